@@ -1,0 +1,18 @@
+#include "can_dbc/dbc_model.h"
+namespace beltgrip::can {
+const SignalDef* MessageDef::find_signal(const std::string& signal_name) const {
+  for (const auto& signal : signals)
+    if (signal.name == signal_name) return &signal;
+  return nullptr;
+}
+const MessageDef* Database::find_message(const std::string& message_name) const {
+  for (const auto& message : messages)
+    if (message.name == message_name) return &message;
+  return nullptr;
+}
+const MessageDef* Database::find_message(CanId id) const {
+  for (const auto& message : messages)
+    if (message.id == id) return &message;
+  return nullptr;
+}
+}  // namespace beltgrip::can

@@ -1,0 +1,40 @@
+// One signal compiled to masks and shifts at load. decode/encode are noexcept, allocation-free and
+// never read outside the payload. Exact for every 64-bit raw value.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "can_dbc/dbc_model.h"
+
+namespace beltgrip::can {
+
+class SignalCodec {
+ public:
+  SignalCodec() = default;
+  explicit SignalCodec(const SignalDef& definition);
+
+  // True if every bit of the signal lies inside a payload of that many bytes.
+  bool fits(std::size_t payload_bytes) const noexcept;
+  // Raw bits, sign-extended to 64 for signed signals. Precondition: fits(payload.size()).
+  std::uint64_t raw(std::span<const std::uint8_t> payload) const noexcept;
+  // raw -> scale * value + offset, each operation rounded. NaN or infinity only for float signals.
+  double physical(std::uint64_t raw_bits) const noexcept;
+  double decode(std::span<const std::uint8_t> payload) const noexcept {
+    return physical(raw(payload));
+  }
+  // Nearest raw value, saturated at what the signal's bits can hold; NaN gives the raw value 0.
+  std::uint64_t raw_from_physical(double value) const noexcept;
+  // Writes the signal's bits and no others. Precondition: fits(payload.size()).
+  void insert(std::span<std::uint8_t> payload, std::uint64_t raw_bits) const noexcept;
+  void encode(std::span<std::uint8_t> payload, double value) const noexcept {
+    insert(payload, raw_from_physical(value));
+  }
+  // All bits one: the usual "signal not available". False for float signals and single bits.
+  bool is_all_ones(std::uint64_t raw_bits) const noexcept;
+  // "decimal text" of the raw value as integer (two's complement for signed), or of the float.
+  std::string raw_text(std::uint64_t raw_bits) const;
+};
+
+}  // namespace beltgrip::can

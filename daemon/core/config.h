@@ -1,0 +1,88 @@
+// The configuration as an immutable value, bound to its DBC files: every role knows its message,
+// codec and unit. Loading reads files and may allocate: start-up and tools only.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "can_dbc/signal_codec.h"
+#include "can_dbc/unit_text.h"
+#include "estimator/parameters.h"
+
+namespace beltgrip::daemon {
+
+enum class Role : std::uint8_t {
+  kPrimarySpeed,
+  kSecondarySpeed,
+  kSecondaryPressure,
+  kEngineTorque,
+  kPrimaryTorque,
+  kSecondaryTorque,
+  kPrimaryPressure,
+  kSecondaryPressureCommand,
+  kEngineSpeed,
+  kOilTemperature,
+  kVehicleSpeed,
+  kAcceleratorPedal,
+  kBrakePressed,
+  kLockupClosed,
+  kExperimentPermitted,
+  kExperimentActive
+};
+inline constexpr std::size_t kRoleCount = 16;
+std::string_view role_name(Role role);  // "primary_speed", as in the configuration
+can::Dimension role_dimension(Role role);
+
+// One role bound to one signal of one message: SI value = factor * (scale * signal + offset) +
+// shift.
+struct RoleBinding {
+  Role role{};
+  std::string message_name;
+  std::string signal_name;
+  can::CanId id;
+  std::uint32_t message_length = 0;  // bytes, as in the DBC
+  can::SignalCodec codec;
+  double minimum = 0.0, maximum = 0.0;  // physical range of the DBC; equal: not given
+  double factor = 1.0, shift = 0.0;     // physical value of the signal -> SI
+  std::optional<double> period_ms;      // from the DBC's cycle time or the configuration
+};
+
+enum class Trigger : std::uint8_t { kCoastDown, kSteady, kSignal, kAlways };
+enum class Control : std::uint8_t { kObserve, kCommand };
+
+struct FrameIdentifiers {  // standard 11 bit
+  std::uint32_t estimate = 0x6A0, slip = 0x6A1, clamp = 0x6A2, status = 0x6A3;
+};
+
+struct Config {
+  std::string interface = "vcan0";
+  std::vector<std::string> dbc;
+  FrameIdentifiers identifiers;
+  std::vector<RoleBinding> roles;  // sorted by role, each at most once
+  estimator::VariatorParameters variator;
+  estimator::SensorAccuracies sensors;
+  estimator::EstimatorSettings estimator;
+  Trigger trigger = Trigger::kCoastDown;
+  Control control = Control::kObserve;
+};
+
+struct ConfigError {
+  int exit_code = 78;  // 66 the file is missing or unreadable, 78 its content
+  std::string text;    // "FILE:LINE: key: found ..., expected ..."
+};
+
+struct ConfigResult {
+  std::optional<Config> config;       // set when errors is empty
+  std::vector<ConfigError> errors;    // all of them
+  std::vector<std::string> warnings;  // problems of the DBC files and the like, one line each
+};
+
+ConfigResult load_config(const std::string& path);
+// Every key with default, unit, range and help: the commented default file.
+std::string default_config_text();
+
+}  // namespace beltgrip::daemon

@@ -1,0 +1,28 @@
+// The loop over a Port: drain frames, sample on the grid, send, report. The same object code for
+// the bus, the embedded bus, replay and simulation. Real-time thread; returns when the Port is
+// closed.
+#pragma once
+
+#include "daemon/core/pipeline.h"
+#include "daemon/core/port.h"
+
+namespace beltgrip::daemon {
+
+// Receives each sample's report (a ring in the daemon, a file in replay, a checker in tests).
+class SampleSink {
+ public:
+  virtual ~SampleSink() = default;
+  virtual void on_report(const SampleReport& report) noexcept = 0;
+};
+
+struct LoopCounters {
+  std::uint64_t samples_late = 0;  // cycle slips
+  std::uint64_t sends_failed = 0;
+};
+
+// The sample grid starts at the first frame's stamp for a Port in log or virtual time, at now() for
+// a bus.
+LoopCounters run_loop(Port& port, Pipeline& pipeline, double sample_rate_hz,
+                      estimator::StopReason end_reason, SampleSink* sink) noexcept;
+
+}  // namespace beltgrip::daemon

@@ -1,0 +1,15 @@
+// Instants and durations of one monotonic time line: int64 nanoseconds. Which clock it is, the Port
+// says.
+#pragma once
+
+#include <cstdint>
+
+namespace beltgrip::daemon {
+
+using MonoTime = std::int64_t;  // ns since the Port's origin
+using Duration = std::int64_t;  // ns
+
+inline constexpr Duration kMillisecond = 1'000'000;
+inline constexpr Duration kSecond = 1'000'000'000;
+
+}  // namespace beltgrip::daemon

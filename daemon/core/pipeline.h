@@ -1,0 +1,90 @@
+// Frames and sample instants in, frames and reports out: everything the daemon decides. No I/O, no
+// clock, no allocation after construction. Real-time thread; replay and simulation use the same
+// object.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+
+#include "can_dbc/can_frame.h"
+#include "daemon/core/config.h"
+#include "daemon/core/port.h"
+#include "estimator/slip_curve_estimator.h"
+
+namespace beltgrip::daemon {
+
+enum class State : std::uint8_t {  // wire values
+  kInhibited,
+  kIdle,
+  kSettling,
+  kRamping,
+  kReleasing,
+  kEvaluating,
+  kCooldown,
+  kFault
+};
+enum class Outcome : std::uint8_t { kNone, kCompleted, kInconclusive, kAborted };  // wire values
+
+struct ExperimentResult {
+  MonoTime start = 0;    // first sample
+  MonoTime end = 0;      // stop decision, or the last sample
+  bool stopped = false;  // a stop decision came (end is its instant)
+  Outcome outcome = Outcome::kNone;
+  estimator::StopReason stop_reason = estimator::StopReason::kNone;
+  estimator::PeakEstimate peak;
+  double sigma_stop_percent = 0.0;  // magnitude
+  std::int64_t samples = 0;         // from start to stop
+  estimator::Direction direction = estimator::Direction::kDrive;
+  estimator::EndStop end_stop = estimator::EndStop::kOverdrive;
+};
+
+// Everything one sample decided: for log, trace, recorder and tests.
+struct SampleReport {
+  MonoTime t = 0;
+  State state = State::kInhibited;
+  bool in_experiment = false;
+  bool macro_slip_stop = false;
+  estimator::VariatorSample sample;
+  estimator::CurveEstimate curve;
+  bool new_result = false;   // result was completed with this sample
+  ExperimentResult result;   // the last one; outcome kNone before the first
+  std::uint32_t faults = 0;  // bit set, see faults.h
+};
+
+struct Outbox {
+  static constexpr std::size_t kCapacity = 12;
+  std::array<can::CanFrame, kCapacity> frames;
+  std::size_t size = 0;
+};
+
+struct PipelineCounters {
+  std::uint64_t frames = 0;          // offered
+  std::uint64_t frames_decoded = 0;  // of a message that carries a role, taken
+  std::uint64_t frames_bad = 0;      // of such a message, but wrong length, kind or protection
+  std::uint64_t samples = 0;
+  std::uint64_t frames_refused = 0;  // by the transmit gate
+};
+
+class Pipeline {
+ public:
+  explicit Pipeline(const Config& config);
+  ~Pipeline();
+  Pipeline(const Pipeline&) = delete;
+  Pipeline& operator=(const Pipeline&) = delete;
+
+  // Frames in order of arrival. BeltGrip's own identifiers are never inputs.
+  void on_frame(const RxFrame& frame) noexcept;
+  void on_bus_state(BusState state, MonoTime t) noexcept;
+  // The sample at t: decides and leaves in outbox what must be sent now.
+  const SampleReport& on_sample(MonoTime t, Outbox& outbox) noexcept;
+  // The end (stop request, end of a log): ends a running experiment and leaves the last frames.
+  const SampleReport& on_end(MonoTime t, estimator::StopReason reason, Outbox& outbox) noexcept;
+  const PipelineCounters& counters() const noexcept;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace beltgrip::daemon

@@ -1,0 +1,43 @@
+// The one seam to the world: waiting, time passing, frames arriving and leaving. SocketCAN, the
+// embedded bus, replay and simulation implement it; everything above is the same object code.
+// Real-time thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "can_dbc/can_frame.h"
+#include "daemon/core/mono_time.h"
+
+namespace beltgrip::daemon {
+
+struct RxFrame {
+  MonoTime t = 0;  // arrival, monotonic; never later than now()
+  can::CanFrame frame;
+  bool own_echo = false;             // our own frame, confirmed as sent
+  std::uint32_t dropped_before = 0;  // frames the kernel lost since the previous RxFrame
+};
+
+enum class Wake : std::uint8_t {
+  kDeadline,  // the deadline has come
+  kFrames,    // receive() has frames
+  kClosed     // the end: stop requested, end of the log; nothing more will come
+};
+
+enum class SendResult : std::uint8_t { kSent, kFull, kDown, kFailed };
+enum class BusState : std::uint8_t { kActive, kWarning, kPassive, kOff, kDown, kAbsent };
+
+class Port {
+ public:
+  virtual ~Port() = default;
+  virtual MonoTime now() noexcept = 0;
+  // Returns at the deadline or earlier. Frames due before the deadline are offered first.
+  virtual Wake wait_until(MonoTime deadline) noexcept = 0;
+  // Takes at most out.size() frames, in order of arrival; 0 when there are none.
+  virtual std::size_t receive(std::span<RxFrame> out) noexcept = 0;
+  virtual SendResult send(const can::CanFrame& frame) noexcept = 0;
+  virtual BusState bus_state() noexcept = 0;
+};
+
+}  // namespace beltgrip::daemon

@@ -1,0 +1,86 @@
+// The common face of the estimation methods: samples in, slope, phase and stop decision out; at the
+// end the maximum friction with its uncertainty. One object lives from start-up on; step and
+// conclude are noexcept, allocate nothing and do bounded work. Real-time thread.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "estimator/parameters.h"
+#include "estimator/variator_sample.h"
+
+namespace beltgrip::estimator {
+
+enum class Phase : std::uint8_t { kQuiet, kExcited, kPeak, kMacroSlip };  // wire values
+
+// First reason wins. Wire values of BeltGripStatus.StopReason.
+enum class StopReason : std::uint8_t {
+  kNone,
+  kSlope,
+  kConfidence,
+  kSlip,
+  kSlipRate,
+  kSlipEnergy,
+  kTime,
+  kForceFloor,
+  kEngineSpeed,
+  kTorque,
+  kRatio,
+  kInputs,
+  kPermission,
+  kDriver,
+  kBus,
+  kShutdown,
+  kTraceEnd
+};
+
+// The state after one sample. mu_star and sigma_star_percent are positive in the direction of the
+// torque.
+struct CurveEstimate {
+  std::int64_t t_ns = 0;
+  double mu_star = 0.0;             // eq. (5)
+  double sigma_star_percent = 0.0;  // eq. (3), percent
+  double slip_variance = 0.0;       // v, eq. (10), (percent slip)^2
+  double friction_slope = 0.0;      // k, 1 / percent slip; held while not excited
+  double clamp_force_N = 0.0;       // F_s
+  double torque_p_Nm = 0.0;         // T_p on the belt, inertia compensated, signed
+  double slip_energy_J = 0.0;       // dissipated since the start
+  Phase phase = Phase::kQuiet;
+  Direction direction = Direction::kDrive;
+  EndStop end_stop = EndStop::kOverdrive;
+  bool usable = false;                  // the values above are defined at this sample
+  StopReason stop = StopReason::kNone;  // stays as it was first set until reset
+};
+
+enum class PeakKind : std::uint8_t { kNone, kValue, kLowerBound };  // wire values of MuMaxKind
+
+struct PeakEstimate {
+  PeakKind kind = PeakKind::kNone;
+  double mu_max = 0.0;      // the value, or the lower bound
+  double mu_max_std = 0.0;  // > 0 with kValue
+  double ci95_low = 0.0;    // includes the configured sensor accuracies
+  double ci95_high = 0.0;
+  double sigma_peak_percent =
+      0.0;                   // slip magnitude at the peak; with kLowerBound: where it was reached
+  std::int64_t samples = 0;  // samples that carried the estimate
+};
+
+class SlipCurveEstimator {
+ public:
+  virtual ~SlipCurveEstimator() = default;
+  // Forgets everything: a new experiment begins with the next sample.
+  virtual void reset() noexcept = 0;
+  // One sample. An unusable sample changes no state and yields usable = false.
+  virtual const CurveEstimate& step(const VariatorSample& sample) noexcept = 0;
+  // After the last step (stop, end of trace, abort): call once per sample until it returns true.
+  virtual bool conclude() noexcept = 0;
+  // Valid once conclude() has returned true.
+  virtual const PeakEstimate& peak() const noexcept = 0;
+};
+
+// All memory is taken here.
+std::unique_ptr<SlipCurveEstimator> make_slip_curve_estimator(const EstimatorSettings& settings,
+                                                              const VariatorParameters& variator,
+                                                              const SensorAccuracies& accuracies);
+
+}  // namespace beltgrip::estimator
