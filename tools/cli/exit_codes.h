@@ -1,0 +1,26 @@
+// Exit codes of both programs (sysexits) as one type, and the failure that carries one. Tools only.
+#pragma once
+
+#include <string>
+
+namespace beltgrip::cli {
+
+enum ExitCode : int {
+  kDone = 0,
+  kUsage = 64,          // the command line
+  kBadInput = 65,       // an input's content cannot be used at all
+  kNoInput = 66,        // an input file is missing or unreadable
+  kUnavailable = 69,    // the bus is not available
+  kInternal = 70,       // a defect of the program
+  kCannotCreate = 73,   // an output could not be created
+  kCannotWrite = 74,    // an output could not be written
+  kConfiguration = 78,  // the configuration or scenario, or what it names
+};
+
+// Thrown by a subcommand, caught once in main: one line on standard error, then the exit code.
+struct Failure {
+  int exit_code = kInternal;
+  std::string text;
+};
+
+}  // namespace beltgrip::cli

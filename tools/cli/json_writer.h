@@ -1,0 +1,110 @@
+// JSON text, one value after the other, without a document in memory. Numbers are the shortest text
+// that reads back to the same double; NaN and infinity are null. Tools only.
+#pragma once
+
+#include <charconv>
+#include <cmath>
+#include <concepts>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace beltgrip::cli {
+
+class JsonWriter {
+ public:
+  JsonWriter& begin_object() { return open('{'); }
+  JsonWriter& end_object() { return close('}'); }
+  JsonWriter& begin_array() { return open('['); }
+  JsonWriter& end_array() { return close(']'); }
+
+  JsonWriter& key(std::string_view name) {
+    separate();
+    quote(name);
+    text_ += ':';
+    after_key_ = true;
+    return *this;
+  }
+
+  JsonWriter& value(std::string_view text) {
+    separate();
+    quote(text);
+    return *this;
+  }
+  JsonWriter& value(const char* text) { return value(std::string_view(text)); }
+  JsonWriter& value(bool flag) { return raw(flag ? "true" : "false"); }
+  JsonWriter& value(double number) {
+    if (!std::isfinite(number)) return null();
+    return number_text(number);
+  }
+  JsonWriter& value(std::integral auto number) { return number_text(number); }
+  JsonWriter& null() { return raw("null"); }
+  // Text that is JSON already.
+  JsonWriter& raw(std::string_view json) {
+    separate();
+    text_ += json;
+    return *this;
+  }
+
+  JsonWriter& field(std::string_view name, const auto& content) { return key(name).value(content); }
+
+  const std::string& text() const { return text_; }
+  // Hands over the text and starts again.
+  std::string take() {
+    std::string result;
+    result.swap(text_);
+    first_ = true;
+    after_key_ = false;
+    return result;
+  }
+
+ private:
+  JsonWriter& open(char bracket) {
+    separate();
+    text_ += bracket;
+    first_ = true;
+    return *this;
+  }
+  JsonWriter& close(char bracket) {
+    text_ += bracket;
+    first_ = false;
+    return *this;
+  }
+  void separate() {
+    if (after_key_) {
+      after_key_ = false;
+    } else if (!first_) {
+      text_ += ',';
+    }
+    first_ = false;
+  }
+  JsonWriter& number_text(auto number) {
+    char buffer[32];
+    const auto end = std::to_chars(buffer, buffer + sizeof buffer, number).ptr;
+    return raw({buffer, static_cast<std::size_t>(end - buffer)});
+  }
+  void quote(std::string_view text) {
+    static constexpr char kHex[] = "0123456789abcdef";
+    text_ += '"';
+    for (const char c : text) {
+      const auto byte = static_cast<unsigned char>(c);
+      if (c == '"' || c == '\\') {
+        text_ += '\\';
+        text_ += c;
+      } else if (byte < 0x20 || byte == 0x7F) {
+        text_ += "\\u00";
+        text_ += kHex[byte >> 4];
+        text_ += kHex[byte & 15];
+      } else {
+        text_ += c;
+      }
+    }
+    text_ += '"';
+  }
+
+  std::string text_;
+  bool first_ = true;
+  bool after_key_ = false;
+};
+
+}  // namespace beltgrip::cli

@@ -1,0 +1,86 @@
+// The program beltgrip: registers the subcommands, runs one, turns every failure into one line on
+// standard error and a sysexits code.
+#include <cstdio>
+#include <exception>
+#include <string>
+
+#include "tools/cli/command.h"
+
+namespace beltgrip::cli {
+namespace {
+
+// Named in the interfaces, not built yet: known by name so that the answer is an honest one.
+constexpr const char* kLater[] = {"calibrate", "diagnose", "report", "can", "history", "status"};
+
+void add_later(CLI::App& app) {
+  for (const char* name : kLater) {
+    CLI::App* command = app.add_subcommand(name)->group("");
+    command->allow_extras();
+    command->set_help_flag();
+    command->callback([name] {
+      throw Failure{kConfiguration, std::string(name) + ": not in this version"};
+    });
+  }
+}
+
+int fail(const std::string& text, int exit_code) {
+  std::fprintf(stderr, "beltgrip: %s\n", text.c_str());
+  return exit_code;
+}
+
+std::string one_line(std::string text) {
+  for (char& c : text) {
+    if (c == '\n' || c == '\r') c = ' ';
+  }
+  return text;
+}
+
+// The first argument, where it is neither an option nor a subcommand.
+std::string unknown_subcommand(const CLI::App& app, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-' || app.get_subcommand_no_throw(argv[1]) != nullptr) return {};
+  return argv[1];
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"BeltGrip: measures the belt-pulley friction of a metal pushbelt CVT over CAN."};
+  app.name("beltgrip");
+  app.set_version_flag("--version", "beltgrip " BELTGRIP_VERSION);
+  app.require_subcommand(1);
+  app.get_formatter()->column_width(34);
+  add_later(app);
+  for (CLI::App* command : app.get_subcommands(nullptr)) {
+    if (!command->get_group().empty()) {
+      command->set_version_flag("--version", "beltgrip " BELTGRIP_VERSION);
+    }
+  }
+  if (const std::string name = unknown_subcommand(app, argc, argv); !name.empty()) {
+    return fail("unknown subcommand '" + name + "' (see beltgrip --help)", kUsage);
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& success) {  // --help, --version
+    return app.exit(success);
+  } catch (const CLI::ParseError& error) {
+    std::string hint = "beltgrip";
+    for (const CLI::App* command : app.get_subcommands()) hint += " " + command->get_name();
+    return fail(one_line(error.what()) + " (see " + hint + " --help)", kUsage);
+  } catch (const Failure& failure) {
+    return fail(one_line(failure.text), failure.exit_code);
+  }
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    return fail("standard output: cannot write", kCannotWrite);
+  }
+  return kDone;
+}
+
+}  // namespace
+}  // namespace beltgrip::cli
+
+int main(int argc, char** argv) {
+  try {
+    return beltgrip::cli::run(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "beltgrip: internal error: %s\n", error.what());
+    return beltgrip::cli::kInternal;
+  }
+}
