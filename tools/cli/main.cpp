@@ -37,7 +37,10 @@ std::string one_line(std::string text) {
 
 // The first argument, where it is neither an option nor a subcommand.
 std::string unknown_subcommand(const CLI::App& app, int argc, char** argv) {
-  if (argc < 2 || argv[1][0] == '-' || app.get_subcommand_no_throw(argv[1]) != nullptr) return {};
+  if (argc < 2 || argv[1][0] == '-') return {};
+  for (const CLI::App* command : app.get_subcommands(nullptr)) {
+    if (command->get_name() == argv[1]) return {};
+  }
   return argv[1];
 }
 
