@@ -15,8 +15,11 @@ class SignalCodec {
   SignalCodec() = default;
   explicit SignalCodec(const SignalDef& definition);
 
-  // True if every bit of the signal lies inside a payload of that many bytes.
-  bool fits(std::size_t payload_bytes) const noexcept;
+  // True if every bit of the signal lies inside a payload of that many bytes. Never for a signal of
+  // no bits or more than 64.
+  bool fits(std::size_t payload_bytes) const noexcept {
+    return byte_count_ != 0 && first_byte_ + byte_count_ <= payload_bytes;
+  }
   // Raw bits, sign-extended to 64 for signed signals. Precondition: fits(payload.size()).
   std::uint64_t raw(std::span<const std::uint8_t> payload) const noexcept;
   // raw -> scale * value + offset, each operation rounded. NaN or infinity only for float signals.
@@ -35,6 +38,25 @@ class SignalCodec {
   bool is_all_ones(std::uint64_t raw_bits) const noexcept;
   // "decimal text" of the raw value as integer (two's complement for signed), or of the float.
   std::string raw_text(std::uint64_t raw_bits) const;
+
+  bool is_float() const noexcept { return kind_ >= Kind::kFloat16; }
+
+ private:
+  enum class Kind : std::uint8_t { kUnsigned, kSigned, kFloat16, kFloat32, kFloat64 };
+
+  // The value of a float signal's bits.
+  double float_value(std::uint64_t raw_bits) const noexcept;
+  std::uint64_t float_bits(double value) const noexcept;
+
+  double scale_ = 1.0;
+  double offset_ = 0.0;
+  std::uint64_t mask_ = 0;        // length ones
+  std::uint32_t first_byte_ = 0;  // lowest byte index touched
+  std::uint8_t byte_count_ = 0;   // bytes touched, 1..9; 0: not a signal that can be decoded
+  std::uint8_t shift_ = 0;        // bits below the signal in the touched bytes read as one number
+  std::uint8_t length_ = 0;       // bits
+  ByteOrder byte_order_ = ByteOrder::kLittle;
+  Kind kind_ = Kind::kUnsigned;
 };
 
 }  // namespace beltgrip::can
