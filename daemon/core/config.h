@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "can_dbc/signal_codec.h"
@@ -37,6 +38,12 @@ inline constexpr std::size_t kRoleCount = 16;
 std::string_view role_name(Role role);  // "primary_speed", as in the configuration
 can::Dimension role_dimension(Role role);
 
+// A multiplexed signal is in the frame when the selector's raw value lies in one of the ranges.
+struct MuxCondition {
+  can::SignalCodec selector;
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges;  // inclusive
+};
+
 // One role bound to one signal of one message: SI value = factor * (scale * signal + offset) +
 // shift.
 struct RoleBinding {
@@ -45,7 +52,9 @@ struct RoleBinding {
   std::string signal_name;
   can::CanId id;
   std::uint32_t message_length = 0;  // bytes, as in the DBC
+  bool message_fd = false;
   can::SignalCodec codec;
+  std::vector<MuxCondition> mux;  // all must hold (a selector may be multiplexed itself)
   double minimum = 0.0, maximum = 0.0;  // physical range of the DBC; equal: not given
   double factor = 1.0, shift = 0.0;     // physical value of the signal -> SI
   std::optional<double> period_ms;      // from the DBC's cycle time or the configuration

@@ -20,8 +20,10 @@ struct LoopCounters {
   std::uint64_t sends_failed = 0;
 };
 
-// The sample grid starts at the first frame's stamp for a Port in log or virtual time, at now() for
-// a bus.
+// The sample grid starts at port.now() as it is when run_loop is called: the first frame's stamp
+// for a Port in log time. Samples that could not be taken in time are taken late, in order and with
+// the frames that had come by their instants, so a late loop decides what a punctual one would
+// have.
 LoopCounters run_loop(Port& port, Pipeline& pipeline, double sample_rate_hz,
                       estimator::StopReason end_reason, SampleSink* sink) noexcept;
 

@@ -9,35 +9,13 @@
 
 #include "can_dbc/can_frame.h"
 #include "daemon/core/config.h"
+#include "daemon/core/experiment.h"
+#include "daemon/core/faults.h"
+#include "daemon/core/outbox.h"
 #include "daemon/core/port.h"
 #include "estimator/slip_curve_estimator.h"
 
 namespace beltgrip::daemon {
-
-enum class State : std::uint8_t {  // wire values
-  kInhibited,
-  kIdle,
-  kSettling,
-  kRamping,
-  kReleasing,
-  kEvaluating,
-  kCooldown,
-  kFault
-};
-enum class Outcome : std::uint8_t { kNone, kCompleted, kInconclusive, kAborted };  // wire values
-
-struct ExperimentResult {
-  MonoTime start = 0;    // first sample
-  MonoTime end = 0;      // stop decision, or the last sample
-  bool stopped = false;  // a stop decision came (end is its instant)
-  Outcome outcome = Outcome::kNone;
-  estimator::StopReason stop_reason = estimator::StopReason::kNone;
-  estimator::PeakEstimate peak;
-  double sigma_stop_percent = 0.0;  // magnitude
-  std::int64_t samples = 0;         // from start to stop
-  estimator::Direction direction = estimator::Direction::kDrive;
-  estimator::EndStop end_stop = estimator::EndStop::kOverdrive;
-};
 
 // Everything one sample decided: for log, trace, recorder and tests.
 struct SampleReport {
@@ -49,13 +27,7 @@ struct SampleReport {
   estimator::CurveEstimate curve;
   bool new_result = false;   // result was completed with this sample
   ExperimentResult result;   // the last one; outcome kNone before the first
-  std::uint32_t faults = 0;  // bit set, see faults.h
-};
-
-struct Outbox {
-  static constexpr std::size_t kCapacity = 12;
-  std::array<can::CanFrame, kCapacity> frames;
-  std::size_t size = 0;
+  std::uint32_t faults = 0;  // fault_bit()s of faults.h
 };
 
 struct PipelineCounters {

@@ -15,7 +15,8 @@ namespace beltgrip::daemon {
 struct RxFrame {
   MonoTime t = 0;  // arrival, monotonic; never later than now()
   can::CanFrame frame;
-  bool own_echo = false;             // our own frame, confirmed as sent
+  bool own_echo = false;             // our own frame, confirmed as sent (a log's port leaves our
+                                     // identifiers out: elsewhere they mean a foreign sender)
   std::uint32_t dropped_before = 0;  // frames the kernel lost since the previous RxFrame
 };
 

@@ -1,0 +1,80 @@
+#include "daemon/core/tx_gate.h"
+
+#include "can_dbc/e2e.h"
+
+namespace beltgrip::daemon {
+
+namespace {
+
+constexpr std::uint8_t kLength = 8;
+constexpr std::array<std::uint16_t, 4> kDataIds{0x6A0, 0x6A1, 0x6A2, 0x6A3};
+enum : std::size_t { kEstimate, kSlip, kClamp, kStatus };
+
+// Codes as laid out in beltgrip.dbc; a test compares. Written out here so that the gate reads the
+// bytes on its own.
+bool content_allowed(std::size_t message, const can::CanFrame& frame) noexcept {
+  const auto& bytes = frame.data;
+  switch (message) {
+    case kEstimate: {
+      const unsigned kind = (bytes[1] >> 4) & 0x3U;
+      const bool valid = (bytes[1] & 0x40U) != 0;
+      return kind <= 2 && (!valid || kind == 1) && (bytes[1] & 0x80U) == 0;
+    }
+    case kSlip:
+      return (bytes[1] & 0x80U) == 0;
+    case kClamp: {
+      const bool active = (bytes[2] & 0x01U) != 0;
+      const bool force = bytes[3] != 0 || bytes[4] != 0;
+      return (bytes[1] & 0xF0U) == 0 && (bytes[2] & 0xFEU) == 0 && active == force &&
+             bytes[5] == 0 && bytes[6] == 0 && bytes[7] == 0;
+    }
+    default: {
+      const unsigned state = bytes[1] >> 4;
+      const unsigned reason = bytes[2] >> 2 & 0x1FU;
+      return state <= 7 && reason <= 16 && (bytes[2] & 0x80U) == 0 && (bytes[4] & 0x80U) == 0 &&
+             bytes[5] == 0 && bytes[6] == 0 && bytes[7] == 0;
+    }
+  }
+}
+
+}  // namespace
+
+TxGate::TxGate(const FrameIdentifiers& identifiers, Control control) noexcept
+    : identifiers_{identifiers.estimate, identifiers.slip, identifiers.clamp, identifiers.status},
+      control_(control) {
+  expected_counter_.fill(kAnyCounter);
+}
+
+std::size_t TxGate::message_of(const can::CanFrame& frame) const noexcept {
+  if (frame.id.extended || frame.remote || frame.error || frame.fd || frame.length != kLength) {
+    return kMessages;
+  }
+  for (std::size_t i = 0; i < kMessages; ++i) {
+    if (frame.id.value == identifiers_[i]) return i;
+  }
+  return kMessages;
+}
+
+bool TxGate::permits(const can::CanFrame& frame) noexcept {
+  const std::size_t message = message_of(frame);
+  if (message == kMessages) {
+    ++refused_;
+    return false;
+  }
+  const auto counter = static_cast<std::uint8_t>(frame.data[1] & 0x0FU);
+  std::uint8_t& expected = expected_counter_[message];
+  const bool allowed =
+      (message != kClamp || control_ == Control::kCommand) && counter <= can::e2e::kCounterMax &&
+      (expected == kAnyCounter || counter == expected) &&
+      can::e2e::crc_profile1(kDataIds[message], frame.payload().subspan(1)) == frame.data[0] &&
+      content_allowed(message, frame);
+  if (!allowed) {
+    expected = kAnyCounter;
+    ++refused_;
+    return false;
+  }
+  expected = can::e2e::next_counter(counter);
+  return true;
+}
+
+}  // namespace beltgrip::daemon
