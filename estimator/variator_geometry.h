@@ -13,8 +13,8 @@ struct RunningRadii {
 // sin(phi) = (R_p - R_s) / d.
 double belt_length_m(double primary_radius_m, double secondary_radius_m, double centre_distance_m);
 
-// Radii for the geometric ratio r_g = R_p / R_s. Lengths > 0, ratio > 0; radii are 0 where no pair of
-// radii closes the belt (too short, or a radius beyond the centre distance).
+// Radii for the geometric ratio r_g = R_p / R_s. Lengths > 0, ratio > 0; radii are 0 where no pair
+// of radii closes the belt (too short, or a radius beyond the centre distance).
 RunningRadii running_radii(double ratio, double belt_length, double centre_distance_m);
 
 }  // namespace beltgrip::estimator

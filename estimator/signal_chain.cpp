@@ -1,0 +1,94 @@
+#include "estimator/signal_chain.h"
+
+#include <cmath>
+
+#include "estimator/clamp_force.h"
+
+namespace beltgrip::estimator {
+namespace {
+
+bool finite(const VariatorSample& sample) {
+  return std::isfinite(sample.omega_p_rad_s) && std::isfinite(sample.omega_s_rad_s) &&
+         std::isfinite(sample.secondary_pressure_Pa) && std::isfinite(sample.torque_Nm);
+}
+
+}  // namespace
+
+SignalChain::SignalChain(const EstimatorSettings& settings, const VariatorParameters& variator,
+                         double lowpass_hz)
+    : variator_(variator),
+      choice_(settings.ratio),
+      inertia_kg_m2_(settings.torque_is_engine ? variator.primary_inertia_kg_m2 : 0.0),
+      acquire_samples_(std::lround(kAcquire_s * settings.sample_rate_hz) + 1),
+      omega_p_(lowpass_hz, settings.sample_rate_hz),
+      omega_s_(lowpass_hz, settings.sample_rate_hz),
+      pressure_(lowpass_hz, settings.sample_rate_hz),
+      torque_(lowpass_hz, settings.sample_rate_hz) {}
+
+void SignalChain::reset() noexcept {
+  started_ = false;
+  acquired_ = 0;
+  ratio_sum_ = 0.0;
+  out_ = {};
+}
+
+void SignalChain::acquire(double ratio) noexcept {
+  const double torque = out_.torque_p_Nm;
+  const bool overrun = torque < 0.0;
+  if (std::abs(torque) <= kTorqueDeadBand_Nm ||
+      (acquired_ > 0 && overrun != (point_.direction == Direction::kOverrun))) {
+    acquired_ = 0;
+    ratio_sum_ = 0.0;
+    return;
+  }
+  ++acquired_;
+  ratio_sum_ += ratio;
+  point_.direction = overrun ? Direction::kOverrun : Direction::kDrive;
+  if (acquired_ < acquire_samples_) return;
+  const double mean_ratio = ratio_sum_ / static_cast<double>(acquired_);
+  EndStop end_stop = choice_ == RatioChoice::kLow ? EndStop::kLow : EndStop::kOverdrive;
+  if (choice_ == RatioChoice::kEither) end_stop = nearest_end_stop(variator_, mean_ratio);
+  point_ = operating_point(variator_, end_stop, point_.direction);
+  if (std::abs(slip_percent(point_, 1.0, mean_ratio)) > kRatioTolerance_percent) {
+    out_.stop = StopReason::kRatio;
+  }
+}
+
+const Measurement& SignalChain::step(const VariatorSample& sample) noexcept {
+  if (!sample.usable || !finite(sample) || (started_ && sample.t_ns <= last_t_ns_)) {
+    out_.usable = false;
+    return out_;
+  }
+  if (!started_) {
+    omega_p_.reset(sample.omega_p_rad_s);
+    omega_s_.reset(sample.omega_s_rad_s);
+    pressure_.reset(sample.secondary_pressure_Pa);
+    torque_.reset(sample.torque_Nm);
+    started_ = true;
+  }
+  last_t_ns_ = sample.t_ns;
+  const double omega_p = omega_p_.step(sample.omega_p_rad_s);
+  const double omega_s = omega_s_.step(sample.omega_s_rad_s);
+  out_.omega_p_rad_s = omega_p;
+  out_.omega_s_rad_s = omega_s;
+  out_.torque_p_Nm = torque_.step(sample.torque_Nm) - inertia_kg_m2_ * omega_p_.derivative();
+  out_.clamp_force_N =
+      secondary_clamp_force_N(variator_, pressure_.step(sample.secondary_pressure_Pa), omega_s);
+  out_.usable = false;
+  if (omega_p <= 0.0 || out_.clamp_force_N <= 0.0) return out_;
+  if (acquired_ < acquire_samples_) acquire(omega_s / omega_p);
+  if (acquired_ < acquire_samples_ || out_.stop != StopReason::kNone) return out_;
+
+  out_.slip_percent = slip_percent(point_, omega_p, omega_s);
+  out_.mu_star = traction_coefficient(variator_, point_, out_.torque_p_Nm, out_.clamp_force_N);
+  if (point_.sign * out_.torque_p_Nm < -kTorqueDeadBand_Nm) {
+    out_.stop = StopReason::kTorque;
+  } else if (out_.slip_percent < -kRatioTolerance_percent) {
+    out_.stop = StopReason::kRatio;
+  } else {
+    out_.usable = point_.sign * out_.torque_p_Nm > kTorqueDeadBand_Nm;
+  }
+  return out_;
+}
+
+}  // namespace beltgrip::estimator

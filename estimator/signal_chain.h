@@ -1,0 +1,62 @@
+// From one sample to slip, traction coefficient and clamp force: common low-pass, inertia torque,
+// operating point, and the checks that these are defined. Shared by the methods. Real-time thread;
+// no allocation after construction.
+//
+// The operating point (direction, end stop) is taken from the mean of the first kAcquire_s in which
+// the filtered torque stands outside its dead band, and then kept. What contradicts it later is a
+// reason to stop, not a number: torque that has changed its sign (kTorque), a ratio that is no
+// end stop's, or slip against the torque (kRatio).
+#pragma once
+
+#include <cstdint>
+
+#include "estimator/input_filter.h"
+#include "estimator/parameters.h"
+#include "estimator/slip.h"
+#include "estimator/slip_curve_estimator.h"
+#include "estimator/variator_sample.h"
+
+namespace beltgrip::estimator {
+
+inline constexpr double kAcquire_s = 0.25;
+// Deformation, calibration of the end stop and slip that is there already stay below this; the
+// next gear of a continuously variable transmission does not.
+inline constexpr double kRatioTolerance_percent = 8.0;
+
+struct Measurement {  // filtered
+  double omega_p_rad_s = 0.0;
+  double omega_s_rad_s = 0.0;
+  double torque_p_Nm = 0.0;  // on the belt, signed
+  double clamp_force_N = 0.0;
+  double slip_percent = 0.0;  // sigma*, in the direction of the torque
+  double mu_star = 0.0;
+  bool usable = false;
+  StopReason stop = StopReason::kNone;  // kTorque or kRatio
+};
+
+class SignalChain {
+ public:
+  SignalChain(const EstimatorSettings& settings, const VariatorParameters& variator,
+              double lowpass_hz);
+  void reset() noexcept;
+  // A sample that is unusable, not finite or not later than the one before changes nothing.
+  const Measurement& step(const VariatorSample& sample) noexcept;
+  const OperatingPoint& point() const noexcept { return point_; }
+
+ private:
+  void acquire(double ratio) noexcept;
+
+  VariatorParameters variator_;
+  RatioChoice choice_;
+  double inertia_kg_m2_;
+  std::int64_t acquire_samples_;
+  LowPass omega_p_, omega_s_, pressure_, torque_;
+  OperatingPoint point_;
+  Measurement out_;
+  std::int64_t last_t_ns_ = 0;
+  std::int64_t acquired_ = 0;  // samples outside the dead band in a row, at the start
+  double ratio_sum_ = 0.0;
+  bool started_ = false;
+};
+
+}  // namespace beltgrip::estimator

@@ -1,0 +1,35 @@
+// One method on one trace of the panel: what came out, judged against the truth.
+#pragma once
+
+#include "estimator/slip_curve_estimator.h"
+#include "virtual_variator.h"
+
+namespace beltgrip::panel {
+
+struct Outcome {
+  bool has_peak = false;     // the true slip went past the peak somewhere in the trace
+  bool peak_passed = false;  // before the stop
+  bool stopped = false;
+  bool early = false;
+  bool beyond_10_percent = false;
+  estimator::StopReason reason = estimator::StopReason::kNone;
+  double stop_s = 0.0;
+  double delay_s = 0.0;            // after the true peak
+  double slip_past_percent = 0.0;  // sigma* at the stop beyond that of the peak (flat top: its end)
+  double slip_past_peak_percent = 0.0;
+  double mu_reached = 0.0;  // largest true mu* up to the stop
+  estimator::PeakEstimate peak;
+  double relative_error = 0.0;  // of mu_max, where the kind is a value and there is a peak
+  int conclude_calls = 0;
+};
+
+struct RunOptions {
+  estimator::Method method = estimator::Method::kRobust;
+  bool with_accuracies = false;  // [sensors] as the scenario says
+  bool keep_going = false;       // reads on to the end of the trace even after a stop
+  double until_s = 1e9;          // ends the trace there
+};
+
+Outcome run(const Scenario& scenario, const Trace& trace, const RunOptions& options);
+
+}  // namespace beltgrip::panel
