@@ -1,0 +1,48 @@
+#include "tools/sim/friction_curve.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace beltgrip::sim {
+
+namespace {
+
+constexpr double kSteepness = 2.2;    // of the rise: tanh(2.2) = 0.976
+constexpr double kShape = 1.3;        // C of the magic formula
+constexpr double kFloorOfFall = 0.5;  // share of the peak that stays at any slip
+
+FrictionPoint rise(double mu_scale, double peak_slip, double slip) {
+  const double t = std::tanh(kSteepness * slip / peak_slip);
+  return {mu_scale * t, mu_scale * (1.0 - t * t) * kSteepness / peak_slip};
+}
+
+FrictionPoint magnitude(const FrictionCurve& curve, double slip) {
+  const double peak_slip = curve.peak_slip_percent / 100.0;
+  switch (curve.shape) {
+    case CurveShape::kSaturating:
+      return rise(curve.mu_max, peak_slip, slip);
+    case CurveShape::kMagicFormula: {
+      // The peak lies where C atan(B s) = pi / 2.
+      const double b = std::tan(std::numbers::pi / (2.0 * kShape)) / peak_slip;
+      const double angle = kShape * std::atan(b * slip);
+      return {curve.mu_max * std::sin(angle),
+              curve.mu_max * std::cos(angle) * kShape * b / (1.0 + b * b * slip * slip)};
+    }
+    case CurveShape::kTanhFall:
+      break;
+  }
+  if (slip <= peak_slip) return rise(curve.mu_max / std::tanh(kSteepness), peak_slip, slip);
+  const double fall = 100.0 * curve.fall_per_percent;
+  const double mu = curve.mu_max - fall * (slip - peak_slip);
+  const double floor = kFloorOfFall * curve.mu_max;
+  return mu > floor ? FrictionPoint{mu, -fall} : FrictionPoint{floor, 0.0};
+}
+
+}  // namespace
+
+FrictionPoint friction_at(const FrictionCurve& curve, double slip) {
+  const FrictionPoint point = magnitude(curve, std::abs(slip));
+  return {std::copysign(point.mu, slip), point.slope};
+}
+
+}  // namespace beltgrip::sim

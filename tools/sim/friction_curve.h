@@ -1,0 +1,29 @@
+// The simulated belt's own friction law: coefficient over slip, odd in slip. It shares nothing with
+// the estimator. Slip as a fraction (0.02 = 2 %). Pure functions.
+//
+//   tanh_fall      mu_pk tanh(2.2 s / s_pk) / tanh(2.2) up to the peak, then a linear fall that
+//   ends
+//                  at half the peak. A kink at the peak: the hard case for a local fit.
+//   magic_formula  D sin(C atan(B s)), smooth at the peak; C = 1.3, B puts the peak at s_pk.
+//   saturating     mu_pk tanh(2.2 s / s_pk): rises for ever, has no peak.
+#pragma once
+
+namespace beltgrip::sim {
+
+enum class CurveShape { kTanhFall, kMagicFormula, kSaturating };
+
+struct FrictionCurve {
+  CurveShape shape = CurveShape::kTanhFall;
+  double mu_max = 0.105;
+  double peak_slip_percent = 2.0;
+  double fall_per_percent = 1.5e-3;  // tanh_fall only: mu lost per percent of slip beyond the peak
+};
+
+struct FrictionPoint {
+  double mu = 0.0;
+  double slope = 0.0;  // d mu / d slip, per unit slip
+};
+
+FrictionPoint friction_at(const FrictionCurve& curve, double slip);
+
+}  // namespace beltgrip::sim

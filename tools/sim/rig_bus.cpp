@@ -1,0 +1,111 @@
+#include "tools/sim/rig_bus.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string_view>
+
+#include "can_dbc/unit_text.h"
+
+namespace beltgrip::sim {
+
+namespace {
+
+constexpr double kOilTemperature_degC = 80.0;
+
+struct ChannelRow {
+  std::string_view signal;  // name in the DBC
+  double (*value)(const RigSignals&);
+  double Scenario::*noise;
+  double Scenario::*bias;
+};
+
+const ChannelRow kChannels[] = {
+    {"PrimarySpeed", [](const RigSignals& s) { return s.omega_p_rad_s; },
+     &Scenario::primary_speed_noise_rad_s, nullptr},
+    {"SecondarySpeed", [](const RigSignals& s) { return s.omega_s_rad_s; },
+     &Scenario::secondary_speed_noise_rad_s, nullptr},
+    {"PrimaryTorque", [](const RigSignals& s) { return s.torque_p_Nm; }, &Scenario::torque_noise_Nm,
+     &Scenario::torque_bias_Nm},
+    {"SecondaryTorque", [](const RigSignals& s) { return s.torque_s_Nm; },
+     &Scenario::torque_noise_Nm, nullptr},
+    {"SecondaryPressure", [](const RigSignals& s) { return s.pressure_Pa; },
+     &Scenario::pressure_noise_Pa, &Scenario::pressure_bias_Pa},
+    {"SecondaryPressureCommand", [](const RigSignals& s) { return s.pressure_command_Pa; }, nullptr,
+     nullptr},
+    {"OilTemperature", [](const RigSignals&) { return kOilTemperature_degC; }, nullptr, nullptr},
+    {"ExperimentActive",
+     [](const RigSignals& s) { return s.mode == RigMode::kLowering ? 1.0 : 0.0; }, nullptr,
+     nullptr},
+    {"RigMode", [](const RigSignals& s) { return static_cast<double>(s.mode); }, nullptr, nullptr},
+};
+constexpr std::string_view kCounterSuffix = "Counter";
+
+}  // namespace
+
+RigBus::RigBus(const can::Database& dbc, const Scenario& scenario, std::uint64_t seed)
+    : jitter_(seed, "frame jitter"),
+      delay_ns_(std::llround(scenario.frame_delay_s * 1e9)),
+      jitter_ns_(scenario.frame_jitter_s * 1e9) {
+  const std::int64_t step_ns = std::llround(scenario.step_s * 1e9);
+  for (const ChannelRow& row : kChannels) {
+    channels_.push_back({row.value, row.noise ? scenario.*row.noise : 0.0,
+                         row.bias ? scenario.*row.bias : 0.0, Random(seed, row.signal)});
+  }
+  for (const can::MessageDef& definition : dbc.messages) {
+    Message message;
+    message.id = definition.id;
+    message.length = static_cast<std::uint8_t>(definition.length);
+    message.period_ns = std::llround(definition.cycle_ms.value_or(0.0) * 1e6);
+    // Neighbours in the file measure one step after each other, as a cyclic program does.
+    message.next_ns = static_cast<std::int64_t>(messages_.size()) * step_ns;
+    if (message.period_ns <= 0) throw std::logic_error(definition.name + " has no cycle time");
+    for (const can::SignalDef& signal : definition.signals) {
+      if (signal.name.ends_with(kCounterSuffix)) {
+        message.counter_codec = can::SignalCodec(signal);
+        message.has_counter = true;
+        continue;
+      }
+      const auto row = std::find_if(std::begin(kChannels), std::end(kChannels),
+                                    [&](const ChannelRow& r) { return r.signal == signal.name; });
+      const auto unit = signal.unit.empty() ? can::Unit{} : can::parse_unit(signal.unit);
+      if (row == std::end(kChannels) || !unit) {
+        throw std::logic_error(signal.name + " is not a signal of the rig");
+      }
+      message.signals.push_back({can::SignalCodec(signal),
+                                 static_cast<std::size_t>(row - std::begin(kChannels)),
+                                 1.0 / unit->factor, unit->offset});
+    }
+    messages_.push_back(std::move(message));
+  }
+}
+
+void RigBus::sample(std::int64_t now_ns, std::int64_t step_ns, const RigSignals& signals,
+                    std::vector<can::StampedFrame>& out) {
+  const auto first = static_cast<std::ptrdiff_t>(out.size());
+  for (Message& message : messages_) {
+    if (message.next_ns >= now_ns + step_ns) continue;
+    message.next_ns += message.period_ns;
+    can::StampedFrame stamped;
+    stamped.t_ns = now_ns + delay_ns_ + static_cast<std::int64_t>(jitter_ns_ * jitter_.uniform());
+    stamped.frame.id = message.id;
+    stamped.frame.length = message.length;
+    const std::span<std::uint8_t> payload(stamped.frame.data.data(), message.length);
+    for (const Signal& signal : message.signals) {
+      Channel& channel = channels_[signal.channel];
+      const double value = channel.value(signals) + channel.bias +
+                           (channel.noise > 0.0 ? channel.noise * channel.random.normal() : 0.0);
+      signal.codec.encode(payload, (value - signal.to_unit_shift) * signal.to_unit_factor);
+    }
+    if (message.has_counter) {
+      message.counter_codec.insert(payload, message.counter);
+      message.counter = static_cast<std::uint8_t>((message.counter + 1) & 15);
+    }
+    out.push_back(stamped);
+  }
+  std::stable_sort(
+      out.begin() + first, out.end(),
+      [](const can::StampedFrame& a, const can::StampedFrame& b) { return a.t_ns < b.t_ns; });
+}
+
+}  // namespace beltgrip::sim

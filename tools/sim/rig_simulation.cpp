@@ -1,0 +1,134 @@
+#include "tools/sim/rig_simulation.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace beltgrip::sim {
+
+RigSimulation::RigSimulation(const Scenario& scenario)
+    : scenario_(scenario),
+      plant_(scenario.variator, scenario.friction()),
+      step_ns_(std::llround(scenario.step_s * 1e9)),
+      step_s_(static_cast<double>(step_ns_) * 1e-9),
+      command_force_N_(scenario.start_force_N),
+      clamp_force_N_(scenario.start_force_N),
+      cycles_left_(std::round(scenario.cycles)) {
+  plant_.settle(scenario.primary_speed_rad_s, scenario.primary_torque_Nm, clamp_force_N_);
+  load_torque_Nm_ = plant_.balancing_load_Nm(scenario.primary_torque_Nm, clamp_force_N_);
+  controller_torque_Nm_ = scenario.primary_torque_Nm;
+  signals_.omega_p_rad_s = plant_.state().omega_p_rad_s;
+  signals_.omega_s_rad_s = plant_.state().omega_s_rad_s;
+  signals_.torque_p_Nm = scenario.primary_torque_Nm;
+  signals_.torque_s_Nm = load_torque_Nm_;
+  signals_.pressure_Pa = signals_.pressure_command_Pa = pressure_Pa(clamp_force_N_);
+}
+
+double RigSimulation::pressure_Pa(double clamp_force_N) const {
+  return (clamp_force_N - scenario_.secondary_spring_force_N) / scenario_.secondary_piston_area_m2;
+}
+
+double RigSimulation::sigma_star() const {
+  const PlantState& state = plant_.state();
+  return 1.0 - state.omega_s_rad_s / state.omega_p_rad_s / scenario_.variator.ratio;
+}
+
+// The operator: hold, lower, notice the slip, let go, rest, and again.
+void RigSimulation::operate() {
+  const double now_s = static_cast<double>(now_ns_) * 1e-9;
+  const double in_mode_s = now_s - mode_since_s_;
+  const auto enter = [&](RigMode mode) {
+    signals_.mode = mode;
+    mode_since_s_ = now_s;
+  };
+  switch (signals_.mode) {
+    case RigMode::kHold:
+      if (in_mode_s >= scenario_.hold_s) {
+        enter(RigMode::kLowering);
+        noticed_s_.reset();
+        truth_.push_back({});
+        truth_.back().mu_max = scenario_.friction().mu_max;
+        truth_.back().start_s = now_s;
+      }
+      break;
+    case RigMode::kLowering: {
+      const bool reacts = noticed_s_ && now_s - *noticed_s_ >= scenario_.reaction_s &&
+                          scenario_.action != OperatorAction::kNone;
+      if (!reacts) {
+        command_force_N_ -= scenario_.ramp_N_per_s * step_s_;
+      } else if (!truth_.back().let_go_s) {
+        truth_.back().let_go_s = now_s;
+      }
+      if (reacts && scenario_.action == OperatorAction::kRestore) enter(RigMode::kRestoring);
+      break;
+    }
+    case RigMode::kRestoring:
+      command_force_N_ += scenario_.restore_N_per_s * step_s_;
+      if (command_force_N_ >= scenario_.start_force_N) enter(RigMode::kRest);
+      break;
+    case RigMode::kRest:
+      if (in_mode_s >= scenario_.rest_s) {
+        cycles_left_ -= 1.0;
+        finished_ = cycles_left_ < 0.5;
+        enter(RigMode::kHold);
+      }
+      break;
+  }
+  command_force_N_ =
+      std::clamp(command_force_N_, scenario_.secondary_spring_force_N, scenario_.start_force_N);
+}
+
+void RigSimulation::observe(double slip_before, double sigma_star_before) {
+  if (signals_.mode != RigMode::kLowering) return;
+  ExperimentTruth& truth = truth_.back();
+  const double peak_slip = scenario_.friction().peak_slip_percent / 100.0;
+  const double slip = std::abs(plant_.output(clamp_force_N_).slip);
+  const double sigma = std::abs(sigma_star());
+  const bool has_peak = scenario_.friction().shape != CurveShape::kSaturating;
+  if (has_peak && !truth.peak_s && slip >= peak_slip) {
+    const double share = (peak_slip - slip_before) / std::max(slip - slip_before, 1e-12);
+    truth.peak_s = static_cast<double>(now_ns_) * 1e-9 - (1.0 - share) * step_s_;
+    truth.slip_peak_percent = scenario_.friction().peak_slip_percent;
+    truth.sigma_star_peak_percent =
+        100.0 * (sigma_star_before + share * (sigma - sigma_star_before));
+    truth.clamp_force_peak_N = clamp_force_N_;
+  }
+  truth.sigma_star_max_percent = std::max(truth.sigma_star_max_percent, 100.0 * sigma);
+  if (!noticed_s_ && 100.0 * sigma >= scenario_.operator_slip_percent) {
+    noticed_s_ = static_cast<double>(now_ns_) * 1e-9;
+  }
+}
+
+void RigSimulation::step() {
+  operate();
+  // The hydraulics follow the command with a first-order lag, exact for a constant command.
+  const double share =
+      scenario_.actuator_lag_s > 0.0 ? -std::expm1(-step_s_ / scenario_.actuator_lag_s) : 1.0;
+  clamp_force_N_ += share * (command_force_N_ - clamp_force_N_);
+
+  const double slip_before = std::abs(plant_.output(clamp_force_N_).slip);
+  const double sigma_star_before = std::abs(sigma_star());
+  const double omega_p_before = plant_.state().omega_p_rad_s;
+  const double error_rad_s = scenario_.primary_speed_rad_s - omega_p_before;
+  controller_torque_Nm_ += scenario_.speed_controller_Nm * error_rad_s * step_s_;
+  PlantInput input;
+  input.clamp_force_N = clamp_force_N_;
+  input.drive_torque_Nm = controller_torque_Nm_ + scenario_.speed_controller_Nm_s * error_rad_s;
+  input.drive_torque_slope_Nm_s = -scenario_.speed_controller_Nm_s;
+  input.load_torque_Nm = load_torque_Nm_;
+  plant_.step(input, step_s_);
+  now_ns_ += step_ns_;
+
+  const PlantState& state = plant_.state();
+  signals_.omega_p_rad_s = state.omega_p_rad_s;
+  signals_.omega_s_rad_s = state.omega_s_rad_s;
+  // The flange sits between the machine's rotor and the pulley; the rotor holds the inertia.
+  signals_.torque_p_Nm = plant_.output(clamp_force_N_).torque_p_Nm;
+  signals_.torque_s_Nm = load_torque_Nm_;
+  signals_.pressure_Pa = pressure_Pa(clamp_force_N_);
+  signals_.pressure_command_Pa = pressure_Pa(command_force_N_);
+  observe(slip_before, sigma_star_before);
+  const bool over = now_ns_ >= std::llround(scenario_.duration_s * 1e9);
+  finished_ = finished_ || over;
+}
+
+}  // namespace beltgrip::sim
