@@ -54,7 +54,7 @@ struct RoleBinding {
   std::uint32_t message_length = 0;  // bytes, as in the DBC
   bool message_fd = false;
   can::SignalCodec codec;
-  std::vector<MuxCondition> mux;  // all must hold (a selector may be multiplexed itself)
+  std::vector<MuxCondition> mux;        // all must hold (a selector may be multiplexed itself)
   double minimum = 0.0, maximum = 0.0;  // physical range of the DBC; equal: not given
   double factor = 1.0, shift = 0.0;     // physical value of the signal -> SI
   std::optional<double> period_ms;      // from the DBC's cycle time or the configuration

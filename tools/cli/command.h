@@ -6,6 +6,4 @@
 
 #include "tools/cli/exit_codes.h"
 
-namespace beltgrip::cli {
-
-}  // namespace beltgrip::cli
+namespace beltgrip::cli {}  // namespace beltgrip::cli
