@@ -75,12 +75,14 @@ struct Config {
   estimator::VariatorParameters variator;
   estimator::SensorAccuracies sensors;
   estimator::EstimatorSettings estimator;
+  std::string model;  // path as in the file; empty: none
   Trigger trigger = Trigger::kCoastDown;
   Control control = Control::kObserve;
 };
 
 struct ConfigError {
-  int exit_code = 78;  // 66 the file is missing or unreadable, 78 its content
+  int exit_code = 78;  // 66 a file is missing or unreadable, 65 a DBC without a readable message,
+                       // 78 everything else
   std::string text;    // "FILE:LINE: key: found ..., expected ..."
 };
 
@@ -88,6 +90,8 @@ struct ConfigResult {
   std::optional<Config> config;       // set when errors is empty
   std::vector<ConfigError> errors;    // all of them
   std::vector<std::string> warnings;  // problems of the DBC files and the like, one line each
+
+  int exit_code() const { return errors.empty() ? 0 : errors.front().exit_code; }
 };
 
 ConfigResult load_config(const std::string& path);

@@ -29,7 +29,7 @@ constexpr std::uint16_t own_data_id(OwnMessage message) {
 std::uint32_t own_identifier(const FrameIdentifiers& identifiers, OwnMessage message) noexcept;
 
 std::string_view beltgrip_dbc_text();  // the text of can_dbc/beltgrip.dbc
-const can::Database& own_database();   // parsed; throws std::logic_error if it is not readable
+const can::Database& own_database();   // the same, parsed
 
 struct EstimateValues {
   estimator::PeakKind kind = estimator::PeakKind::kNone;

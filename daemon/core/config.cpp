@@ -1,0 +1,435 @@
+#include "daemon/core/config.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "daemon/core/config_binding.h"
+#include "daemon/core/config_document.h"
+#include "daemon/core/config_options.h"
+
+namespace beltgrip::daemon {
+
+namespace {
+
+constexpr int kExitNoInput = 66;
+constexpr std::size_t kFileSizeMax = 1U << 20;
+constexpr std::size_t kInterfaceNameMax = 15;  // IFNAMSIZ - 1
+
+// Reads one configuration; the steps in the order of load().
+class Loader {
+ public:
+  Loader(const std::string& path, ConfigResult& result)
+      : path_(path),
+        directory_(std::filesystem::path(path).parent_path().string()),
+        result_(result),
+        errors_(path, result.errors) {}
+
+  void load();
+
+ private:
+  bool read_document();
+  void check_keys();
+  void read_options();
+  void read_option(const Option& option, const TomlNode& node);
+  void read_number(const Option& option, const TomlNode& node);
+  void read_texts(const TomlNode& node);
+  void read_identifiers(const TomlNode& node);
+  void read_sensors();
+  void read_sensor(Role role, const TomlNode& node);
+  void read_signals();
+  void check_required_roles(const TomlNode* signals);
+  void check_across();
+  void check_not_there_yet();
+
+  const TomlNode* section(std::string_view name) const;
+  // The line of a key, else of its section, else 1.
+  std::uint32_t line_of(std::string_view section_name, std::string_view key) const;
+  bool has_role(Role role) const;
+
+  std::string path_;
+  std::string directory_;
+  ConfigResult& result_;
+  ConfigErrors errors_;
+  TomlNode root_;
+  Config config_;
+  SignalCatalogue catalogue_;
+  std::array<estimator::ChannelAccuracy, kRoleCount> accuracies_{};
+};
+
+std::string key_of(std::string_view section, std::string_view key) {
+  return std::string(section) + "." + std::string(key);
+}
+
+std::string number_text(double value) {
+  TomlNode node;
+  node.type = TomlType::kNumber;
+  node.number = value;
+  return node.found();
+}
+
+std::string range_text(double minimum, double maximum) {
+  return "a number from " + number_text(minimum) + " to " + number_text(maximum);
+}
+
+void Loader::load() {
+  if (!read_document()) return;
+  check_keys();
+  read_options();
+  read_sensors();
+  read_signals();
+  check_across();
+  check_not_there_yet();
+  if (!result_.errors.empty()) return;
+  std::sort(config_.roles.begin(), config_.roles.end(),
+            [](const RoleBinding& a, const RoleBinding& b) { return a.role < b.role; });
+  config_.estimator.torque_is_engine = !has_role(Role::kPrimaryTorque);
+  const auto accuracy = [&](Role role) { return accuracies_[static_cast<std::size_t>(role)]; };
+  config_.sensors = {
+      accuracy(Role::kPrimarySpeed), accuracy(Role::kSecondarySpeed),
+      accuracy(Role::kSecondaryPressure),
+      accuracy(config_.estimator.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque)};
+  result_.config = std::move(config_);
+}
+
+bool Loader::read_document() {
+  errno = 0;
+  std::ifstream in(path_, std::ios::binary);
+  std::string text;
+  if (in.is_open() && !std::filesystem::is_directory(path_)) {
+    text.assign(std::istreambuf_iterator<char>(in), {});
+  }
+  if (!in.is_open() || in.bad() || std::filesystem::is_directory(path_)) {
+    const std::string reason = std::filesystem::is_directory(path_) ? "it is a directory"
+                               : errno != 0                         ? std::strerror(errno)
+                                                                    : "it cannot be read";
+    result_.errors.push_back({kExitNoInput, path_ + ": found no readable file (" + reason +
+                                                "), expected a configuration in TOML"});
+    return false;
+  }
+  if (text.size() > kFileSizeMax) {
+    errors_.add(1, "size", std::to_string(text.size()) + " bytes", "at most 1 MiB");
+    return false;
+  }
+  auto parsed = parse_toml(text);
+  if (const auto* error = std::get_if<TomlSyntaxError>(&parsed)) {
+    errors_.add(error->line, "syntax", in_quotes(error->text), "TOML");
+    return false;
+  }
+  root_ = std::move(std::get<TomlNode>(parsed));
+  return true;
+}
+
+const TomlNode* Loader::section(std::string_view name) const {
+  const TomlNode* found = root_.find(name);
+  return found != nullptr && found->type == TomlType::kTable ? found : nullptr;
+}
+
+std::uint32_t Loader::line_of(std::string_view section_name, std::string_view key) const {
+  const TomlNode* in = section(section_name);
+  if (in == nullptr) return 1;
+  const TomlNode* at = in->find(key);
+  return at == nullptr ? in->line : at->line;
+}
+
+bool Loader::has_role(Role role) const {
+  return std::any_of(config_.roles.begin(), config_.roles.end(),
+                     [&](const RoleBinding& each) { return each.role == role; });
+}
+
+void Loader::check_keys() {
+  const auto sections = section_names();
+  std::vector<std::string> names(sections.begin(), sections.end());
+  for (const TomlNode& node : root_.children) {
+    if (std::find(sections.begin(), sections.end(), node.key) == sections.end()) {
+      errors_.add(node.line, node.key,
+                  node.type == TomlType::kTable ? "an unknown section" : "an unknown key",
+                  "a section of the configuration" + nearest_hint(node.key, names));
+      continue;
+    }
+    if (node.type != TomlType::kTable) {
+      errors_.add(node.line, node.key, node.found(), "a section [" + node.key + "]");
+      continue;
+    }
+    std::vector<std::string> keys;
+    for (const Option& option : option_table()) {
+      if (option.section == node.key) keys.emplace_back(option.key);
+    }
+    for (std::size_t i = 0; i < kRoleCount; ++i) {
+      const Role role = static_cast<Role>(i);
+      if (node.key == "signals" ||
+          (node.key == "sensors" && !bias_key(role_dimension(role)).empty())) {
+        keys.emplace_back(role_name(role));
+      }
+    }
+    for (const TomlNode& child : node.children) {
+      if (std::find(keys.begin(), keys.end(), child.key) != keys.end()) continue;
+      errors_.add(child.line, key_of(node.key, child.key), "an unknown key",
+                  "a key of [" + node.key + "]" + nearest_hint(child.key, keys));
+    }
+  }
+}
+
+void Loader::read_options() {
+  for (const Option& option : option_table()) {
+    const TomlNode* in = section(option.section);
+    const TomlNode* node = in == nullptr ? nullptr : in->find(option.key);
+    if (node != nullptr) read_option(option, *node);
+  }
+}
+
+void Loader::read_option(const Option& option, const TomlNode& node) {
+  const std::string key = key_of(option.section, option.key);
+  switch (option.kind) {
+    case Option::Kind::kNumber:
+      read_number(option, node);
+      break;
+    case Option::Kind::kText:
+      if (node.type == TomlType::kText) {
+        option.text(config_) = node.text;
+      } else {
+        errors_.add(node.line, key, node.found(), "text in quotes");
+      }
+      break;
+    case Option::Kind::kChoice: {
+      const auto at = std::find(option.choices.begin(), option.choices.end(), node.text);
+      if (node.type == TomlType::kText && at != option.choices.end()) {
+        option.set_choice(config_, static_cast<std::size_t>(at - option.choices.begin()));
+        break;
+      }
+      std::string expected;
+      for (const std::string_view each : option.choices) {
+        expected += (expected.empty() ? "" : " or ") + in_quotes(each);
+      }
+      errors_.add(node.line, key, node.found(), expected);
+      break;
+    }
+    case Option::Kind::kTexts:
+      read_texts(node);
+      break;
+    case Option::Kind::kIdentifiers:
+      read_identifiers(node);
+      break;
+  }
+}
+
+void Loader::read_number(const Option& option, const TomlNode& node) {
+  if (!node.is_number() || !(node.number >= option.minimum) || !(node.number <= option.maximum)) {
+    errors_.add(node.line, key_of(option.section, option.key), node.found(),
+                range_text(option.minimum, option.maximum));
+    return;
+  }
+  option.number(config_) = node.number * option.factor;
+}
+
+void Loader::read_texts(const TomlNode& node) {
+  if (node.type != TomlType::kArray) {
+    errors_.add(node.line, "bus.dbc", node.found(), "an array of paths: [\"vehicle.dbc\"]");
+    return;
+  }
+  for (const TomlNode& each : node.children) {
+    if (each.type == TomlType::kText && !each.text.empty()) {
+      config_.dbc.push_back(each.text);
+    } else {
+      errors_.add(each.line, "bus.dbc", each.found(), "the path of a DBC file in quotes");
+    }
+  }
+}
+
+void Loader::read_identifiers(const TomlNode& node) {
+  if (node.type != TomlType::kTable) {
+    errors_.add(node.line, "bus.identifiers", node.found(), "{ estimate = 0x6A0, ... }");
+    return;
+  }
+  std::vector<std::string> names;
+  for (const IdentifierKey& each : identifier_keys()) names.emplace_back(each.key);
+  for (const TomlNode& child : node.children) {
+    const std::string key = "bus.identifiers." + child.key;
+    const auto keys = identifier_keys();
+    const auto at = std::find_if(keys.begin(), keys.end(),
+                                 [&](const IdentifierKey& each) { return each.key == child.key; });
+    if (at == keys.end()) {
+      errors_.add(child.line, key, "an unknown key",
+                  "estimate, slip, clamp or status" + nearest_hint(child.key, names));
+    } else if (child.type != TomlType::kInteger || child.integer < 0 ||
+               child.integer > static_cast<std::int64_t>(can::kStandardIdMax)) {
+      errors_.add(child.line, key, child.found(), "an integer from 0 to 0x7FF");
+    } else {
+      config_.identifiers.*at->field = static_cast<std::uint32_t>(child.integer);
+    }
+  }
+}
+
+void Loader::read_sensors() {
+  const TomlNode* sensors = section("sensors");
+  if (sensors == nullptr) return;
+  for (std::size_t i = 0; i < kRoleCount; ++i) {
+    const Role role = static_cast<Role>(i);
+    const TomlNode* node = sensors->find(role_name(role));
+    if (node != nullptr && !bias_key(role_dimension(role)).empty()) read_sensor(role, *node);
+  }
+}
+
+void Loader::read_sensor(Role role, const TomlNode& node) {
+  const std::string key = key_of("sensors", role_name(role));
+  const std::string bias(bias_key(role_dimension(role)));
+  if (node.type != TomlType::kTable) {
+    errors_.add(node.line, key, node.found(), "{ " + bias + " = ..., gain = ... }");
+    return;
+  }
+  estimator::ChannelAccuracy& accuracy = accuracies_[static_cast<std::size_t>(role)];
+  for (const TomlNode& child : node.children) {
+    const bool is_bias = child.key == bias;
+    if (!is_bias && child.key != "gain") {
+      errors_.add(child.line, key + "." + child.key, "an unknown key", bias + " or gain");
+      continue;
+    }
+    const double maximum = is_bias ? bias_maximum(role_dimension(role)) : kGainMaximum;
+    if (!child.is_number() || !(child.number >= 0.0) || !(child.number <= maximum)) {
+      errors_.add(child.line, key + "." + child.key, child.found(), range_text(0.0, maximum));
+      continue;
+    }
+    (is_bias ? accuracy.bias : accuracy.gain) = child.number;
+  }
+}
+
+void Loader::read_signals() {
+  const std::uint32_t line = line_of("bus", "dbc");
+  if (config_.dbc.empty()) {
+    const TomlNode* bus = section("bus");
+    const TomlNode* node = bus == nullptr ? nullptr : bus->find("dbc");
+    // An array that holds something else than paths has been reported.
+    if (node == nullptr || (node->type == TomlType::kArray && node->children.empty())) {
+      errors_.add(line, "bus.dbc", "no file", "at least one DBC file: [\"vehicle.dbc\"]");
+    }
+    return;
+  }
+  for (const std::string& path : config_.dbc) {
+    catalogue_.add_file(path, directory_, line, errors_, result_.warnings);
+  }
+  catalogue_.check_identifiers(line, errors_);
+  const TomlNode* signals = section("signals");
+  if (catalogue_.complete() && signals != nullptr) {
+    for (std::size_t i = 0; i < kRoleCount; ++i) {
+      const Role role = static_cast<Role>(i);
+      const TomlNode* node = signals->find(role_name(role));
+      if (node == nullptr) continue;
+      std::optional<RoleBinding> binding = catalogue_.bind(role, *node, errors_);
+      if (binding) config_.roles.push_back(std::move(*binding));
+    }
+  }
+  check_required_roles(signals);
+}
+
+void Loader::check_required_roles(const TomlNode* signals) {
+  const auto named = [&](Role role) {
+    return signals != nullptr && signals->find(role_name(role)) != nullptr;
+  };
+  const std::uint32_t line = signals == nullptr ? 1 : signals->line;
+  const auto require = [&](Role role, const std::string& expected) {
+    errors_.add(line, key_of("signals", role_name(role)), "no such key", expected);
+  };
+  for (const Role role : {Role::kPrimarySpeed, Role::kSecondarySpeed, Role::kSecondaryPressure}) {
+    if (!named(role)) require(role, "a signal: \"Message.Signal\"");
+  }
+  if (!named(Role::kEngineTorque) && !named(Role::kPrimaryTorque)) {
+    require(Role::kEngineTorque, "a signal: \"Message.Signal\", here or as primary_torque");
+  }
+  if (config_.trigger == Trigger::kSignal && !named(Role::kExperimentActive)) {
+    require(Role::kExperimentActive, "a signal, as experiment.trigger is \"signal\"");
+  }
+}
+
+void Loader::check_across() {
+  constexpr std::string_view kInproc = "inproc:";
+  const std::string& name = config_.interface;
+  const bool inproc = name.starts_with(kInproc) && name.size() > kInproc.size();
+  const bool socket = !name.empty() && name.size() <= kInterfaceNameMax &&
+                      name.find_first_of("/: \t\n") == std::string::npos && name != "." &&
+                      name != "..";
+  if (!inproc && !socket) {
+    errors_.add(line_of("bus", "interface"), "bus.interface", in_quotes(name),
+                "an interface of 1 to 15 characters, or inproc:NAME");
+  }
+
+  const auto keys = identifier_keys();
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    for (std::size_t j = i + 1; j < keys.size(); ++j) {
+      if (config_.identifiers.*keys[i].field != config_.identifiers.*keys[j].field) continue;
+      errors_.add(
+          line_of("bus", "identifiers"), "bus.identifiers",
+          "one identifier for " + std::string(keys[i].key) + " and " + std::string(keys[j].key),
+          "four different ones");
+    }
+    for (const RoleBinding& role : config_.roles) {
+      if (role.id.extended || role.id.value != config_.identifiers.*keys[i].field) continue;
+      errors_.add(line_of("signals", role_name(role.role)), key_of("signals", role_name(role.role)),
+                  "message " + role.message_name + " with the identifier of BeltGrip's " +
+                      std::string(keys[i].key) + " frame",
+                  "another identifier there or in bus.identifiers");
+    }
+  }
+
+  const estimator::VariatorParameters& variator = config_.variator;
+  if (variator.ratio_low >= variator.ratio_overdrive) {
+    errors_.add(line_of("variator", "ratio_low"), "variator.ratio_low",
+                number_text(variator.ratio_low),
+                "less than ratio_overdrive, " + number_text(variator.ratio_overdrive));
+  }
+  if (variator.primary_radius_low_m >= variator.primary_radius_overdrive_m) {
+    errors_.add(line_of("variator", "primary_radius_low_m"), "variator.primary_radius_low_m",
+                number_text(variator.primary_radius_low_m),
+                "less than primary_radius_overdrive_m, " +
+                    number_text(variator.primary_radius_overdrive_m));
+  }
+  const estimator::EstimatorSettings& settings = config_.estimator;
+  if (settings.stop_slope >= settings.peak_slope) {
+    errors_.add(line_of("estimator", "stop_slope"), "estimator.stop_slope",
+                number_text(settings.stop_slope),
+                "less than peak_slope, " + number_text(settings.peak_slope));
+  }
+  if (settings.lowpass_hz >= settings.sample_rate_hz / 2.0) {
+    errors_.add(line_of("estimator", "lowpass_hz"), "estimator.lowpass_hz",
+                number_text(settings.lowpass_hz),
+                "less than half of sample_rate_hz, " + number_text(settings.sample_rate_hz / 2.0));
+  }
+}
+
+void Loader::check_not_there_yet() {
+  constexpr std::string_view kNotThere = ", which this version does not do yet";
+  const auto refuse = [&](std::string_view section_name, std::string_view key,
+                          const std::string& found, const std::string& expected) {
+    const TomlNode* in = section(section_name);
+    const bool given = in != nullptr && in->find(key) != nullptr;
+    errors_.add(line_of(section_name, key), key_of(section_name, key),
+                (given ? "" : "the default, ") + found + std::string(kNotThere), expected);
+  };
+  if (config_.trigger == Trigger::kCoastDown || config_.trigger == Trigger::kSteady) {
+    refuse("experiment", "trigger",
+           config_.trigger == Trigger::kSteady ? "\"steady\"" : "\"coast_down\"",
+           "trigger = \"always\" or \"signal\"");
+  }
+  if (config_.control == Control::kCommand) {
+    refuse("experiment", "control", "\"command\"", "control = \"observe\"");
+  }
+  if (config_.estimator.stop_rule == estimator::StopRule::kConfidence) {
+    refuse("experiment", "stop", "\"confidence\"", "stop = \"peak\"");
+  }
+  if (!config_.model.empty()) {
+    refuse("estimator", "model", in_quotes(config_.model), "model = \"\"");
+  }
+}
+
+}  // namespace
+
+ConfigResult load_config(const std::string& path) {
+  ConfigResult result;
+  Loader(path, result).load();
+  return result;
+}
+
+}  // namespace beltgrip::daemon

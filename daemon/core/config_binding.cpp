@@ -1,0 +1,374 @@
+#include "daemon/core/config_binding.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+
+#include "can_dbc/dbc_parser.h"
+#include "daemon/core/config_options.h"
+
+namespace beltgrip::daemon {
+
+namespace {
+
+constexpr int kExitData = 65;
+constexpr int kExitNoInput = 66;
+constexpr std::size_t kWarningsPerFile = 10;
+constexpr std::size_t kMuxDepth = 16;
+
+std::string id_text(can::CanId id) {
+  std::array<char, 16> digits;
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), id.value, 16).ptr;
+  return "0x" + std::string(digits.data(), end) + (id.extended ? "x" : "");
+}
+
+// "0x123" or "0x12345678x" (29 bit); nothing if it is not a number that fits.
+std::optional<can::CanId> parse_id(std::string_view text) {
+  text.remove_prefix(2);
+  can::CanId id;
+  id.extended = !text.empty() && (text.back() == 'x' || text.back() == 'X');
+  if (id.extended) text.remove_suffix(1);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id.value, 16);
+  const std::uint32_t maximum = id.extended ? can::kExtendedIdMax : can::kStandardIdMax;
+  if (error != std::errc() || end != text.data() + text.size() || id.value > maximum) return {};
+  return id;
+}
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t above = row[j];
+      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      row[j] = std::min({above + 1, row[j - 1] + 1, replaced});
+      diagonal = above;
+    }
+  }
+  return row[b.size()];
+}
+
+std::string lower(std::string_view text) {
+  std::string result(text);
+  for (char& c : result) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
+  return result;
+}
+
+// What a role says in its TOML value.
+struct RoleText {
+  std::string signal;
+  std::optional<std::string> unit;
+  double scale = 1.0, offset = 0.0;
+  std::optional<double> period_ms;
+  std::uint32_t signal_line = 0, unit_line = 0;
+};
+
+std::optional<RoleText> read_role(const std::string& key, const TomlNode& node,
+                                  ConfigErrors& errors) {
+  RoleText text;
+  text.signal_line = text.unit_line = node.line;
+  if (node.type == TomlType::kText) {
+    text.signal = node.text;
+    return text;
+  }
+  if (node.type != TomlType::kTable) {
+    errors.add(node.line, key, node.found(), "\"Message.Signal\" or { signal = \"...\", ... }");
+    return {};
+  }
+  static const std::vector<std::string> kKeys{"signal", "unit", "scale", "offset", "period_ms"};
+  bool good = true;
+  const auto wrong = [&](const TomlNode& child, const std::string& expected) {
+    errors.add(child.line, key + "." + child.key, child.found(), expected);
+    good = false;
+  };
+  for (const TomlNode& child : node.children) {
+    if (child.key == "signal") {
+      text.signal = child.text;
+      text.signal_line = child.line;
+      if (child.type != TomlType::kText) wrong(child, "text \"Message.Signal\"");
+    } else if (child.key == "unit") {
+      text.unit = child.text;
+      text.unit_line = child.line;
+      if (child.type != TomlType::kText) wrong(child, "text such as \"rpm\"");
+    } else if (child.key == "scale") {
+      text.scale = child.number;
+      if (!child.is_number() || !std::isfinite(child.number) || child.number == 0.0) {
+        wrong(child, "a finite number other than 0");
+      }
+    } else if (child.key == "offset") {
+      text.offset = child.number;
+      if (!child.is_number() || !std::isfinite(child.number)) wrong(child, "a finite number");
+    } else if (child.key == "period_ms") {
+      text.period_ms = child.number;
+      if (!child.is_number() || !(child.number >= kPeriodMinimum_ms) ||
+          !(child.number <= kPeriodMaximum_ms)) {
+        wrong(child, "a number from 0.5 to 10000");
+      }
+    } else {
+      errors.add(child.line, key + "." + child.key, "an unknown key",
+                 "signal, unit, scale, offset or period_ms" + nearest_hint(child.key, kKeys));
+      good = false;
+    }
+  }
+  if (node.find("signal") == nullptr) {
+    errors.add(node.line, key, "a table without signal", "signal = \"Message.Signal\"");
+    good = false;
+  }
+  return good ? std::optional(text) : std::nullopt;
+}
+
+// The unit of a role; nothing when errors were added.
+std::optional<can::Unit> role_unit(Role role, const std::string& key, const RoleText& text,
+                                   const can::SignalDef& signal, const std::string& dbc_path,
+                                   ConfigErrors& errors) {
+  const can::Dimension dimension = role_dimension(role);
+  const std::string unit_text = text.unit.value_or(signal.unit);
+  const std::optional<can::Unit> unit = can::parse_unit(unit_text);
+  const std::string where = text.unit ? "" : " in " + dbc_path;
+  const std::string found =
+      unit_text.empty() ? "no unit" + where : "unit " + in_quotes(unit_text) + where;
+  if (dimension == can::Dimension::kNone) {
+    if (unit && unit->dimension != can::Dimension::kNone) {
+      errors.add(text.unit_line, key,
+                 found + " (" + std::string(can::dimension_name(unit->dimension)) + ")",
+                 "a signal without unit, 0 or 1");
+      return {};
+    }
+    return can::Unit{};
+  }
+  const std::string wanted = "a unit of " + std::string(can::dimension_name(dimension)) +
+                             " such as " + std::string(can::si_unit_text(dimension));
+  const std::string hint = text.unit ? "" : "; set unit in { signal = \"...\", unit = \"...\" }";
+  if (!unit || unit->dimension == can::Dimension::kNone) {
+    errors.add(text.unit_line, key, found, wanted + hint);
+    return {};
+  }
+  if (unit->dimension != dimension) {
+    errors.add(text.unit_line, key,
+               found + " (" + std::string(can::dimension_name(unit->dimension)) + ")",
+               wanted + hint);
+    return {};
+  }
+  return unit;
+}
+
+}  // namespace
+
+void ConfigErrors::add(std::uint32_t line, const std::string& key, const std::string& found,
+                       const std::string& expected, int exit_code) {
+  errors_.push_back({exit_code, file_ + ":" + std::to_string(std::max(line, 1U)) + ": " + key +
+                                    ": found " + found + ", expected " + expected});
+}
+
+std::string nearest_hint(std::string_view name, const std::vector<std::string>& names) {
+  constexpr std::size_t kNameMax = 128;
+  if (name.size() > kNameMax) return {};
+  const std::string wanted = lower(name);
+  std::size_t best_distance = 2 + name.size() / 4;
+  const std::string* best = nullptr;
+  for (const std::string& candidate : names) {
+    if (candidate.size() > kNameMax) continue;
+    const std::size_t distance = edit_distance(wanted, lower(candidate));
+    if (distance < best_distance) {
+      best_distance = distance;
+      best = &candidate;
+    }
+  }
+  return best == nullptr ? std::string() : "; nearest is " + in_quotes(*best);
+}
+
+void SignalCatalogue::add_file(const std::string& path, const std::string& directory,
+                               std::uint32_t line, ConfigErrors& errors,
+                               std::vector<std::string>& warnings) {
+  const std::string full = (std::filesystem::path(directory) / path).string();
+  errno = 0;
+  std::ifstream in(full, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  if (!in.is_open() || in.bad() || std::filesystem::is_directory(full)) {
+    const std::string reason = std::filesystem::is_directory(full) ? "it is a directory"
+                               : errno != 0                        ? std::strerror(errno)
+                                                                   : "it cannot be read";
+    errors.add(line, "bus.dbc", in_quotes(path) + " that cannot be read (" + reason + ")",
+               "the path of a DBC file, relative to " + (directory.empty() ? "." : directory),
+               kExitNoInput);
+    complete_ = false;
+    return;
+  }
+  can::DbcParseResult parsed = can::parse_dbc(text);
+  if (parsed.database.messages.empty()) {
+    std::string reason = "no message in it";
+    if (!parsed.problems.empty()) {
+      const can::Problem& first = parsed.problems.front();
+      reason = "line " + std::to_string(first.line) + ": " + first.text;
+    }
+    errors.add(line, "bus.dbc", in_quotes(path) + " without a readable message (" + reason + ")",
+               "a DBC file", kExitData);
+    complete_ = false;
+    return;
+  }
+  std::size_t problems = 0;
+  for (const can::Problem& problem : parsed.problems) {
+    if (problem.severity != can::Severity::kError) continue;
+    if (problems++ < kWarningsPerFile) {
+      warnings.push_back(full + ":" + std::to_string(problem.line) + ":" +
+                         std::to_string(problem.column) + ": " + problem.text);
+    }
+  }
+  if (problems > kWarningsPerFile) {
+    warnings.push_back(full + ": " + std::to_string(problems - kWarningsPerFile) +
+                       " more; see beltgrip dbc check");
+  }
+  files_.push_back({path, std::move(parsed.database)});
+}
+
+void SignalCatalogue::check_identifiers(std::uint32_t line, ConfigErrors& errors) const {
+  std::map<can::CanId, std::pair<const File*, const can::MessageDef*>> seen;
+  std::size_t clashes = 0;
+  std::string first;
+  for (const File& file : files_) {
+    for (const can::MessageDef& message : file.database.messages) {
+      const auto [at, fresh] = seen.try_emplace(message.id, &file, &message);
+      if (fresh || at->second.first == &file) continue;
+      if (clashes++ == 0) {
+        first = "identifier " + id_text(message.id) + " in " + in_quotes(at->second.first->path) +
+                " (" + at->second.second->name + ") and in " + in_quotes(file.path) + " (" +
+                message.name + ")";
+      }
+    }
+  }
+  if (clashes == 0) return;
+  if (clashes > 1) first += " and " + std::to_string(clashes - 1) + " more such";
+  errors.add(line, "bus.dbc", first, "each identifier in one file only");
+}
+
+std::vector<std::string> SignalCatalogue::message_names() const {
+  std::vector<std::string> names;
+  for (const File& file : files_) {
+    for (const can::MessageDef& message : file.database.messages) names.push_back(message.name);
+  }
+  return names;
+}
+
+std::optional<SignalCatalogue::Found> SignalCatalogue::find_message(std::string_view name,
+                                                                    const std::string& key,
+                                                                    std::uint32_t line,
+                                                                    ConfigErrors& errors) const {
+  const bool by_id = name.starts_with("0x") || name.starts_with("0X");
+  const std::optional<can::CanId> id = by_id ? parse_id(name) : std::nullopt;
+  if (by_id && !id) {
+    errors.add(line, key, "message " + in_quotes(name),
+               "an identifier such as 0x123 (11 bit) or 0x12345678x (29 bit)");
+    return {};
+  }
+  Found found;
+  for (const File& file : files_) {
+    const can::MessageDef* message =
+        id ? file.database.find_message(*id) : file.database.find_message(std::string(name));
+    if (message == nullptr) continue;
+    if (found.message != nullptr && !id) {
+      errors.add(
+          line, key,
+          "message " + in_quotes(name) + " in " + in_quotes(found.file->path) + " and in " +
+              in_quotes(file.path),
+          "its identifier instead: " + id_text(found.message->id) + " or " + id_text(message->id));
+      return {};
+    }
+    if (found.message == nullptr) found = {&file, message};
+  }
+  if (found.message == nullptr) {
+    errors.add(line, key, "message " + in_quotes(name) + " that no DBC names",
+               "a message of the DBC files" + (by_id ? "" : nearest_hint(name, message_names())));
+    return {};
+  }
+  return found;
+}
+
+std::optional<RoleBinding> SignalCatalogue::bind(Role role, const TomlNode& node,
+                                                 ConfigErrors& errors) const {
+  const std::string key = "signals." + std::string(role_name(role));
+  const std::optional<RoleText> text = read_role(key, node, errors);
+  if (!text) return {};
+  const std::size_t dot = text->signal.find('.');
+  if (dot == std::string::npos || dot == 0 || dot + 1 == text->signal.size()) {
+    errors.add(text->signal_line, key, in_quotes(text->signal),
+               "\"Message.Signal\", \"0x123.Signal\" or \"0x12345678x.Signal\"");
+    return {};
+  }
+  const std::optional<Found> found =
+      find_message(std::string_view(text->signal).substr(0, dot), key, text->signal_line, errors);
+  if (!found) return {};
+  const can::MessageDef& message = *found->message;
+  const std::string signal_name = text->signal.substr(dot + 1);
+  const can::SignalDef* signal = message.find_signal(signal_name);
+  if (signal == nullptr) {
+    std::vector<std::string> names;
+    for (const can::SignalDef& each : message.signals) names.push_back(each.name);
+    errors.add(text->signal_line, key,
+               "signal " + in_quotes(signal_name) + " that " + message.name + " does not have",
+               "a signal of " + message.name + " in " + found->file->path +
+                   nearest_hint(signal_name, names));
+    return {};
+  }
+
+  RoleBinding binding;
+  binding.role = role;
+  binding.message_name = message.name;
+  binding.signal_name = signal->name;
+  binding.id = message.id;
+  binding.message_length = message.length;
+  binding.message_fd = message.fd;
+  binding.codec = can::SignalCodec(*signal);
+  if (!binding.codec.fits(message.length)) {
+    errors.add(text->signal_line, key,
+               "signal " + in_quotes(signal_name) + " that lies outside the " +
+                   std::to_string(message.length) + " bytes of " + message.name,
+               "a signal inside its message");
+    return {};
+  }
+  if (!std::isfinite(signal->scale) || signal->scale == 0.0 || !std::isfinite(signal->offset)) {
+    errors.add(text->signal_line, key,
+               "signal " + in_quotes(signal_name) + " with factor 0 or none",
+               "a finite factor other than 0 in " + found->file->path);
+    return {};
+  }
+  const can::SignalDef* multiplexed = signal;
+  for (std::size_t depth = 0; multiplexed->multiplexed_by; ++depth) {
+    const can::MuxRule& rule = *multiplexed->multiplexed_by;
+    const can::SignalDef* selector = message.find_signal(rule.selector);
+    if (selector == nullptr || depth == kMuxDepth ||
+        !can::SignalCodec(*selector).fits(message.length)) {
+      errors.add(text->signal_line, key,
+                 "signal " + in_quotes(signal_name) + " whose multiplexer " +
+                     in_quotes(rule.selector) + " cannot be decoded",
+                 "a multiplexer signal inside " + message.name);
+      return {};
+    }
+    binding.mux.push_back({can::SignalCodec(*selector), rule.ranges});
+    multiplexed = selector;
+  }
+  if (signal->minimum < signal->maximum) {
+    binding.minimum = signal->minimum;
+    binding.maximum = signal->maximum;
+  }
+  const std::optional<can::Unit> unit =
+      role_unit(role, key, *text, *signal, found->file->path, errors);
+  if (!unit) return {};
+  binding.factor = unit->factor * text->scale;
+  binding.shift = unit->factor * text->offset + unit->offset;
+  binding.period_ms = text->period_ms;
+  if (!binding.period_ms && message.cycle_ms && *message.cycle_ms > 0.0) {
+    binding.period_ms = message.cycle_ms;
+  }
+  return binding;
+}
+
+}  // namespace beltgrip::daemon

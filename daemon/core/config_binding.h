@@ -1,0 +1,62 @@
+// From names in the configuration to signals in the DBC files: reads the files, finds what a role
+// names, settles its unit. Start-up and tools only.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "can_dbc/dbc_model.h"
+#include "daemon/core/config.h"
+#include "daemon/core/config_document.h"
+
+namespace beltgrip::daemon {
+
+// Collects errors with their position: "FILE:LINE: key: found ..., expected ...".
+class ConfigErrors {
+ public:
+  ConfigErrors(std::string file, std::vector<ConfigError>& errors)
+      : file_(std::move(file)), errors_(errors) {}
+  void add(std::uint32_t line, const std::string& key, const std::string& found,
+           const std::string& expected, int exit_code = 78);
+
+ private:
+  std::string file_;
+  std::vector<ConfigError>& errors_;
+};
+
+// The name in `names` nearest to `name`, where one is near enough to be a slip of the pen:
+// ", nearest is \"x\"", else nothing.
+std::string nearest_hint(std::string_view name, const std::vector<std::string>& names);
+
+class SignalCatalogue {
+ public:
+  // Reads one DBC file; path as in the configuration, directory that of the configuration.
+  void add_file(const std::string& path, const std::string& directory, std::uint32_t line,
+                ConfigErrors& errors, std::vector<std::string>& warnings);
+  // Every identifier in one file only.
+  void check_identifiers(std::uint32_t line, ConfigErrors& errors) const;
+  // True when every file could be read: only then roles can be judged.
+  bool complete() const { return complete_; }
+  // The binding of a role from its TOML value; nothing when errors were added.
+  std::optional<RoleBinding> bind(Role role, const TomlNode& node, ConfigErrors& errors) const;
+
+ private:
+  struct File {
+    std::string path;
+    can::Database database;
+  };
+  struct Found {
+    const File* file = nullptr;
+    const can::MessageDef* message = nullptr;
+  };
+  std::optional<Found> find_message(std::string_view name, const std::string& key,
+                                    std::uint32_t line, ConfigErrors& errors) const;
+  std::vector<std::string> message_names() const;
+
+  std::vector<File> files_;
+  bool complete_ = true;
+};
+
+}  // namespace beltgrip::daemon

@@ -1,0 +1,40 @@
+// TOML text as a tree of plain values with line numbers: all that the rest of the program sees of
+// the TOML library. Start-up and tools only.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+namespace beltgrip::daemon {
+
+enum class TomlType : std::uint8_t { kTable, kArray, kText, kInteger, kNumber, kFlag, kTime };
+std::string in_quotes(std::string_view text);
+std::string_view toml_type_name(TomlType type);  // "table", "text", ...
+
+struct TomlNode {
+  std::string key;  // empty for elements of an array and the root
+  std::uint32_t line = 0;
+  TomlType type = TomlType::kTable;
+  std::string text;                // kText
+  std::int64_t integer = 0;        // kInteger
+  double number = 0.0;             // kNumber, and kInteger as a number
+  bool flag = false;               // kFlag
+  std::vector<TomlNode> children;  // kTable (sorted by key), kArray
+
+  const TomlNode* find(std::string_view child_key) const;
+  bool is_number() const { return type == TomlType::kNumber || type == TomlType::kInteger; }
+  // As found in the file, short: "text", 12, a table ...; for error messages.
+  std::string found() const;
+};
+
+struct TomlSyntaxError {
+  std::uint32_t line = 0;
+  std::string text;  // one line
+};
+
+std::variant<TomlNode, TomlSyntaxError> parse_toml(std::string_view text);
+
+}  // namespace beltgrip::daemon
