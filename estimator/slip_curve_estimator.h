@@ -73,6 +73,7 @@ class SlipCurveEstimator {
   // One sample. An unusable sample changes no state and yields usable = false.
   virtual const CurveEstimate& step(const VariatorSample& sample) noexcept = 0;
   // After the last step (stop, end of trace, abort): call once per sample until it returns true.
+  // Steps may follow: the curve goes on, the peak stays.
   virtual bool conclude() noexcept = 0;
   // Valid once conclude() has returned true.
   virtual const PeakEstimate& peak() const noexcept = 0;

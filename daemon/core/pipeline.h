@@ -25,7 +25,7 @@ struct SampleReport {
   bool macro_slip_stop = false;
   estimator::VariatorSample sample;
   estimator::CurveEstimate curve;
-  bool new_result = false;   // result was completed with this sample
+  bool new_result = false;   // an experiment has come to its outcome with this sample
   ExperimentResult result;   // the last one; outcome kNone before the first
   std::uint32_t faults = 0;  // fault_bit()s of faults.h
 };
@@ -45,9 +45,14 @@ class Pipeline {
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
 
-  // Frames in order of arrival. BeltGrip's own identifiers are never inputs.
+  // Frames in order of arrival. BeltGrip's own identifiers are never inputs; such a frame that is
+  // no echo comes from a foreign sender, which latches a fault.
   void on_frame(const RxFrame& frame) noexcept;
+  // The link as the Port sees it; the controller's state comes with its error frames.
   void on_bus_state(BusState state, MonoTime t) noexcept;
+  // A sample at t was taken late, or (lost) samples before t were not taken at all.
+  void on_late(MonoTime t, bool lost) noexcept;
+  void on_send_failed(MonoTime t) noexcept;
   // The sample at t: decides and leaves in outbox what must be sent now.
   const SampleReport& on_sample(MonoTime t, Outbox& outbox) noexcept;
   // The end (stop request, end of a log): ends a running experiment and leaves the last frames.

@@ -1,0 +1,47 @@
+#include "daemon/core/sampler.h"
+
+#include <algorithm>
+
+namespace beltgrip::daemon {
+
+Sampler::Sampler(const InputMonitor& inputs, bool torque_is_engine)
+    : inputs_(inputs), torque_(torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque) {}
+
+void Sampler::settle() noexcept {
+  Duration delay = 0;
+  for (const Role role : inputs_.required()) {
+    const std::optional<Duration> period = inputs_.period(role);
+    if (!period) return;
+    if (role == Role::kPrimarySpeed || role == Role::kSecondarySpeed) {
+      delay = std::max(delay, std::min(*period, kDelayMaximum));
+    } else if (role != Role::kExperimentActive && *period <= kSlow) {
+      delay = std::max(delay, *period);
+    }
+  }
+  delay_ = delay;
+}
+
+bool Sampler::read(Role role, MonoTime t, double& value) const noexcept {
+  constexpr Duration kReachPeriods = 2;
+  const Duration reach = kReachPeriods * inputs_.period(role).value_or(0);
+  return inputs_.history(role).value_at(t, reach, value);
+}
+
+const estimator::VariatorSample& Sampler::sample(MonoTime t, bool may_settle) noexcept {
+  sample_.usable = false;
+  if (may_settle) settle();
+  if (!delay_ || !inputs_.all_valid()) return sample_;
+  const MonoTime at = t - *delay_;
+  estimator::VariatorSample next;
+  next.t_ns = at;
+  next.usable = read(Role::kPrimarySpeed, at, next.omega_p_rad_s) &&
+                read(Role::kSecondarySpeed, at, next.omega_s_rad_s) &&
+                read(Role::kSecondaryPressure, at, next.secondary_pressure_Pa) &&
+                read(torque_, at, next.torque_Nm) && next.omega_p_rad_s > 0.0 && at > last_;
+  if (!next.usable) return sample_;
+  last_ = at;
+  sample_ = next;
+  return sample_;
+}
+
+}  // namespace beltgrip::daemon

@@ -1,0 +1,57 @@
+#include "daemon/core/signal_history.h"
+
+#include <algorithm>
+
+namespace beltgrip::daemon {
+
+void SignalHistory::add(MonoTime t, double value) noexcept {
+  if (size_ != 0 && t <= newest()) {
+    points_[newest_].value = value;
+    return;
+  }
+  newest_ = (newest_ + 1) % kCapacity;
+  points_[newest_] = {t, value};
+  size_ = std::min(size_ + 1, kCapacity);
+}
+
+bool SignalHistory::value_at(MonoTime t, Duration reach, double& value) const noexcept {
+  if (size_ == 0) return false;
+  const Point& last = at(0);
+  if (t < last.t) {
+    for (std::size_t age = 1; age < size_; ++age) {
+      const Point& before = at(age);
+      if (before.t > t) continue;
+      const Point& after = at(age - 1);
+      const double share =
+          static_cast<double>(t - before.t) / static_cast<double>(after.t - before.t);
+      value = before.value + share * (after.value - before.value);
+      return true;
+    }
+    return false;
+  }
+  // Stamps relative to the newest, in units of the time they span: exact enough in double.
+  const std::size_t count = std::min(size_, kLine);
+  const double span = static_cast<double>(last.t - at(count - 1).t);
+  if (count < 2 || t == last.t) {
+    value = last.value;
+    return true;
+  }
+  double mean_x = 0.0, mean_y = 0.0;
+  for (std::size_t age = 0; age < count; ++age) {
+    mean_x += static_cast<double>(at(age).t - last.t) / span;
+    mean_y += at(age).value;
+  }
+  mean_x /= static_cast<double>(count);
+  mean_y /= static_cast<double>(count);
+  double xx = 0.0, xy = 0.0;
+  for (std::size_t age = 0; age < count; ++age) {
+    const double x = static_cast<double>(at(age).t - last.t) / span - mean_x;
+    xx += x * x;
+    xy += x * (at(age).value - mean_y);
+  }
+  const double ahead = static_cast<double>(std::min(t - last.t, reach)) / span;
+  value = last.value + xy / xx * ahead;
+  return true;
+}
+
+}  // namespace beltgrip::daemon
