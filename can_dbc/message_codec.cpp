@@ -59,8 +59,10 @@ std::size_t MessageCodec::decode(std::span<const std::uint8_t> payload,
     if (!entry.codec.fits(payload.size()) || entry.selector == kNever) continue;
     if (entry.selector != kAlways) {
       const DecodedSignal& selector = out[entry.selector];
+      // The file's numbers are those of the bits: 255 selects in an 8-bit signal, signed or not.
+      const std::uint64_t bits = selector.raw & signals_[entry.selector].codec.mask();
       const auto selected = [&](const Range& range) {
-        return selector.raw >= range.low && selector.raw <= range.high;
+        return bits >= range.low && bits <= range.high;
       };
       if (!selector.present || !std::any_of(ranges_.begin() + entry.range_begin,
                                             ranges_.begin() + entry.range_end, selected)) {

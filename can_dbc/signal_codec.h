@@ -39,6 +39,7 @@ class SignalCodec {
   // "decimal text" of the raw value as integer (two's complement for signed), or of the float.
   std::string raw_text(std::uint64_t raw_bits) const;
 
+  std::uint64_t mask() const noexcept { return mask_; }  // as many ones as the signal has bits
   bool is_float() const noexcept { return kind_ >= Kind::kFloat16; }
 
  private:

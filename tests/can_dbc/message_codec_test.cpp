@@ -76,17 +76,17 @@ TEST(MessageCodec, NeverSelectsThroughACircleOrAnUnknownSelector) {
   EXPECT_TRUE(values[5].present);
 }
 
-TEST(MessageCodec, ComparesASignedSelectorBySign) {
+TEST(MessageCodec, SelectsByTheBitsOfASignedSelector) {
   MessageDef message;
   SignalDef mux = byte_signal("mux", 0);
   mux.type = ValueType::kSigned;
-  message.signals = {mux, selected("a", 1, "mux", {{0, 127}})};
+  message.signals = {mux, selected("a", 1, "mux", {{128, 255}})};
   const MessageCodec codec(message);
   Values values;
   codec.decode(std::array<std::uint8_t, 2>{0x7F, 0}, values);
-  EXPECT_TRUE(values[1].present);
-  codec.decode(std::array<std::uint8_t, 2>{0x80, 0}, values);
   EXPECT_FALSE(values[1].present);
+  codec.decode(std::array<std::uint8_t, 2>{0x80, 0}, values);
+  EXPECT_TRUE(values[1].present);
 }
 
 }  // namespace
