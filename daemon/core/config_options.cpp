@@ -300,7 +300,7 @@ void add_signals(std::string& out) {
     add_comment(out, kRoleHelp[i]);
     const auto dimension = role_dimension(role);
     if (dimension != can::Dimension::kNone) {
-      add_comment(out, "[" + std::string(can::dimension_name(dimension)) + "]");
+      add_comment(out, "(" + std::string(can::dimension_name(dimension)) + ")");
     }
     out += "# " + std::string(role_name(role)) + " = \"\"\n";
   }
@@ -373,7 +373,7 @@ std::string default_config_text() {
       first = false;
       add_comment(out, option.help);
       const std::string range = range_text(option);
-      if (!range.empty()) add_comment(out, "[" + range + "]");
+      if (!range.empty()) add_comment(out, "(" + range + ")");
       out += "# " + std::string(option.key) + " = " + default_value(option, defaults) + "\n";
     }
   }

@@ -1,0 +1,173 @@
+#include "tests/daemon/test_vehicle.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <random>
+
+namespace beltgrip::test {
+
+const char* const kVehicleDbc = R"(VERSION ""
+
+NS_ :
+
+BS_:
+
+BU_: TCU ECU
+
+BO_ 256 Speeds: 8 TCU
+ SG_ PrimarySpeed : 0|16@1+ (0.125,0) [0|8000] "rpm" ECU
+ SG_ SecondarySpeed : 16|16@1+ (0.125,0) [0|8000] "rpm" ECU
+
+BO_ 257 Pressure: 4 TCU
+ SG_ SecondaryPressure : 7|16@0+ (0.001,0) [0|60] "bar" ECU
+
+BO_ 2452903544 Torque: 8 ECU
+ SG_ EngineTorque : 8|16@1- (0.1,0) [-500|500] "Nm" TCU
+
+BO_ 259 Flags: 2 TCU
+ SG_ ExperimentActive : 0|2@1+ (1,0) [0|3] "" ECU
+ SG_ Permitted : 2|1@1+ (1,0) [0|1] "" ECU
+
+BA_DEF_ BO_ "GenMsgCycleTime" INT 0 65535;
+BA_DEF_DEF_ "GenMsgCycleTime" 0;
+BA_ "GenMsgCycleTime" BO_ 256 10;
+BA_ "GenMsgCycleTime" BO_ 257 20;
+BA_ "GenMsgCycleTime" BO_ 2452903544 10;
+BA_ "GenMsgCycleTime" BO_ 259 50;
+)";
+
+const char* const kVehicleToml = R"([bus]
+interface = "inproc:test"
+dbc = ["vehicle.dbc"]
+[signals]
+primary_speed = "Speeds.PrimarySpeed"
+secondary_speed = "Speeds.SecondarySpeed"
+secondary_pressure = "Pressure.SecondaryPressure"
+engine_torque = "0x12345678x.EngineTorque"
+experiment_active = "Flags.ExperimentActive"
+[experiment]
+trigger = "always"
+)";
+
+namespace {
+
+constexpr double kRpm = std::numbers::pi / 30.0;
+constexpr double kArea_m2 = 0.0113, kSpring_N = 500.0, kRadius_m = 0.0784, kRatio = 2.25;
+constexpr double kPrimary_rad_s = 105.0;
+const double kCos = std::cos(11.0 * std::numbers::pi / 180.0);
+
+can::CanFrame frame_of(std::uint32_t id, bool extended, std::uint8_t length) {
+  can::CanFrame frame;
+  frame.id = {id, extended};
+  frame.length = length;
+  return frame;
+}
+
+void put16(can::CanFrame& frame, std::size_t low, std::size_t high, double raw) {
+  const auto bits = static_cast<std::uint16_t>(static_cast<std::int32_t>(std::lround(raw)));
+  frame.data[low] = static_cast<std::uint8_t>(bits & 0xFFU);
+  frame.data[high] = static_cast<std::uint8_t>(bits >> 8);
+}
+
+}  // namespace
+
+TemporaryDirectory::TemporaryDirectory() {
+  std::string pattern = (std::filesystem::temp_directory_path() / "beltgrip.XXXXXX").string();
+  if (mkdtemp(pattern.data()) == nullptr) std::abort();
+  path_ = pattern;
+}
+TemporaryDirectory::~TemporaryDirectory() {
+  std::error_code error;
+  std::filesystem::remove_all(path_, error);
+}
+std::string TemporaryDirectory::write(const std::string& name, const std::string& content) const {
+  const std::string path = path_ + "/" + name;
+  std::ofstream(path, std::ios::binary) << content;
+  return path;
+}
+
+daemon::Config vehicle_config(const std::string& toml) {
+  TemporaryDirectory directory;
+  directory.write("vehicle.dbc", kVehicleDbc);
+  const daemon::ConfigResult result = daemon::load_config(directory.write("beltgripd.toml", toml));
+  for (const auto& error : result.errors) ADD_FAILURE() << error.text;
+  for (const auto& warning : result.warnings) ADD_FAILURE() << warning;
+  return result.config.value();
+}
+
+can::CanFrame speeds_frame(double primary_rad_s, double secondary_rad_s) {
+  can::CanFrame frame = frame_of(0x100, false, 8);
+  put16(frame, 0, 1, primary_rad_s / kRpm / 0.125);
+  put16(frame, 2, 3, secondary_rad_s / kRpm / 0.125);
+  return frame;
+}
+can::CanFrame pressure_frame(double pressure_Pa) {
+  can::CanFrame frame = frame_of(0x101, false, 4);
+  put16(frame, 1, 0, pressure_Pa / 1e5 / 0.001);
+  return frame;
+}
+can::CanFrame torque_frame(double torque_Nm) {
+  can::CanFrame frame = frame_of(0x12345678, true, 8);
+  put16(frame, 1, 2, torque_Nm / 0.1);
+  return frame;
+}
+can::CanFrame flags_frame(bool experiment_active) {
+  can::CanFrame frame = frame_of(0x103, false, 2);
+  frame.data[0] = experiment_active ? 1 : 0;
+  return frame;
+}
+
+std::vector<can::StampedFrame> drive_frames(const Drive& drive) {
+  constexpr double kStep_s = 0.001;
+  constexpr double kTorque_Nm = 50.0;
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  const auto noisy = [&](double value, double deviation) {
+    return drive.noise ? value + deviation * normal(random) : value;
+  };
+  std::vector<can::StampedFrame> frames;
+  const auto add = [&](std::int64_t t, const can::CanFrame& frame) {
+    frames.push_back({t, frame});
+  };
+  double force_N = drive.start_force_N;
+  double slip = 0.0;  // fraction
+  const auto steps = static_cast<int>(drive.duration_s / kStep_s);
+  for (int step = 0; step < steps; ++step) {
+    force_N = std::max(force_N - drive.ramp_N_per_s * kStep_s, 1000.0);
+    const double needed = kTorque_Nm * kCos / (2.0 * kRadius_m * force_N);
+    // Below the peak the belt carries the torque with the slip that this takes; beyond it slips
+    // faster and faster, and the friction falls a little.
+    double mu = needed;
+    if (needed < kTrueMuMax && slip <= 0.02) {
+      slip = 0.02 * std::atanh(needed / kTrueMuMax * std::tanh(2.2)) / 2.2;
+    } else {
+      slip = std::min(slip + 0.05 * kStep_s, 0.15);
+      mu = kTrueMuMax - 0.15 * std::max(slip - 0.02, 0.0);
+    }
+    const double torque = mu * 2.0 * kRadius_m * force_N / kCos;
+    const std::int64_t t = drive.start_ns + std::int64_t{step} * 1'000'000;
+    if (step % 10 == 0) {
+      const double ratio = kRatio * (1.0 - slip);
+      add(t, speeds_frame(noisy(kPrimary_rad_s, 0.02), noisy(kPrimary_rad_s * ratio, 0.04)));
+    }
+    if (step % 10 == 3) add(t + 200'000, torque_frame(noisy(torque, 0.1)));
+    if (step % 20 == 5) {
+      add(t + 400'000, pressure_frame(noisy((force_N - kSpring_N) / kArea_m2, 500.0)));
+    }
+    if (step % 50 == 7) {
+      const auto now = static_cast<std::uint32_t>(step);
+      add(t, flags_frame(now >= drive.active_from_ms && now < drive.active_to_ms));
+    }
+  }
+  std::stable_sort(frames.begin(), frames.end(),
+                   [](const auto& a, const auto& b) { return a.t_ns < b.t_ns; });
+  return frames;
+}
+
+}  // namespace beltgrip::test
