@@ -139,7 +139,6 @@ void InputMonitor::take(Row& row, const RxFrame& frame, MonoTime t, FaultSet& fa
     return;
   }
   if (row.learns) learn(row, t);
-  note_change(row, t, value);
   row.history.add(t, value);
 }
 
@@ -153,16 +152,6 @@ void InputMonitor::learn(Row& row, MonoTime t) noexcept {
   row.learns = false;
 }
 
-void InputMonitor::note_change(Row& row, MonoTime t, double value) noexcept {
-  const Role role = row.binding->role;
-  if (role != Role::kPrimarySpeed && role != Role::kSecondarySpeed) return;
-  const Row& other =
-      this->row(role == Role::kPrimarySpeed ? Role::kSecondarySpeed : Role::kPrimarySpeed);
-  if (!row.history.empty() && value == row.history.newest_value()) return;
-  row.changed = t;
-  row.other_at_change = other.history.empty() ? 0.0 : other.history.newest_value();
-}
-
 SignalQuality InputMonitor::judge(const Row& row, MonoTime t) const noexcept {
   if (row.binding == nullptr) return SignalQuality::kUnbound;
   if (row.history.empty()) return SignalQuality::kMissing;
@@ -173,34 +162,39 @@ SignalQuality InputMonitor::judge(const Row& row, MonoTime t) const noexcept {
   return row.period ? SignalQuality::kValid : SignalQuality::kLearning;
 }
 
-bool InputMonitor::is_frozen(Role role, Role other_role, MonoTime t) const noexcept {
-  const Row& row = this->row(role);
-  const Row& other = this->row(other_role);
-  if (row.quality != SignalQuality::kValid || other.quality != SignalQuality::kValid ||
-      t - row.changed < kFrozenAfter) {
+bool InputMonitor::is_frozen(Motion& motion, const Row& row, const Row& other,
+                             MonoTime t) noexcept {
+  if (row.quality != SignalQuality::kValid || other.quality != SignalQuality::kValid) {
+    motion.known = false;
     return false;
   }
-  const double moved = std::abs(other.history.newest_value() - row.other_at_change);
-  return moved > kFrozenShare * std::max(std::abs(row.other_at_change), kFrozenFloor_rad_s);
+  const double value = row.history.newest_value();
+  const double other_value = other.history.newest_value();
+  if (!motion.known || value != motion.value) motion = {true, t, value, other_value};
+  return t - motion.since >= kFrozenAfter &&
+         std::abs(other_value - motion.other) >
+             kFrozenShare * std::max(std::abs(motion.other), kFrozenFloor_rad_s);
 }
 
 void InputMonitor::update(MonoTime t, FaultSet& faults) noexcept {
   if (!began_) began_ = t;
-  for (Row& row : rows_) {
-    row.quality = judge(row, t);
-    // A period learned from the remains of a message that has stopped says nothing.
-    if (row.quality == SignalQuality::kStale && row.learns) row.interval_count = 0;
+  for (Row& each : rows_) {
+    each.quality = judge(each, t);
+    // Intervals from before a message stopped say nothing of its period.
+    if (each.quality == SignalQuality::kStale && each.learns) each.interval_count = 0;
   }
-  const bool primary_frozen = is_frozen(Role::kPrimarySpeed, Role::kSecondarySpeed, t);
-  const bool secondary_frozen = is_frozen(Role::kSecondarySpeed, Role::kPrimarySpeed, t);
-  if (primary_frozen) row(Role::kPrimarySpeed).quality = SignalQuality::kFrozen;
-  if (secondary_frozen) row(Role::kSecondarySpeed).quality = SignalQuality::kFrozen;
+  Row& primary = row(Role::kPrimarySpeed);
+  Row& secondary = row(Role::kSecondarySpeed);
+  const bool primary_frozen = is_frozen(primary_motion_, primary, secondary, t);
+  const bool secondary_frozen = is_frozen(secondary_motion_, secondary, primary, t);
+  if (primary_frozen) primary.quality = SignalQuality::kFrozen;
+  if (secondary_frozen) secondary.quality = SignalQuality::kFrozen;
 
   for (const Role role : required()) {
-    const Row& row = this->row(role);
-    switch (row.quality) {
+    const Row& now = row(role);
+    switch (now.quality) {
       case SignalQuality::kMissing:
-        if (t - *began_ >= scaled(row.period.value_or(kPeriodAssumed), kMissingPeriods)) {
+        if (t - *began_ >= scaled(now.period.value_or(kPeriodAssumed), kMissingPeriods)) {
           faults.raise(Fault::kInputMissing, t);
         }
         break;

@@ -10,6 +10,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "daemon/core/config.h"
@@ -65,8 +66,13 @@ class InputMonitor {
     bool learns = false;
     std::array<Duration, kLearnIntervals> intervals{};
     std::size_t interval_count = 0;
-    MonoTime changed = 0;          // when the value last changed
-    double other_at_change = 0.0;  // and what the other speed was then
+  };
+  // Since when a speed has stood still, and what the other was then.
+  struct Motion {
+    bool known = false;
+    MonoTime since = 0;
+    double value = 0.0;
+    double other = 0.0;
   };
   struct Message {
     can::CanId id;
@@ -83,9 +89,8 @@ class InputMonitor {
   const Message* message_of(can::CanId id) const noexcept;
   void take(Row& row, const RxFrame& frame, MonoTime t, FaultSet& faults) noexcept;
   void learn(Row& row, MonoTime t) noexcept;
-  void note_change(Row& row, MonoTime t, double value) noexcept;
   SignalQuality judge(const Row& row, MonoTime t) const noexcept;
-  bool is_frozen(Role role, Role other, MonoTime t) const noexcept;
+  static bool is_frozen(Motion& motion, const Row& row, const Row& other, MonoTime t) noexcept;
 
   Config config_;  // the bindings' home
   std::array<Row, kRoleCount> rows_{};
@@ -96,7 +101,8 @@ class InputMonitor {
   std::array<std::uint8_t, kHashSize> extended_{};                // open addressing
   std::array<Role, kRoleCount> required_{};
   std::size_t required_count_ = 0;
-  MonoTime newest_ = 0;  // stamp of the newest frame taken
+  Motion primary_motion_, secondary_motion_;
+  MonoTime newest_ = std::numeric_limits<MonoTime>::min();  // stamp of the newest frame taken
   std::optional<MonoTime> began_;
 };
 

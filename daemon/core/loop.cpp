@@ -78,9 +78,11 @@ class Loop {
 
   void send() noexcept {
     for (std::size_t i = 0; i < outbox_.size; ++i) {
-      if (port_.send(outbox_.frames[i]) == SendResult::kSent) continue;
+      const SendResult result = port_.send(outbox_.frames[i]);
+      if (result == SendResult::kSent) continue;
       ++counters_.sends_failed;
-      pipeline_.on_send_failed(next_);
+      // A link that is down has a fault of its own.
+      if (result != SendResult::kDown) pipeline_.on_send_failed(next_);
     }
   }
 

@@ -30,7 +30,7 @@ struct Played {
 };
 
 Played run_frames(const Config& config, std::vector<can::StampedFrame> frames,
-               StopReason end = StopReason::kTraceEnd) {
+                  StopReason end = StopReason::kTraceEnd) {
   test::FramePlayer port(std::move(frames));
   test::ReportKeeper keeper;
   Pipeline pipeline(config);
