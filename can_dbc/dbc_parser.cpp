@@ -533,7 +533,6 @@ bool StatementReader::signal() {
 
   std::uint64_t start = 0;
   std::uint64_t length = 0;
-  NumberToken order;
   NumberToken scale;
   NumberToken offset;
   constexpr std::uint64_t kBitsMax = 0x7FFF'FFFF;
