@@ -1,12 +1,8 @@
 #include "daemon/core/config.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 
 #include "daemon/core/config_binding.h"
 #include "daemon/core/config_document.h"
@@ -17,7 +13,7 @@ namespace beltgrip::daemon {
 namespace {
 
 constexpr int kExitNoInput = 66;
-constexpr std::size_t kFileSizeMax = 1U << 20;
+constexpr std::size_t kFileSizeMax = std::size_t{1} << 20;
 constexpr std::size_t kInterfaceNameMax = 15;  // IFNAMSIZ - 1
 
 // Reads one configuration; the steps in the order of load().
@@ -97,22 +93,15 @@ void Loader::load() {
 }
 
 bool Loader::read_document() {
-  errno = 0;
-  std::ifstream in(path_, std::ios::binary);
   std::string text;
-  if (in.is_open() && !std::filesystem::is_directory(path_)) {
-    text.assign(std::istreambuf_iterator<char>(in), {});
-  }
-  if (!in.is_open() || in.bad() || std::filesystem::is_directory(path_)) {
-    const std::string reason = std::filesystem::is_directory(path_) ? "it is a directory"
-                               : errno != 0                         ? std::strerror(errno)
-                                                                    : "it cannot be read";
+  const std::string reason = read_text_file(path_, kFileSizeMax, text);
+  if (!reason.empty()) {
     result_.errors.push_back({kExitNoInput, path_ + ": found no readable file (" + reason +
                                                 "), expected a configuration in TOML"});
     return false;
   }
   if (text.size() > kFileSizeMax) {
-    errors_.add(1, "size", std::to_string(text.size()) + " bytes", "at most 1 MiB");
+    errors_.add(1, "size", "more than 1 MiB", "a configuration in TOML");
     return false;
   }
   auto parsed = parse_toml(text);

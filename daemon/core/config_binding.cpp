@@ -8,7 +8,6 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <map>
 
 #include "can_dbc/dbc_parser.h"
@@ -22,6 +21,7 @@ constexpr int kExitData = 65;
 constexpr int kExitNoInput = 66;
 constexpr std::size_t kWarningsPerFile = 10;
 constexpr std::size_t kMuxDepth = 16;
+constexpr std::size_t kDbcSizeMax = std::size_t{256} << 20;
 
 std::string id_text(can::CanId id) {
   std::array<char, 16> digits;
@@ -169,11 +169,28 @@ void ConfigErrors::add(std::uint32_t line, const std::string& key, const std::st
                                     ": found " + found + ", expected " + expected});
 }
 
+std::string read_text_file(const std::string& path, std::size_t limit, std::string& text) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) return "it is a directory";
+  errno = 0;
+  std::ifstream in(path, std::ios::binary);
+  if (!in.is_open()) return errno != 0 ? std::strerror(errno) : "it cannot be opened";
+  constexpr std::size_t kChunk = 1U << 16;
+  std::size_t size = 0;
+  while (size <= limit && in) {
+    text.resize(size + kChunk);
+    in.read(text.data() + size, kChunk);
+    size += static_cast<std::size_t>(in.gcount());
+  }
+  text.resize(size);
+  return in.bad() ? "it cannot be read" : "";
+}
+
 std::string nearest_hint(std::string_view name, const std::vector<std::string>& names) {
   constexpr std::size_t kNameMax = 128;
   if (name.size() > kNameMax) return {};
   const std::string wanted = lower(name);
-  std::size_t best_distance = 2 + name.size() / 4;
+  std::size_t best_distance = 3 + name.size() / 4;
   const std::string* best = nullptr;
   for (const std::string& candidate : names) {
     if (candidate.size() > kNameMax) continue;
@@ -190,13 +207,10 @@ void SignalCatalogue::add_file(const std::string& path, const std::string& direc
                                std::uint32_t line, ConfigErrors& errors,
                                std::vector<std::string>& warnings) {
   const std::string full = (std::filesystem::path(directory) / path).string();
-  errno = 0;
-  std::ifstream in(full, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(in), {}};
-  if (!in.is_open() || in.bad() || std::filesystem::is_directory(full)) {
-    const std::string reason = std::filesystem::is_directory(full) ? "it is a directory"
-                               : errno != 0                        ? std::strerror(errno)
-                                                                   : "it cannot be read";
+  std::string text;
+  std::string reason = read_text_file(full, kDbcSizeMax, text);
+  if (text.size() > kDbcSizeMax) reason = "it is larger than 256 MiB";
+  if (!reason.empty()) {
     errors.add(line, "bus.dbc", in_quotes(path) + " that cannot be read (" + reason + ")",
                "the path of a DBC file, relative to " + (directory.empty() ? "." : directory),
                kExitNoInput);
@@ -205,12 +219,12 @@ void SignalCatalogue::add_file(const std::string& path, const std::string& direc
   }
   can::DbcParseResult parsed = can::parse_dbc(text);
   if (parsed.database.messages.empty()) {
-    std::string reason = "no message in it";
+    std::string why = "no message in it";
     if (!parsed.problems.empty()) {
       const can::Problem& first = parsed.problems.front();
-      reason = "line " + std::to_string(first.line) + ": " + first.text;
+      why = "line " + std::to_string(first.line) + ": " + first.text;
     }
-    errors.add(line, "bus.dbc", in_quotes(path) + " without a readable message (" + reason + ")",
+    errors.add(line, "bus.dbc", in_quotes(path) + " without a readable message (" + why + ")",
                "a DBC file", kExitData);
     complete_ = false;
     return;
@@ -274,7 +288,7 @@ std::optional<SignalCatalogue::Found> SignalCatalogue::find_message(std::string_
     const can::MessageDef* message =
         id ? file.database.find_message(*id) : file.database.find_message(std::string(name));
     if (message == nullptr) continue;
-    if (found.message != nullptr && !id) {
+    if (found.message != nullptr && found.message->id != message->id) {
       errors.add(
           line, key,
           "message " + in_quotes(name) + " in " + in_quotes(found.file->path) + " and in " +

@@ -26,6 +26,10 @@ class ConfigErrors {
   std::vector<ConfigError>& errors_;
 };
 
+// The whole file; one that is longer than `limit` is read a little beyond it and no further.
+// Returns why it cannot be read, or nothing.
+std::string read_text_file(const std::string& path, std::size_t limit, std::string& text);
+
 // The name in `names` nearest to `name`, where one is near enough to be a slip of the pen:
 // ", nearest is \"x\"", else nothing.
 std::string nearest_hint(std::string_view name, const std::vector<std::string>& names);

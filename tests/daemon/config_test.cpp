@@ -1,0 +1,581 @@
+// The configuration: every key at, below and beyond its range, of the wrong type, unknown, twice;
+// roles, units and DBC files that do not fit; what is not there yet; the default file. Every error
+// must name file, line and key, and all of them must be listed.
+#include "daemon/core/config.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <numbers>
+
+#include "daemon/core/config_options.h"
+#include "tests/daemon/test_vehicle.h"
+
+namespace beltgrip::daemon {
+namespace {
+
+using test::TemporaryDirectory;
+
+std::string number(double value) {
+  std::array<char, 40> text;
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
+}
+
+class ConfigTest : public testing::Test {
+ protected:
+  ConfigTest() { directory_.write("vehicle.dbc", test::kVehicleDbc); }
+
+  ConfigResult load(const std::string& toml) {
+    return load_config(directory_.write("beltgripd.toml", toml));
+  }
+  // The vehicle's configuration with lines of a section added to it.
+  static std::string with(const std::string& section, const std::string& lines) {
+    std::string toml = test::kVehicleToml;
+    const std::string header = "[" + section + "]\n";
+    const std::size_t at = toml.find(header);
+    if (at == std::string::npos) return toml + header + lines + "\n";
+    return toml.insert(at + header.size(), lines + "\n");
+  }
+  static std::string replaced(std::string toml, const std::string& what, const std::string& by) {
+    const std::size_t at = toml.find(what);
+    EXPECT_NE(at, std::string::npos) << what;
+    return toml.replace(at, what.size(), by);
+  }
+  static std::string vehicle(const std::string& what, const std::string& by) {
+    return replaced(test::kVehicleToml, what, by);
+  }
+  // Exactly one error, with this exit code, that names file, line, key and the words.
+  void expect_error(const std::string& toml, const std::string& key,
+                    const std::vector<std::string>& words, int line = 0, int exit_code = 78) {
+    const ConfigResult result = load(toml);
+    EXPECT_FALSE(result.config.has_value()) << key;
+    ASSERT_EQ(result.errors.size(), 1U)
+        << key << (result.errors.size() > 1 ? result.errors[1].text : std::string());
+    const ConfigError& error = result.errors[0];
+    EXPECT_EQ(error.exit_code, exit_code);
+    EXPECT_EQ(result.exit_code(), exit_code);
+    EXPECT_EQ(error.text.find('\n'), std::string::npos);
+    EXPECT_TRUE(error.text.starts_with(directory_.path() + "/beltgripd.toml:")) << error.text;
+    EXPECT_NE(error.text.find(": " + key + ": found "), std::string::npos) << error.text;
+    EXPECT_NE(error.text.find(", expected "), std::string::npos) << error.text;
+    for (const std::string& word : words) {
+      EXPECT_NE(error.text.find(word), std::string::npos) << word << " in " << error.text;
+    }
+    if (line != 0) {
+      EXPECT_NE(error.text.find("toml:" + std::to_string(line) + ":"), std::string::npos)
+          << error.text;
+    }
+  }
+  void expect_good(const std::string& toml) {
+    const ConfigResult result = load(toml);
+    for (const ConfigError& error : result.errors) ADD_FAILURE() << error.text;
+    EXPECT_TRUE(result.config.has_value());
+  }
+
+  TemporaryDirectory directory_;
+};
+
+int line_of(const std::string& toml, const std::string& what) {
+  const std::size_t at = toml.find(what);
+  return 1 + static_cast<int>(std::count(toml.begin(), toml.begin() + static_cast<long>(at), '\n'));
+}
+
+TEST_F(ConfigTest, TheVehicleIsBound) {
+  const ConfigResult result = load(test::kVehicleToml);
+  ASSERT_TRUE(result.config.has_value());
+  EXPECT_TRUE(result.warnings.empty());
+  const Config& config = *result.config;
+  ASSERT_EQ(config.roles.size(), 5U);
+  EXPECT_TRUE(std::is_sorted(config.roles.begin(), config.roles.end(),
+                             [](const auto& a, const auto& b) { return a.role < b.role; }));
+  const RoleBinding& speed = config.roles[0];
+  EXPECT_EQ(speed.role, Role::kPrimarySpeed);
+  EXPECT_EQ(speed.message_name, "Speeds");
+  EXPECT_EQ(speed.id, (can::CanId{0x100, false}));
+  EXPECT_EQ(speed.message_length, 8U);
+  EXPECT_EQ(speed.maximum, 8000.0);
+  EXPECT_NEAR(speed.factor, std::numbers::pi / 30.0, 1e-15);
+  EXPECT_EQ(speed.period_ms, 10.0);
+  const RoleBinding& pressure = config.roles[2];
+  EXPECT_EQ(pressure.factor, 1e5);
+  const RoleBinding& torque = config.roles[3];
+  EXPECT_EQ(torque.id, (can::CanId{0x12345678, true}));
+  EXPECT_EQ(config.trigger, Trigger::kAlways);
+  EXPECT_EQ(config.control, Control::kObserve);
+  EXPECT_TRUE(config.estimator.torque_is_engine);
+  EXPECT_EQ(config.interface, "inproc:test");
+}
+
+// Every number: minimum and maximum are taken, the next double beyond is not, nor is text.
+TEST_F(ConfigTest, EveryNumberAtAndBeyondItsRange) {
+  // The neighbours that the cross-checks look at, moved out of the way.
+  const auto neighbours = [](const std::string& key, double value) -> std::string {
+    if (key == "ratio_low") return "ratio_overdrive = 10.0\n";
+    if (key == "ratio_overdrive") return "ratio_low = 0.1\n";
+    if (key == "primary_radius_overdrive_m") return "primary_radius_low_m = 0.005\n";
+    if (key == "primary_radius_low_m") return "primary_radius_overdrive_m = 1.0\n";
+    if (key == "lowpass_hz" && value > 50) return "sample_rate_hz = 1000\n";
+    return "";
+  };
+  for (const Option& option : option_table()) {
+    if (option.kind != Option::Kind::kNumber) continue;
+    const std::string section(option.section), key(option.key), name = section + "." + key;
+    const auto toml = [&](const std::string& value, double size = 0.0) {
+      return with(section, key + " = " + value + "\n" + neighbours(key, size));
+    };
+    const bool low_ok = key != "ratio_overdrive" && key != "primary_radius_overdrive_m";
+    const bool high_ok = key != "ratio_low" && key != "primary_radius_low_m";
+    if (low_ok) expect_good(toml(number(option.minimum)));
+    if (high_ok && key != "stop_slope") expect_good(toml(number(option.maximum), option.maximum));
+    const double below = std::nextafter(option.minimum, -1e9);
+    const double above = std::nextafter(option.maximum, 1e9);
+    const std::vector<std::string> words{"a number from"};
+    const int line = line_of(toml("1"), key + " = ");
+    // Beyond its range the default stands for the cross-checks; only the range is reported.
+    const auto alone = [&](const std::string& value) { return with(section, key + " = " + value); };
+    expect_error(alone(number(below)), name, words, line);
+    expect_error(alone(number(above)), name, words, line);
+    expect_error(alone("nan"), name, words, line);
+    expect_error(alone("inf"), name, words, line);
+    expect_error(alone("\"1.0\""), name, words, line);
+    expect_error(alone("true"), name, words, line);
+    expect_error(alone("[1.0]"), name, words, line);
+    expect_error(alone("2026-01-01"), name, words, line);
+    if (option.minimum <= 1.0 && option.maximum >= 1.0 && low_ok && high_ok) {
+      expect_good(toml("1"));  // an integer is fine where a number is wanted
+    }
+  }
+}
+
+TEST_F(ConfigTest, EveryKeyTwiceIsASyntaxErrorWithItsLine) {
+  for (const Option& option : option_table()) {
+    if (option.kind != Option::Kind::kNumber) continue;
+    const std::string key(option.key);
+    const std::string toml = with(std::string(option.section), key + " = 1\n" + key + " = 1");
+    const int line = line_of(toml, key + " = 1") + 1;
+    expect_error(toml, "syntax", {key}, line);
+  }
+}
+
+TEST_F(ConfigTest, EveryKeyMisspeltIsNamedWithTheNearest) {
+  for (const Option& option : option_table()) {
+    std::string key(option.key);
+    std::string wrong = key + "x";
+    expect_error(with(std::string(option.section), wrong + " = 1"),
+                 std::string(option.section) + "." + wrong,
+                 {"an unknown key", "nearest is \"" + key + "\""});
+  }
+  expect_error(std::string(test::kVehicleToml) + "[variatr]\nratio_low = 1\n", "variatr",
+               {"unknown section", "nearest is \"variator\""});
+  expect_error("interface = \"vcan0\"\n" + std::string(test::kVehicleToml), "interface",
+               {"unknown key"}, 1);
+}
+
+// A wrong unit in a key with a unit suffix is another key.
+TEST_F(ConfigTest, AKeyWithAnotherUnitIsUnknown) {
+  expect_error(with("variator", "half_wedge_angle_rad = 0.19"), "variator.half_wedge_angle_rad",
+               {"nearest is \"half_wedge_angle_deg\""});
+  expect_error(with("sensors", "secondary_pressure = { bias_bar = 0.2 }"),
+               "sensors.secondary_pressure.bias_bar", {"bias_Pa or gain"});
+}
+
+TEST_F(ConfigTest, EveryChoice) {
+  for (const Option& option : option_table()) {
+    if (option.kind != Option::Kind::kChoice) continue;
+    const std::string key(option.key), section(option.section);
+    const std::string name = section + "." + key;
+    std::string base = test::kVehicleToml;
+    if (key == "trigger") base = replaced(base, "trigger = \"always\"\n", "");
+    const auto toml = [&](const std::string& value) {
+      std::string text = base;
+      const std::string header = "[" + section + "]\n";
+      const std::size_t at = text.find(header);
+      const std::string line = key + " = " + value + "\n";
+      return at == std::string::npos ? text + header + line : text.insert(at + header.size(), line);
+    };
+    for (const std::string_view choice : option.choices) {
+      const ConfigResult result = load(toml('"' + std::string(choice) + '"'));
+      const bool there = choice != "coast_down" && choice != "steady" && choice != "command" &&
+                         choice != "confidence";
+      EXPECT_EQ(result.config.has_value(), there) << name << " " << choice;
+      if (there) {
+        EXPECT_EQ(option.choices[option.get_choice(*result.config)], choice);
+      } else {
+        ASSERT_EQ(result.errors.size(), 1U);
+        EXPECT_NE(result.errors[0].text.find("this version does not do yet"), std::string::npos);
+      }
+    }
+    if (key == "trigger") continue;  // its default is not there yet, which is one more error
+    expect_error(toml("\"nonsense\""), name, {"\"nonsense\"", std::string(option.choices[0])});
+    expect_error(toml("1"), name, {std::string(option.choices[0])});
+  }
+}
+
+TEST_F(ConfigTest, TheDefaultTriggerIsNotThereYetAndSaysWhatToSet) {
+  expect_error(vehicle("trigger = \"always\"\n", ""), "experiment.trigger",
+               {"the default", "coast_down", "trigger = \"always\" or \"signal\""});
+  expect_error(with("estimator", "model = \"wear.toml\""), "estimator.model", {"wear.toml"});
+}
+
+TEST_F(ConfigTest, CrossChecks) {
+  expect_error(with("variator", "ratio_low = 2.5"), "variator.ratio_low",
+               {"2.5", "less than ratio_overdrive, 2.25"});
+  expect_error(with("variator", "ratio_low = 2.25"), "variator.ratio_low", {"less than"});
+  expect_error(with("variator", "primary_radius_low_m = 0.09"), "variator.primary_radius_low_m",
+               {"less than primary_radius_overdrive_m, 0.0784"});
+  expect_error(with("estimator", "stop_slope = 0\npeak_slope = 0"), "estimator.stop_slope",
+               {"less than peak_slope"});
+  expect_error(with("estimator", "lowpass_hz = 100"), "estimator.lowpass_hz",
+               {"less than half of sample_rate_hz, 100"});
+  expect_error(vehicle("inproc:test", "can0123456789abc"), "bus.interface", {"1 to 15 characters"},
+               2);
+  expect_good(vehicle("inproc:test", "can0123456789ab"));
+  for (const char* name : {"", "inproc:", "a b", "a/b", ".", "a:b"}) {
+    expect_error(vehicle("inproc:test", name), "bus.interface", {"or inproc:NAME"}, 2);
+  }
+}
+
+TEST_F(ConfigTest, Identifiers) {
+  const ConfigResult result = load(with("bus", "identifiers = { slip = 0x7FF, status = 0 }"));
+  ASSERT_TRUE(result.config.has_value());
+  EXPECT_EQ(result.config->identifiers.slip, 0x7FFU);
+  EXPECT_EQ(result.config->identifiers.status, 0U);
+  EXPECT_EQ(result.config->identifiers.estimate, 0x6A0U);
+  const std::string key = "bus.identifiers.slip";
+  expect_error(with("bus", "identifiers = { slip = 0x800 }"), key, {"2048", "0 to 0x7FF"});
+  expect_error(with("bus", "identifiers = { slip = -1 }"), key, {"-1"});
+  expect_error(with("bus", "identifiers = { slip = 1.5 }"), key, {"1.5"});
+  expect_error(with("bus", "identifiers = { slap = 1 }"), "bus.identifiers.slap",
+               {"nearest is \"slip\""});
+  expect_error(with("bus", "identifiers = 5"), "bus.identifiers", {"5"});
+  expect_error(with("bus", "identifiers = { slip = 0x6A0 }"), "bus.identifiers",
+               {"estimate and slip"});
+  expect_error(with("bus", "identifiers = { clamp = 0x101 }"), "signals.secondary_pressure",
+               {"clamp"});
+}
+
+TEST_F(ConfigTest, RequiredRoles) {
+  for (const auto& [role, line] :
+       {std::pair{"primary_speed", "primary_speed = \"Speeds.PrimarySpeed\"\n"},
+        std::pair{"secondary_speed", "secondary_speed = \"Speeds.SecondarySpeed\"\n"},
+        std::pair{"secondary_pressure", "secondary_pressure = \"Pressure.SecondaryPressure\"\n"},
+        std::pair{"engine_torque", "engine_torque = \"0x12345678x.EngineTorque\"\n"}}) {
+    expect_error(vehicle(line, ""), "signals." + std::string(role), {"no such key"}, 4);
+  }
+  const std::string primary = vehicle("engine_torque", "primary_torque");
+  const ConfigResult result = load(primary);
+  ASSERT_TRUE(result.config.has_value());
+  EXPECT_FALSE(result.config->estimator.torque_is_engine);
+  expect_error(replaced(vehicle("experiment_active = \"Flags.ExperimentActive\"\n", ""),
+                        "\"always\"", "\"signal\""),
+               "signals.experiment_active", {"trigger is \"signal\""});
+}
+
+TEST_F(ConfigTest, RolesThatNameNothing) {
+  const std::string key = "signals.primary_speed";
+  const auto role = [&](const std::string& text) {
+    return vehicle("\"Speeds.PrimarySpeed\"", text);
+  };
+  expect_error(role("\"Speeds.PrimarySped\""), key,
+               {"PrimarySped", "vehicle.dbc", "nearest is \"PrimarySpeed\""}, 5);
+  expect_error(role("\"Speds.PrimarySpeed\""), key, {"Speds", "nearest is \"Speeds\""}, 5);
+  expect_error(role("\"PrimarySpeed\""), key, {"\"Message.Signal\""}, 5);
+  expect_error(role("\"\""), key, {"\"Message.Signal\""}, 5);
+  expect_error(role("\".x\""), key, {"\"Message.Signal\""}, 5);
+  expect_error(role("\"x.\""), key, {"\"Message.Signal\""}, 5);
+  expect_error(role("\"0x101.PrimarySpeed\""), key, {"Pressure does not have"}, 5);
+  expect_error(role("\"0x100x.PrimarySpeed\""), key, {"no DBC names"}, 5);  // 29 bit, not 11
+  expect_error(role("\"0x800.PrimarySpeed\""), key, {"0x123 (11 bit)"}, 5);
+  expect_error(role("\"0x20000000x.PrimarySpeed\""), key, {"(29 bit)"}, 5);
+  expect_error(role("\"0x.PrimarySpeed\""), key, {"(29 bit)"}, 5);
+  expect_error(role("\"0x1G.PrimarySpeed\""), key, {"(29 bit)"}, 5);
+  expect_error(role("5"), key, {"5"}, 5);
+  expect_error(role("[\"Speeds.PrimarySpeed\"]"), key, {"an array"}, 5);
+  expect_good(role("\"0x100.PrimarySpeed\""));
+  expect_error(with("signals", "primry_speed = \"Speeds.PrimarySpeed\""), "signals.primry_speed",
+               {"nearest is \"primary_speed\""});
+}
+
+TEST_F(ConfigTest, RolesAsTables) {
+  const std::string key = "signals.primary_speed";
+  const auto role = [&](const std::string& text) {
+    return vehicle("\"Speeds.PrimarySpeed\"", "{ signal = \"Speeds.PrimarySpeed\", " + text + " }");
+  };
+  const ConfigResult result =
+      load(role("unit = \"rad/s\", scale = 2, offset = -1.5, period_ms = 40"));
+  ASSERT_TRUE(result.config.has_value());
+  EXPECT_EQ(result.config->roles[0].factor, 2.0);
+  EXPECT_EQ(result.config->roles[0].shift, -1.5);
+  EXPECT_EQ(result.config->roles[0].period_ms, 40.0);
+  const ConfigResult rpm = load(role("offset = 30"));
+  ASSERT_TRUE(rpm.config.has_value());
+  EXPECT_NEAR(rpm.config->roles[0].shift, std::numbers::pi, 1e-12);
+
+  expect_error(role("unit = \"bar\""), key, {"\"bar\" (pressure)", "angular speed"}, 5);
+  expect_error(role("unit = \"furlong\""), key, {"furlong", "rad/s"}, 5);
+  expect_error(role("unit = \"\""), key, {"no unit"}, 5);
+  expect_error(role("unit = 5"), key + ".unit", {"5"}, 5);
+  expect_error(role("scale = 0"), key + ".scale", {"0"}, 5);
+  expect_error(role("scale = nan"), key + ".scale", {"nan"}, 5);
+  expect_error(role("offset = \"1\""), key + ".offset", {"finite number"}, 5);
+  expect_error(role("period_ms = 0"), key + ".period_ms", {"0.5 to 10000"}, 5);
+  expect_error(role("period = 10"), key + ".period", {"nearest is \"period_ms\""}, 5);
+  expect_error(vehicle("\"Speeds.PrimarySpeed\"", "{ unit = \"rpm\" }"), key, {"without signal"},
+               5);
+}
+
+TEST_F(ConfigTest, UnitsOfTheDbc) {
+  const auto dbc = [&](const std::string& what, const std::string& by) {
+    directory_.write("vehicle.dbc", replaced(test::kVehicleDbc, what, by));
+  };
+  dbc("[0|60] \"bar\"", "[0|60] \"Nm\"");
+  expect_error(test::kVehicleToml, "signals.secondary_pressure",
+               {"\"Nm\" in vehicle.dbc (torque)", "pressure", "set unit"}, 7);
+  dbc("[0|60] \"bar\"", "[0|60] \"\"");
+  expect_error(test::kVehicleToml, "signals.secondary_pressure",
+               {"no unit in vehicle.dbc", "set unit"}, 7);
+  dbc("[0|60] \"bar\"", "[0|60] \"counts\"");
+  expect_error(test::kVehicleToml, "signals.secondary_pressure", {"\"counts\""}, 7);
+  dbc("[0|3] \"\"", "[0|3] \"rpm\"");
+  expect_error(test::kVehicleToml, "signals.experiment_active", {"angular speed", "0 or 1"}, 9);
+}
+
+TEST_F(ConfigTest, SignalsThatCannotBeDecoded) {
+  const auto dbc = [&](const std::string& what, const std::string& by) {
+    directory_.write("vehicle.dbc", replaced(test::kVehicleDbc, what, by));
+  };
+  dbc("PrimarySpeed : 0|16@1+", "PrimarySpeed : 56|16@1+");
+  ConfigResult result = load(test::kVehicleToml);
+  ASSERT_EQ(result.errors.size(), 1U);
+  EXPECT_NE(result.errors[0].text.find("outside the 8 bytes of Speeds"), std::string::npos);
+  dbc("(0.125,0) [0|8000] \"rpm\"", "(0,0) [0|8000] \"rpm\"");
+  result = load(test::kVehicleToml);
+  ASSERT_FALSE(result.errors.empty());
+  EXPECT_NE(result.errors[0].text.find("factor"), std::string::npos) << result.errors[0].text;
+}
+
+TEST_F(ConfigTest, AMultiplexedRoleKnowsItsSelectors) {
+  directory_.write("vehicle.dbc",
+                   replaced(replaced(test::kVehicleDbc, "PrimarySpeed :", "PrimarySpeed m3 :"),
+                            " SG_ SecondarySpeed",
+                            " SG_ Page M : 32|8@1+ (1,0) [0|0] \"\" ECU\n"
+                            " SG_ SecondarySpeed"));
+  const ConfigResult result = load(test::kVehicleToml);
+  ASSERT_TRUE(result.config.has_value()) << result.errors[0].text;
+  ASSERT_EQ(result.config->roles[0].mux.size(), 1U);
+  EXPECT_EQ(result.config->roles[0].mux[0].ranges.front(),
+            (std::pair<std::uint64_t, std::uint64_t>{3, 3}));
+  EXPECT_TRUE(result.config->roles[1].mux.empty());
+}
+
+TEST_F(ConfigTest, DbcFiles) {
+  expect_error(vehicle("[\"vehicle.dbc\"]", "[]"), "bus.dbc", {"at least one DBC"}, 3);
+  expect_error(vehicle("dbc = [\"vehicle.dbc\"]\n", ""), "bus.dbc", {"at least one DBC"}, 1);
+  expect_error(vehicle("[\"vehicle.dbc\"]", "\"vehicle.dbc\""), "bus.dbc", {"an array"}, 3);
+  expect_error(vehicle("[\"vehicle.dbc\"]", "[1]"), "bus.dbc", {"1"}, 3);
+  expect_error(vehicle("[\"vehicle.dbc\"]", "[\"none.dbc\"]"), "bus.dbc",
+               {"none.dbc", "No such file", directory_.path()}, 3, 66);
+  expect_error(vehicle("[\"vehicle.dbc\"]", "[\".\"]"), "bus.dbc", {"directory"}, 3, 66);
+  directory_.write("empty.dbc", "");
+  expect_error(vehicle("[\"vehicle.dbc\"]", "[\"empty.dbc\"]"), "bus.dbc",
+               {"empty.dbc", "without a readable message"}, 3, 65);
+  directory_.write("text.dbc", "This is no DBC.\n");
+  expect_error(vehicle("[\"vehicle.dbc\"]", "[\"text.dbc\"]"), "bus.dbc", {"text.dbc"}, 3, 65);
+  // An identifier in two files, whether or not a role uses it.
+  directory_.write("other.dbc",
+                   "VERSION \"\"\nBS_:\nBU_: X\nBO_ 259 Other: 8 X\n SG_ S : 0|8@1+ (1,0) [0|0] "
+                   "\"\" X\n");
+  expect_error(vehicle("[\"vehicle.dbc\"]", "[\"vehicle.dbc\", \"other.dbc\"]"), "bus.dbc",
+               {"0x103", "\"vehicle.dbc\" (Flags)", "\"other.dbc\" (Other)"}, 3);
+  expect_error(vehicle("[\"vehicle.dbc\"]", "[\"vehicle.dbc\", \"vehicle.dbc\"]"), "bus.dbc",
+               {"and 3 more such"}, 3);
+  // One name in two files.
+  directory_.write("other.dbc",
+                   "VERSION \"\"\nBS_:\nBU_: X\nBO_ 1 Speeds: 8 X\n SG_ PrimarySpeed : 0|16@1+ "
+                   "(1,0) [0|0] \"rpm\" X\n");
+  ConfigResult result = load(vehicle("[\"vehicle.dbc\"]", "[\"vehicle.dbc\", \"other.dbc\"]"));
+  ASSERT_EQ(result.errors.size(), 2U);
+  EXPECT_NE(result.errors[0].text.find("0x100 or 0x1"), std::string::npos);
+  expect_good(replaced(replaced(vehicle("[\"vehicle.dbc\"]", "[\"vehicle.dbc\", \"other.dbc\"]"),
+                                "Speeds.PrimarySpeed", "0x1.PrimarySpeed"),
+                       "Speeds.SecondarySpeed", "0x100.SecondarySpeed"));
+}
+
+TEST_F(ConfigTest, PathsAreRelativeToTheFile) {
+  TemporaryDirectory elsewhere;
+  const std::string toml = vehicle("vehicle.dbc", directory_.path() + "/vehicle.dbc");
+  EXPECT_TRUE(load_config(elsewhere.write("c.toml", toml)).config.has_value());
+  EXPECT_FALSE(load_config(elsewhere.write("d.toml", test::kVehicleToml)).config.has_value());
+}
+
+TEST_F(ConfigTest, Sensors) {
+  const ConfigResult result = load(with("sensors",
+                                        "engine_torque = { bias_Nm = 2.5, gain = 0.05 }\n"
+                                        "primary_torque = { bias_Nm = 9 }\n"
+                                        "secondary_pressure = { bias_Pa = 20e3 }\n"
+                                        "primary_speed = { gain = 0.0005 }"));
+  ASSERT_TRUE(result.config.has_value());
+  EXPECT_EQ(result.config->sensors.torque.bias, 2.5);
+  EXPECT_EQ(result.config->sensors.torque.gain, 0.05);
+  EXPECT_EQ(result.config->sensors.secondary_pressure.bias, 20e3);
+  EXPECT_EQ(result.config->sensors.omega_p.gain, 0.0005);
+  EXPECT_EQ(result.config->sensors.omega_s.gain, 0.0);
+  for (std::size_t i = 0; i < kRoleCount; ++i) {
+    const Role role = static_cast<Role>(i);
+    const std::string name(role_name(role)), key = "sensors." + name;
+    const std::string bias(bias_key(role_dimension(role)));
+    if (bias.empty()) {
+      expect_error(with("sensors", name + " = { gain = 0 }"), key, {"an unknown key"});
+      continue;
+    }
+    const double maximum = bias_maximum(role_dimension(role));
+    expect_good(with("sensors", name + " = { gain = 1, " + bias + " = " + number(maximum) + " }"));
+    expect_good(with("sensors", name + " = { gain = 0, " + bias + " = 0 }"));
+    expect_error(with("sensors", name + " = { gain = 1.01 }"), key + ".gain", {"1.01"});
+    expect_error(with("sensors", name + " = { gain = -0.01 }"), key + ".gain", {"-0.01"});
+    expect_error(with("sensors", name + " = { " + bias + " = -1 }"), key + "." + bias, {"-1"});
+    expect_error(with("sensors", name + " = { " + bias + " = " + number(maximum * 1.01) + " }"),
+                 key + "." + bias, {"a number from 0 to"});
+    expect_error(with("sensors", name + " = { " + bias + " = \"1\" }"), key + "." + bias,
+                 {"\"1\""});
+    expect_error(with("sensors", name + " = 1"), key, {"1"});
+  }
+}
+
+TEST_F(ConfigTest, AllErrorsAreListed) {
+  const ConfigResult result = load(R"([bus]
+interface = ""
+dbc = ["vehicle.dbc"]
+[signals]
+primary_speed = "Speeds.Nothing"
+secondary_speed = "Speeds.SecondarySpeed"
+secondary_pressure = { signal = "Pressure.SecondaryPressure", unit = "rpm" }
+[variator]
+ratio_low = 3
+safety_factor = 0.5
+unknown = 1
+[experiment]
+control = "command"
+)");
+  // unknown, safety_factor, primary_speed, secondary_pressure, engine_torque missing, interface,
+  // ratio_low, trigger, control
+  EXPECT_EQ(result.errors.size(), 9U);
+  for (const ConfigError& error : result.errors) EXPECT_EQ(error.exit_code, 78) << error.text;
+}
+
+TEST_F(ConfigTest, FilesThatAreNoConfiguration) {
+  EXPECT_EQ(load_config(directory_.path() + "/none.toml").exit_code(), 66);
+  EXPECT_EQ(load_config(directory_.path()).exit_code(), 66);
+  EXPECT_NE(load_config("/dev/zero").errors.at(0).text.find("/dev/zero:1: size: found more than"),
+            std::string::npos);
+  const auto text_of = [&](const std::string& content) {
+    const ConfigResult result = load(content);
+    EXPECT_FALSE(result.config.has_value());
+    EXPECT_EQ(result.exit_code(), 78);
+    EXPECT_EQ(result.errors.at(0).text.find('\n'), std::string::npos);
+    return result.errors.at(0).text;
+  };
+  text_of("");
+  EXPECT_NE(text_of("[bus\n").find("toml:1: syntax"), std::string::npos);
+  EXPECT_NE(text_of("\n\na = \n").find("toml:3: syntax"), std::string::npos);
+  text_of(std::string("a = 1\n\0b = 2\n", 13));
+  text_of("a = \"\xff\xfe\"\n");
+  text_of("a = '''never closed");
+  text_of(std::string(5000, '['));
+  text_of("bus = 5\n");
+  text_of("[[bus]]\n");
+  EXPECT_NE(text_of("a" + std::string(1 << 18, 'x') + " = 1\n").find("an unknown key"),
+            std::string::npos);
+  EXPECT_NE(text_of("# " + std::string(1 << 20, 'x')).find("toml:1: size: found more than 1 MiB"),
+            std::string::npos);
+  expect_good(std::string(test::kVehicleToml) + "# " + std::string(1'000'000, 'x') + "\n");
+  // A byte order mark and carriage returns are fine.
+  std::string windows = "\xEF\xBB\xBF";
+  for (const char c : std::string(test::kVehicleToml))
+    windows += c == '\n' ? "\r\n" : std::string(1, c);
+  expect_good(windows);
+}
+
+// Every default in the generated file is the one in the code: with all of them uncommented nothing
+// changes but what the vehicle needs.
+TEST_F(ConfigTest, TheDefaultFileSaysTheDefaults) {
+  std::string active;
+  std::size_t keys = 0;
+  std::string text = default_config_text();
+  std::string section;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = text.find('\n', at);
+    std::string line = text.substr(at, end - at);
+    at = end + 1;
+    if (line.starts_with("[")) {
+      section = line.substr(1, line.size() - 2);
+      active += line + "\n";
+    }
+    for (const Option& option : option_table()) {
+      if (option.section == section && line.starts_with("# " + std::string(option.key) + " = ")) {
+        active += line.substr(2) + "\n";
+        ++keys;
+      }
+    }
+  }
+  EXPECT_EQ(keys, option_table().size());
+  active = replaced(active, "dbc = []", "dbc = [\"vehicle.dbc\"]");
+  active = replaced(active, "trigger = \"coast_down\"", "trigger = \"always\"");
+  const std::string vehicle_text = test::kVehicleToml;
+  const std::size_t from = vehicle_text.find("[signals]\n") + 10;
+  active =
+      replaced(active, "[signals]\n",
+               "[signals]\n" + vehicle_text.substr(from, vehicle_text.find("[experiment]") - from));
+  const ConfigResult result = load(active);
+  ASSERT_TRUE(result.config.has_value()) << result.errors.at(0).text;
+  Config defaults;
+  for (const Option& option : option_table()) {
+    if (option.kind == Option::Kind::kNumber) {
+      Config loaded = *result.config;
+      EXPECT_NEAR(option.number(loaded), option.number(defaults),
+                  1e-12 * std::abs(option.number(defaults)))
+          << option.key;
+    } else if (option.kind == Option::Kind::kChoice && option.key != "trigger") {
+      EXPECT_EQ(option.get_choice(*result.config), option.get_choice(defaults)) << option.key;
+    }
+  }
+  EXPECT_EQ(result.config->interface, defaults.interface);
+}
+
+// The values that the interface promises as defaults.
+TEST_F(ConfigTest, DefaultsOfTheInterface) {
+  Config config;
+  EXPECT_NEAR(config.variator.half_wedge_angle_rad, 11.0 * std::numbers::pi / 180.0, 1e-15);
+  EXPECT_EQ(config.variator.ratio_low, 0.405);
+  EXPECT_EQ(config.variator.ratio_overdrive, 2.25);
+  EXPECT_EQ(config.variator.primary_radius_overdrive_m, 0.0784);
+  EXPECT_EQ(config.variator.primary_radius_low_m, 0.0324);
+  EXPECT_EQ(config.variator.secondary_piston_area_m2, 0.0113);
+  EXPECT_EQ(config.variator.secondary_spring_force_N, 500.0);
+  EXPECT_EQ(config.variator.safety_factor, 1.3);
+  EXPECT_EQ(config.estimator.sample_rate_hz, 200.0);
+  EXPECT_EQ(config.estimator.lowpass_hz, 5.0);
+  EXPECT_EQ(config.estimator.window_s, 1.0);
+  EXPECT_EQ(config.estimator.slope_variance, 5e-3);
+  EXPECT_EQ(config.estimator.offset_variance, 0.5);
+  EXPECT_EQ(config.estimator.excitation_threshold, 0.05);
+  EXPECT_EQ(config.estimator.stop_slope, -1e-3);
+  EXPECT_EQ(config.estimator.peak_slope, 1e-3);
+  EXPECT_EQ(config.estimator.ramp_rate_max_N_per_s, 300.0);
+  EXPECT_EQ(config.estimator.method, estimator::Method::kRobust);
+  EXPECT_EQ(config.trigger, Trigger::kCoastDown);
+  EXPECT_EQ(config.control, Control::kObserve);
+}
+
+TEST_F(ConfigTest, TheShippedDefaultFileIsTheGeneratedOne) {
+  std::ifstream in(std::string(BELTGRIP_SOURCE_DIR) + "/systemd/beltgripd.toml");
+  const std::string shipped{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_EQ(shipped, default_config_text()) << "write it with beltgripd --print-default-config";
+}
+
+}  // namespace
+}  // namespace beltgrip::daemon
