@@ -54,6 +54,7 @@ class CandumpWriter {
 
  private:
   std::FILE* out_;
+  std::string line_;  // reused: no allocation per frame
 };
 
 // One frame in candump's compact notation, "123#0011", "00000123##10011", "123#R8", "20000004#..."
