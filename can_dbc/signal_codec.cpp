@@ -159,16 +159,14 @@ std::uint64_t SignalCodec::float_bits(double value) const noexcept {
   }
 }
 
+double SignalCodec::value_of(std::uint64_t raw_bits) const noexcept {
+  if (is_float()) return float_value(raw_bits);
+  if (kind_ == Kind::kSigned) return static_cast<double>(static_cast<std::int64_t>(raw_bits));
+  return static_cast<double>(raw_bits);
+}
+
 double SignalCodec::physical(std::uint64_t raw_bits) const noexcept {
-  double value = 0.0;
-  if (is_float()) {
-    value = float_value(raw_bits);
-  } else if (kind_ == Kind::kSigned) {
-    value = static_cast<double>(static_cast<std::int64_t>(raw_bits));
-  } else {
-    value = static_cast<double>(raw_bits);
-  }
-  const double scaled = value * scale_;
+  const double scaled = value_of(raw_bits) * scale_;
   return scaled + offset_;
 }
 

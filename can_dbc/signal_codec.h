@@ -41,11 +41,12 @@ class SignalCodec {
 
   std::uint64_t mask() const noexcept { return mask_; }  // as many ones as the signal has bits
   bool is_float() const noexcept { return kind_ >= Kind::kFloat16; }
+  // The number that the raw bits are, before scale and offset.
+  double value_of(std::uint64_t raw_bits) const noexcept;
 
  private:
   enum class Kind : std::uint8_t { kUnsigned, kSigned, kFloat16, kFloat32, kFloat64 };
 
-  // The value of a float signal's bits.
   double float_value(std::uint64_t raw_bits) const noexcept;
   std::uint64_t float_bits(double value) const noexcept;
 

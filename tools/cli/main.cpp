@@ -5,6 +5,7 @@
 #include <string>
 
 #include "tools/cli/command.h"
+#include "tools/cli/dbc.h"
 
 namespace beltgrip::cli {
 namespace {
@@ -50,6 +51,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", "beltgrip " BELTGRIP_VERSION);
   app.require_subcommand(1);
   app.get_formatter()->column_width(34);
+  add_dbc(app);
   add_later(app);
   for (CLI::App* command : app.get_subcommands(nullptr)) {
     if (!command->get_group().empty()) {
