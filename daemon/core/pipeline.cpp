@@ -219,6 +219,7 @@ const SampleReport& Pipeline::on_end(MonoTime t, StopReason reason, Outbox& outb
   parts.report(t);
   parts.publisher.collect_all(t, parts.publication(), wanted);
   parts.pass_gate(wanted, outbox);
+  parts.last.sample.usable = false;
   return parts.last;
 }
 

@@ -55,7 +55,8 @@ class Pipeline {
   void on_send_failed(MonoTime t) noexcept;
   // The sample at t: decides and leaves in outbox what must be sent now.
   const SampleReport& on_sample(MonoTime t, Outbox& outbox) noexcept;
-  // The end (stop request, end of a log): ends a running experiment and leaves the last frames.
+  // The end (stop request, end of a log): ends a running experiment and leaves the last frames. Its
+  // report has no sample of its own (sample.usable is false).
   const SampleReport& on_end(MonoTime t, estimator::StopReason reason, Outbox& outbox) noexcept;
   const PipelineCounters& counters() const noexcept;
 

@@ -29,13 +29,14 @@ bool SignalHistory::value_at(MonoTime t, Duration reach, double& value) const no
     }
     return false;
   }
-  // Stamps relative to the newest, in units of the time they span: exact enough in double.
-  const std::size_t count = std::min(size_, kLine);
-  const double span = static_cast<double>(last.t - at(count - 1).t);
-  if (count < 2 || t == last.t) {
+  if (t == last.t) {
     value = last.value;
     return true;
   }
+  const std::size_t count = std::min(size_, kLine);
+  if (count < 2) return false;
+  const double span = static_cast<double>(last.t - at(count - 1).t);
+  // Stamps relative to the newest, in units of the time they span.
   double mean_x = 0.0, mean_y = 0.0;
   for (std::size_t age = 0; age < count; ++age) {
     mean_x += static_cast<double>(at(age).t - last.t) / span;

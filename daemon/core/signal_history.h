@@ -22,7 +22,7 @@ class SignalHistory {
   // The value at t by linear interpolation. Beyond the newest stamp the value goes on with the
   // least-squares slope of the last kLine values for at most `reach`, and stays level from there:
   // holding the last value instead would lag a ramp of 300 N/s by 5 N at 20 Hz and 13 N at 10 Hz.
-  // False when t lies before the oldest stamp or there is no value.
+  // False when t lies before the oldest stamp, or beyond the only one.
   bool value_at(MonoTime t, Duration reach, double& value) const noexcept;
 
  private:
