@@ -224,7 +224,7 @@ TEST(PaperRig, OverrunIsTheMirrorImageButForTheDeformation) {
 }
 
 TEST(PaperRig, RepeatsTheExperiment) {
-  RigSimulation simulation(rig({"run.cycles=3", "run.duration_s=1000"}));
+  RigSimulation simulation(rig({"run.cycles=3"}));
   run(simulation);
   ASSERT_EQ(simulation.truth().size(), 3u);
   for (const ExperimentTruth& truth : simulation.truth()) {

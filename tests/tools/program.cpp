@@ -30,8 +30,10 @@ void Workplace::write(const std::string& name, std::string_view content) const {
   if (!file.flush()) throw std::runtime_error(name + " cannot be written");
 }
 
+std::string program_path() { return BELTGRIP_PROGRAM; }
+
 RunResult beltgrip(std::vector<std::string> arguments, const std::string& stdin_file) {
-  arguments.insert(arguments.begin(), BELTGRIP_PROGRAM);
+  arguments.insert(arguments.begin(), program_path());
   return run(arguments, Milliseconds{60000}, stdin_file);
 }
 

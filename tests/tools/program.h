@@ -25,6 +25,8 @@ class Workplace {
   std::filesystem::path directory_;
 };
 
+std::string program_path();
+
 // beltgrip ARGUMENT...
 RunResult beltgrip(std::vector<std::string> arguments, const std::string& stdin_file = "/dev/null");
 

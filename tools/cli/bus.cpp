@@ -75,6 +75,7 @@ bool play(daemon::Port& port, const std::string& name, double speed,
   std::optional<std::int64_t> first_ns;
   can::StampedFrame stamped;
   while (next(stamped)) {
+    if (stamped.frame.error) continue;  // said by a controller, not sent by a node
     if (!first_ns) first_ns = stamped.t_ns;
     const auto after = static_cast<double>(stamped.t_ns - *first_ns) / speed;
     if (!pass_time(port, origin + static_cast<daemon::Duration>(after))) return false;

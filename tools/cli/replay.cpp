@@ -1,4 +1,6 @@
 // beltgrip replay: the daemon's pipeline over logs, as fast as the machine can.
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -79,9 +81,12 @@ void run_all(std::vector<Task>& tasks, unsigned jobs, const auto& work, const Re
 void print_speed(std::uint64_t frames, std::chrono::steady_clock::time_point begin) {
   const double wall_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  std::fprintf(stderr, "beltgrip: %llu frames in %.3f s, %.2f million frames/s\n",
-               static_cast<unsigned long long>(frames), wall_s,
-               static_cast<double>(frames) / wall_s * 1e-6);
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  std::fprintf(
+      stderr, "beltgrip: %llu frames in %.3f s, %.2f million frames/s, peak memory %.1f MB\n",
+      static_cast<unsigned long long>(frames), wall_s, static_cast<double>(frames) / wall_s * 1e-6,
+      static_cast<double>(usage.ru_maxrss) / 1024.0);
 }
 
 // The logs as one timeline onto a bus in real time; BeltGrip's own frames stay out.

@@ -134,7 +134,8 @@ void RigSimulation::step() {
   // A shaft that nearly stands: the rig's own protection switches off, and slip is no longer
   // defined.
   const bool stalled = state.omega_p_rad_s < kStall_rad_s;
-  finished_ = finished_ || stalled || now_ns_ >= std::llround(scenario_.duration_s * 1e9);
+  const double limit_s = scenario_.duration_s * std::round(scenario_.cycles);
+  finished_ = finished_ || stalled || now_ns_ >= std::llround(limit_s * 1e9);
 }
 
 }  // namespace beltgrip::sim
