@@ -220,14 +220,19 @@ bool SocketPort::convert(const mmsghdr& message, const canfd_frame& raw, RxFrame
 
 SendResult SocketPort::send(const can::CanFrame& frame) noexcept {
   if (socket_ < 0) return SendResult::kDown;
-  can_frame raw{};
-  raw.can_id = frame.id.value | (frame.id.extended ? CAN_EFF_FLAG : 0);
+  // One layout holds both formats; the size that is written says which it is.
+  canfd_frame raw{};
+  raw.can_id =
+      frame.id.value | (frame.id.extended ? CAN_EFF_FLAG : 0) | (frame.remote ? CAN_RTR_FLAG : 0);
   raw.len = frame.length;
-  if (frame.fd || frame.remote || frame.error || frame.length > CAN_MAX_DLEN) {
+  raw.flags = static_cast<std::uint8_t>((frame.bit_rate_switch ? CANFD_BRS : 0) |
+                                        (frame.error_state_indicator ? CANFD_ESI : 0));
+  if (frame.error || frame.length > (frame.fd ? CANFD_MAX_DLEN : CAN_MAX_DLEN)) {
     return SendResult::kFailed;
   }
   std::copy_n(frame.data.begin(), frame.length, raw.data);
-  if (::write(socket_, &raw, sizeof raw) == static_cast<ssize_t>(sizeof raw)) {
+  const std::size_t size = frame.fd ? CANFD_MTU : CAN_MTU;
+  if (::write(socket_, &raw, size) == static_cast<ssize_t>(size)) {
     if (state_ == BusState::kDown) state_ = BusState::kActive;
     return SendResult::kSent;
   }

@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "tools/sim/friction_curve.h"
 #include "tools/sim/random.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/rig_simulation.h"
+#include "tools/sim/rig_source.h"
 
 namespace beltgrip::sim {
 namespace {
@@ -222,7 +224,7 @@ TEST(PaperRig, OverrunIsTheMirrorImageButForTheDeformation) {
 }
 
 TEST(PaperRig, RepeatsTheExperiment) {
-  RigSimulation simulation(rig({"run.cycles=3", "run.duration_s=1000"}));
+  RigSimulation simulation(rig({"run.cycles=3"}));
   run(simulation);
   ASSERT_EQ(simulation.truth().size(), 3u);
   for (const ExperimentTruth& truth : simulation.truth()) {
@@ -234,6 +236,32 @@ TEST(PaperRig, WithoutAPeakTheTruthHasNone) {
   RigSimulation simulation(rig({"belts.new.curve=saturating"}));
   run(simulation);
   EXPECT_FALSE(simulation.truth()[0].peak_s);
+}
+
+TEST(PaperRig, AShaftThatStallsEndsTheRun) {
+  // Overrun: the belt slips while the machine goes on braking the primary shaft.
+  RigSimulation simulation(
+      rig({"driveline.primary_torque_Nm=-50", "driveline.speed_controller_Nm_s=0.1",
+           "driveline.speed_controller_Nm=0", "operator.action=none", "run.duration_s=1000"}));
+  run(simulation);
+  EXPECT_LT(static_cast<double>(simulation.now_ns()) * 1e-9, 200.0);
+  EXPECT_LT(simulation.signals().omega_p_rad_s, 5.0);
+}
+
+TEST(RigSource, AStateThatIsNoLongerFiniteNamesSeedAndTime) {
+  Scenario scenario = rig();
+  scenario.speed_controller_Nm = std::numeric_limits<double>::infinity();
+  RigSource source(scenario, 42, 0.0, 1e9);
+  can::StampedFrame frame;
+  try {
+    while (source.next(frame)) {
+    }
+    FAIL() << "the run came to its end";
+  } catch (const NonFiniteState& state) {
+    EXPECT_EQ(state.seed, 42u);
+    EXPECT_GT(state.t_s, 0.0);
+    EXPECT_LT(state.t_s, 1.0);
+  }
 }
 
 TEST(Random, HasTheMomentsOfItsDistributionAndIndependentStreams) {

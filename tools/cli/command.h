@@ -6,4 +6,12 @@
 
 #include "tools/cli/exit_codes.h"
 
-namespace beltgrip::cli {}  // namespace beltgrip::cli
+namespace beltgrip::cli {
+
+void add_init(CLI::App& app);
+void add_monitor(CLI::App& app);
+void add_replay(CLI::App& app);
+void add_run_demo(CLI::App& app);
+void add_simulate(CLI::App& app);
+
+}  // namespace beltgrip::cli

@@ -6,10 +6,14 @@
 #include <cmath>
 #include <concepts>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 
 namespace beltgrip::cli {
+
+// As a number: null.
+inline constexpr double kJsonNull = std::numeric_limits<double>::quiet_NaN();
 
 class JsonWriter {
  public:

@@ -1,5 +1,6 @@
 // The program beltgrip: registers the subcommands, runs one, turns every failure into one line on
 // standard error and a sysexits code.
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -24,8 +25,14 @@ void add_later(CLI::App& app) {
   }
 }
 
+// One line for each line of the text; none when everything has been said.
 int fail(const std::string& text, int exit_code) {
-  std::fprintf(stderr, "beltgrip: %s\n", text.c_str());
+  std::fflush(stdout);
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    std::fprintf(stderr, "beltgrip: %s\n", text.substr(begin, end - begin).c_str());
+    begin = end + 1;
+  }
   return exit_code;
 }
 
@@ -51,6 +58,11 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", "beltgrip " BELTGRIP_VERSION);
   app.require_subcommand(1);
   app.get_formatter()->column_width(34);
+  add_run_demo(app);
+  add_init(app);
+  add_replay(app);
+  add_simulate(app);
+  add_monitor(app);
   add_dbc(app);
   add_later(app);
   for (CLI::App* command : app.get_subcommands(nullptr)) {
@@ -70,7 +82,7 @@ int run(int argc, char** argv) {
     for (const CLI::App* command : app.get_subcommands()) hint += " " + command->get_name();
     return fail(one_line(error.what()) + " (see " + hint + " --help)", kUsage);
   } catch (const Failure& failure) {
-    return fail(one_line(failure.text), failure.exit_code);
+    return fail(failure.text, failure.exit_code);
   }
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
     return fail("standard output: cannot write", kCannotWrite);

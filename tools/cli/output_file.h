@@ -43,4 +43,10 @@ class OutputFile {
   std::FILE* file_;
 };
 
+inline void write_file(const std::string& path, std::string_view text) {
+  OutputFile file(path);
+  file.write(text);
+  file.close();
+}
+
 }  // namespace beltgrip::cli

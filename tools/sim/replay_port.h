@@ -18,6 +18,7 @@ class ReplayPort final : public daemon::Port {
   // receiver may be empty.
   ReplayPort(LogTimeline& log, Receiver receiver);
 
+  bool empty() const { return !has_next_; }  // before the first call: the log has no frame
   // Before the first frame: its stamp.
   daemon::MonoTime now() noexcept override { return now_; }
   daemon::Wake wait_until(daemon::MonoTime deadline) noexcept override;

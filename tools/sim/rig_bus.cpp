@@ -87,7 +87,9 @@ void RigBus::sample(std::int64_t now_ns, std::int64_t step_ns, const RigSignals&
     if (message.next_ns >= now_ns + step_ns) continue;
     message.next_ns += message.period_ns;
     can::StampedFrame stamped;
+    // Whole microseconds, as logs have them.
     stamped.t_ns = now_ns + delay_ns_ + static_cast<std::int64_t>(jitter_ns_ * jitter_.uniform());
+    stamped.t_ns -= stamped.t_ns % 1000;
     stamped.frame.id = message.id;
     stamped.frame.length = message.length;
     const std::span<std::uint8_t> payload(stamped.frame.data.data(), message.length);

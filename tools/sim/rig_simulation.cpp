@@ -5,6 +5,10 @@
 
 namespace beltgrip::sim {
 
+namespace {
+constexpr double kStall_rad_s = 5.0;
+}
+
 RigSimulation::RigSimulation(const Scenario& scenario)
     : scenario_(scenario),
       plant_(scenario.variator, scenario.friction()),
@@ -127,8 +131,11 @@ void RigSimulation::step() {
   signals_.pressure_Pa = pressure_Pa(clamp_force_N_);
   signals_.pressure_command_Pa = pressure_Pa(command_force_N_);
   observe(slip_before, sigma_star_before);
-  const bool over = now_ns_ >= std::llround(scenario_.duration_s * 1e9);
-  finished_ = finished_ || over;
+  // A shaft that nearly stands: the rig's own protection switches off, and slip is no longer
+  // defined.
+  const bool stalled = state.omega_p_rad_s < kStall_rad_s;
+  const double limit_s = scenario_.duration_s * std::round(scenario_.cycles);
+  finished_ = finished_ || stalled || now_ns_ >= std::llround(limit_s * 1e9);
 }
 
 }  // namespace beltgrip::sim

@@ -1,0 +1,59 @@
+// The command line itself: help, version, exit codes of sysexits, one line for a mistake.
+#include <gtest/gtest.h>
+
+#include "tests/tools/program.h"
+
+namespace beltgrip::test {
+namespace {
+
+TEST(Program, HelpsAndNamesItsVersionEverywhere) {
+  const RunResult help = beltgrip({"--help"});
+  EXPECT_EQ(help.status, 0);
+  EXPECT_EQ(help.err, "");
+  for (const char* name : {"init", "replay", "simulate"}) {
+    EXPECT_NE(help.out.find(name), std::string::npos) << name;
+    const RunResult own = beltgrip({name, "--help"});
+    EXPECT_EQ(own.status, 0) << name;
+    EXPECT_NE(own.out.find("--help"), std::string::npos) << name;
+    EXPECT_EQ(beltgrip({name, "--version"}).out, beltgrip({"--version"}).out) << name;
+  }
+  EXPECT_EQ(beltgrip({"--version"}).out.substr(0, 9), "beltgrip ");
+}
+
+TEST(Program, WhatIsNotThereYetSaysSo) {
+  for (const char* name : {"calibrate", "diagnose", "report", "can", "history", "status"}) {
+    const RunResult result = beltgrip({name, "--whatever", "x"});
+    EXPECT_EQ(result.status, 78) << name;
+    EXPECT_EQ(result.err, std::string("beltgrip: ") + name + ": not in this version\n");
+    EXPECT_EQ(result.out, "");
+  }
+}
+
+TEST(Program, AMistakeOnTheCommandLineIsOneLine) {
+  const std::vector<std::vector<std::string>> mistakes = {
+      {},
+      {"nonsense"},
+      {"--nonsense"},
+      {"replay"},
+      {"replay", "x.log"},
+      {"replay", "x.log", "--config"},
+      {"replay", "x.log", "--config", "y", "--method", "magic"},
+      {"replay", "x.log", "--config", "y", "--jobs", "0"},
+      {"replay", "x.log", "y.log", "--config", "y", "--trace", "t.csv"},
+      {"replay", "x.log", "--config", "y", "--trace", "-", "--json", "-"},
+      {"simulate"},
+      {"simulate", "--seed", "x", "--log-out", "-"},
+      {"simulate", "--start", "-1", "--log-out", "-"},
+      {"simulate", "--log-out", "a", "--out-dir", "b"},
+      {"init"}};
+  for (const auto& arguments : mistakes) {
+    const RunResult result = beltgrip(arguments);
+    const std::string shown = arguments.empty() ? "(nothing)" : arguments.front();
+    EXPECT_EQ(result.status, 64) << shown << ": " << result.err;
+    EXPECT_EQ(lines(result.err), 1) << shown << ": " << result.err;
+    EXPECT_EQ(result.out, "") << shown;
+  }
+}
+
+}  // namespace
+}  // namespace beltgrip::test

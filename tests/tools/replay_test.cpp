@@ -1,0 +1,348 @@
+// beltgrip replay: the same bytes every time, all its options, and logs and configurations that are
+// wrong in every way.
+#include <gtest/gtest.h>
+#include <zlib.h>
+#include <zstd.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "tests/tools/program.h"
+
+namespace beltgrip::test {
+namespace {
+
+using nlohmann::json;
+
+std::vector<json> parse(const std::string& text) {
+  std::vector<json> result;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) result.push_back(json::parse(line));
+  return result;
+}
+
+class Replay : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    place_ = new Workplace;
+    ASSERT_EQ(beltgrip({"simulate", "--start", "80", "--out-dir", place_->path("")}).status, 0);
+  }
+  static void TearDownTestSuite() {
+    delete place_;
+    place_ = nullptr;
+  }
+  static std::string path(const std::string& name) { return place_->path(name); }
+  static std::vector<std::string> with_config(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "replay");
+    arguments.insert(arguments.end(), {"--config", path("beltgrip.toml")});
+    return arguments;
+  }
+  // JSON of a log of this content.
+  static RunResult replay_text(const std::string& content) {
+    place_->write("case.log", content);
+    return beltgrip(with_config({path("case.log"), "--json", "-"}));
+  }
+  static std::string trace() { return place_->read("trace.log"); }
+  static std::string json_of_trace() {
+    return beltgrip(with_config({path("trace.log"), "--json", "-"})).out;
+  }
+  // The same without the name of the log.
+  static json nameless(json line) {
+    line.erase("log");
+    return line;
+  }
+
+  static Workplace* place_;
+};
+Workplace* Replay::place_ = nullptr;
+
+TEST_F(Replay, SameBytesEveryTime) {
+  for (const char* method : {"robust", "paper"}) {
+    std::vector<std::string> first;
+    for (int run = 0; run < 3; ++run) {
+      const RunResult result =
+          beltgrip(with_config({path("trace.log"), "--method", method, "--json", path("r.json"),
+                                "--trace", path("r.csv"), "--log-out", path("r.log")}));
+      ASSERT_EQ(result.status, 0) << result.err;
+      const std::vector<std::string> now = {result.out, place_->read("r.json"),
+                                            place_->read("r.csv"), place_->read("r.log")};
+      if (run == 0) first = now;
+      EXPECT_EQ(now, first) << method;
+      EXPECT_GT(lines(now[2]), 1000);
+      EXPECT_GT(lines(now[3]), 1000);
+    }
+  }
+}
+
+TEST_F(Replay, JsonHasTheFieldsOfTheInterface) {
+  const auto result = parse(json_of_trace());
+  ASSERT_EQ(result.size(), 2u);
+  const json& experiment = result[0];
+  EXPECT_EQ(experiment.at("type"), "experiment");
+  EXPECT_EQ(experiment.at("log"), path("trace.log"));
+  EXPECT_NEAR(experiment.at("start_s").get<double>(), 80.0, 0.1);
+  EXPECT_EQ(experiment.at("outcome"), "completed");
+  EXPECT_TRUE(experiment.at("stop_s").is_number());
+  EXPECT_TRUE(experiment.at("stop_reason").is_string());
+  EXPECT_NEAR(experiment.at("mu_max").get<double>(), 0.105, 0.004);
+  EXPECT_GT(experiment.at("mu_max_std").get<double>(), 0.0);
+  ASSERT_EQ(experiment.at("mu_max_ci95").size(), 2u);
+  EXPECT_LT(experiment.at("mu_max_ci95")[0], experiment.at("mu_max"));
+  EXPECT_GT(experiment.at("mu_max_ci95")[1], experiment.at("mu_max"));
+  EXPECT_TRUE(experiment.at("mu_max_lower_bound").is_null());
+  EXPECT_GT(experiment.at("sigma_stop_percent").get<double>(), 2.0);
+  EXPECT_GT(experiment.at("sigma_peak_percent").get<double>(), 1.5);
+  const double seconds =
+      experiment.at("stop_s").get<double>() - experiment.at("start_s").get<double>();
+  EXPECT_NEAR(experiment.at("samples").get<double>(), seconds * 200.0, 2.0);
+  EXPECT_EQ(experiment.at("direction"), "drive");
+  EXPECT_EQ(experiment.at("ratio"), "overdrive");
+  const json& summary = result[1];
+  EXPECT_EQ(summary.at("type"), "summary");
+  EXPECT_EQ(summary.at("log"), path("trace.log"));
+  EXPECT_EQ(summary.at("frames"), lines(trace()));
+  EXPECT_EQ(summary.at("frames_decoded"), lines(trace()));
+  EXPECT_EQ(summary.at("frames_bad"), 0);
+  EXPECT_EQ(summary.at("lines_bad"), 0);
+  EXPECT_NEAR(summary.at("duration_s").get<double>(), 20.8, 0.2);
+}
+
+TEST_F(Replay, TraceStartsWithTheColumnsOfTheInterface) {
+  ASSERT_EQ(beltgrip(with_config({path("trace.log"), "--trace", path("t.csv")})).status, 0);
+  EXPECT_TRUE(place_->read("t.csv").starts_with(
+      "t_s,mu_star,sigma_star_percent,slip_variance,friction_slope,phase,"));
+}
+
+TEST_F(Replay, TextGoesToStandardOutputAndSpeedToStandardError) {
+  const RunResult result = beltgrip(with_config({path("trace.log")}));
+  EXPECT_EQ(result.status, 0);
+  EXPECT_NE(result.out.find("mu_max 0.10"), std::string::npos);
+  EXPECT_EQ(result.out.find("frames/s"), std::string::npos);
+  EXPECT_NE(result.err.find("frames/s"), std::string::npos);
+}
+
+TEST_F(Replay, SeveralLogsAreSeparateRunsInTheirOrder) {
+  place_->write("short.log", trace().substr(0, trace().size() / 3));
+  const std::vector<std::string> logs = {path("trace.log"), path("short.log"), path("trace.log"),
+                                         path("short.log")};
+  auto arguments = logs;
+  arguments.insert(arguments.end(), {"--json", "-", "--jobs", "4"});
+  const RunResult parallel = beltgrip(with_config(arguments));
+  ASSERT_EQ(parallel.status, 0) << parallel.err;
+  arguments.back() = "1";
+  EXPECT_EQ(beltgrip(with_config(arguments)).out, parallel.out);
+  std::vector<std::string> order;
+  for (const json& line : parse(parallel.out)) {
+    if (line.at("type") == "summary") order.push_back(line.at("log"));
+  }
+  EXPECT_EQ(order, logs);
+}
+
+TEST_F(Replay, OneMissingLogDoesNotHideTheOthers) {
+  const RunResult result =
+      beltgrip(with_config({path("no.log"), path("trace.log"), "--json", "-"}));
+  EXPECT_EQ(result.status, 66);
+  EXPECT_NE(result.err.find("no.log"), std::string::npos);
+  EXPECT_EQ(result.out, json_of_trace());
+}
+
+TEST_F(Replay, JoinedPiecesAreTheWhole) {
+  const std::string whole = trace();
+  const std::size_t cut = whole.find('\n', whole.size() / 2) + 1;
+  place_->write("1.log", whole.substr(0, cut));
+  place_->write("2.log", whole.substr(cut));
+  std::string odd, even;  // as from two recorders
+  std::istringstream stream(whole);
+  bool is_odd = false;
+  for (std::string line; std::getline(stream, line); is_odd = !is_odd) {
+    (is_odd ? odd : even) += line + "\n";
+  }
+  place_->write("odd.log", odd);
+  place_->write("even.log", even);
+  const auto expected = parse(json_of_trace());
+  const std::vector<std::vector<std::string>> joins = {
+      {"1.log", "2.log"}, {"2.log", "1.log"}, {"odd.log", "even.log"}};
+  for (const auto& names : joins) {
+    const auto joined =
+        parse(beltgrip(with_config({path(names[0]), path(names[1]), "--join", "--json", "-"})).out);
+    ASSERT_EQ(joined.size(), expected.size());
+    for (std::size_t i = 0; i < joined.size(); ++i) {
+      EXPECT_EQ(nameless(joined[i]), nameless(expected[i])) << names[0];
+    }
+  }
+}
+
+TEST_F(Replay, PackedLogsAndStandardInput) {
+  const std::string log = trace();
+  gzFile gz = gzopen(path("trace.log.gz").c_str(), "wb");
+  ASSERT_EQ(gzwrite(gz, log.data(), static_cast<unsigned>(log.size())),
+            static_cast<int>(log.size()));
+  ASSERT_EQ(gzclose(gz), Z_OK);
+  std::string packed(ZSTD_compressBound(log.size()), '\0');
+  packed.resize(ZSTD_compress(packed.data(), packed.size(), log.data(), log.size(), 3));
+  place_->write("trace.log.zst", packed);
+  const auto expected = parse(json_of_trace());
+  for (const char* name : {"trace.log.gz", "trace.log.zst", "-"}) {
+    const std::string log_path = name == std::string("-") ? "-" : path(name);
+    const RunResult result = beltgrip(with_config({log_path, "--json", "-"}), path("trace.log"));
+    ASSERT_EQ(result.status, 0) << name << result.err;
+    const auto found = parse(result.out);
+    ASSERT_EQ(found.size(), expected.size());
+    EXPECT_EQ(nameless(found[0]), nameless(expected[0])) << name;
+    EXPECT_EQ(found[0].at("log"), log_path);
+  }
+  place_->write("cut.log.gz", place_->read("trace.log.gz").substr(0, 5000));
+  EXPECT_EQ(beltgrip(with_config({path("cut.log.gz"), "--json", "-"})).status, 0);
+}
+
+TEST_F(Replay, OwnFramesAreNoInput) {
+  ASSERT_EQ(beltgrip(with_config({path("trace.log"), "--log-out", path("own.log")})).status, 0);
+  EXPECT_NE(place_->read("own.log").find(" 6A0#"), std::string::npos);
+  EXPECT_NE(place_->read("own.log").find(" 6A1#"), std::string::npos);
+  EXPECT_NE(place_->read("own.log").find(" 6A3#"), std::string::npos);
+  EXPECT_EQ(place_->read("own.log").find(" 6A2#"), std::string::npos);  // observe: never
+  const auto joined = parse(
+      beltgrip(with_config({path("trace.log"), path("own.log"), "--join", "--json", "-"})).out);
+  EXPECT_EQ(nameless(joined[0]), nameless(parse(json_of_trace())[0]));
+}
+
+TEST_F(Replay, InterfaceSelects) {
+  std::string other = trace();
+  for (std::size_t at = 0; (at = other.find("vcan0", at)) != std::string::npos; at += 5) {
+    other.replace(at, 5, "other");
+  }
+  place_->write("both.log", trace().substr(0, trace().find('\n', trace().size() / 2) + 1) + other);
+  const auto arguments = [&](const char* interface) {
+    return with_config({path("both.log"), "--interface", interface, "--json", "-"});
+  };
+  const RunResult chosen = beltgrip(arguments("other"));
+  ASSERT_EQ(chosen.status, 0);
+  EXPECT_EQ(nameless(parse(chosen.out)[0]), nameless(parse(json_of_trace())[0]));
+  const RunResult none = beltgrip(arguments("can7"));
+  EXPECT_EQ(none.status, 65);
+  EXPECT_NE(none.err.find("can7"), std::string::npos);
+}
+
+TEST_F(Replay, LogsThatCannotBeUsed) {
+  EXPECT_EQ(beltgrip(with_config({path("missing.log")})).status, 66);
+  EXPECT_EQ(beltgrip(with_config({path("")})).status, 66);  // a directory
+  for (const char* content : {"", "\n\n", "hello\n", "(1.0) can0 12G#00\n", "\xff\xfe\n\0x"}) {
+    const RunResult result = replay_text(content);
+    EXPECT_EQ(result.status, 65) << content;
+    EXPECT_EQ(lines(result.err), 1) << result.err;
+    EXPECT_NE(result.err.find("case.log"), std::string::npos);
+    EXPECT_EQ(result.out, "");
+  }
+}
+
+TEST_F(Replay, BadLinesAreCountedAndNamed) {
+  std::string log = trace();
+  const std::size_t at = log.find('\n', log.size() / 2) + 1;
+  log.insert(at, "this is no frame\n(12.5 vcan0 110#00\n");
+  log += "(0000000100.900000) vca";  // cut off
+  const RunResult result = replay_text(log);
+  ASSERT_EQ(result.status, 0) << result.err;
+  const auto json_lines = parse(result.out);
+  EXPECT_EQ(json_lines.back().at("lines_bad"), 3);
+  EXPECT_EQ(json_lines[0].at("outcome"), "completed");
+  EXPECT_NE(result.err.find("case.log:" + std::to_string(lines(log.substr(0, at)) + 1)),
+            std::string::npos)
+      << result.err;
+}
+
+TEST_F(Replay, AWildTimeStampCostsAFrameNotTheNight) {
+  std::string log = trace();
+  const std::size_t at = log.find('\n', log.size() / 2) + 1;
+  log.insert(at, "(5999999999.000000) vcan0 110#0000000000000000\n");
+  const RunResult result = replay_text(log);
+  ASSERT_EQ(result.status, 0);
+  const auto json_lines = parse(result.out);
+  EXPECT_EQ(json_lines.back().at("frames_bad"), 1);
+  EXPECT_EQ(nameless(json_lines[0]), nameless(parse(json_of_trace())[0]));
+}
+
+TEST_F(Replay, FramesOfTheWrongLengthAreBadNotValues) {
+  std::string log = trace();
+  const std::size_t at = log.find('\n', log.size() / 2) + 1;
+  const std::size_t before = log.rfind('(', at - 2);
+  const std::string stamp = log.substr(before, log.find(')', before) + 1 - before);
+  log.insert(at, stamp + " vcan0 110#FF\n" + stamp + " vcan0 120#R\n");
+  const RunResult result = replay_text(log);
+  ASSERT_EQ(result.status, 0);
+  const auto json_lines = parse(result.out);
+  EXPECT_EQ(json_lines.back().at("frames_bad"), 2);
+  EXPECT_EQ(nameless(json_lines[0]), nameless(parse(json_of_trace())[0]));
+}
+
+TEST_F(Replay, GarbledLogsNeverCrash) {
+  const std::string log = trace().substr(0, 300000);
+  std::uint32_t random = 12345;
+  const auto next = [&random] { return random = random * 1664525u + 1013904223u; };
+  for (int seed = 0; seed < 40; ++seed) {
+    std::string garbled = log;
+    const unsigned strokes = 1 + (next() >> 20);
+    for (unsigned i = 0; i < strokes; ++i) {
+      garbled[next() % garbled.size()] = static_cast<char>(next() >> 24);
+    }
+    const RunResult result = replay_text(garbled);
+    EXPECT_TRUE(result.status == 0 || result.status == 65) << seed << ": " << result.status;
+    for (const json& line : parse(result.out)) EXPECT_TRUE(line.contains("type"));
+  }
+}
+
+TEST_F(Replay, ConfigurationsThatAreWrong) {
+  EXPECT_EQ(beltgrip({"replay", path("trace.log"), "--config", path("no.toml")}).status, 66);
+  const std::string good = place_->read("beltgrip.toml");
+  struct Case {
+    const char* from;
+    const char* to;
+    int status;
+    const char* named;
+  };
+  const Case cases[] = {
+      {"RIG_Speed.PrimarySpeed", "RIG_Speed.PrimSpeed", 78, "primary_speed"},
+      {"RIG_Torque.PrimaryTorque", "RIG_Speed.PrimarySpeed", 78, "primary_torque"},
+      {"vehicle.dbc", "gone.dbc", 66, "gone.dbc"},
+      {"[\"vehicle.dbc\"]", "[\"vehicle.dbc\", \"twin.dbc\"]", 78, "twin.dbc"},
+      {"method = \"robust\"", "method = \"magic\"", 78, "method"},
+      {"[estimator]", "[estimater]", 78, "estimater"},
+      {"trigger = \"always\"", "trigger = \"coast_down\"", 78, "trigger"},
+      {"[estimator]", "[estimator", 78, "wrong.toml"},
+  };
+  place_->write("twin.dbc", place_->read("vehicle.dbc"));
+  for (const Case& c : cases) {
+    std::string text = good;
+    text.replace(text.find(c.from), std::string(c.from).size(), c.to);
+    place_->write("wrong.toml", text);
+    const RunResult result =
+        beltgrip({"replay", path("trace.log"), "--config", path("wrong.toml"), "--json", "-"});
+    EXPECT_EQ(result.status, c.status) << c.to << ": " << result.err;
+    EXPECT_NE(result.err.find(c.named), std::string::npos) << result.err;
+    EXPECT_EQ(result.out, "");
+  }
+}
+
+TEST_F(Replay, ADbcCutOffAnywhereIsRefusedOrUsed) {
+  const std::string dbc = place_->read("vehicle.dbc");
+  std::string text = place_->read("beltgrip.toml");
+  text.replace(text.find("vehicle.dbc"), 11, "cut.dbc");
+  place_->write("cut.toml", text);
+  place_->write("head.log", trace().substr(0, 20000));
+  for (std::size_t size = 0; size < dbc.size(); size += 61) {
+    place_->write("cut.dbc", dbc.substr(0, size));
+    const RunResult result = beltgrip({"replay", path("head.log"), "--config", path("cut.toml")});
+    EXPECT_TRUE(result.status == 0 || result.status == 78 || result.status == 65)
+        << size << ": " << result.status << result.err;
+    EXPECT_FALSE(result.err.empty());
+  }
+}
+
+TEST_F(Replay, OutputsThatCannotBe) {
+  EXPECT_EQ(beltgrip(with_config({path("trace.log"), "--json", "/nonexistent/x"})).status, 73);
+  EXPECT_EQ(beltgrip(with_config({path("trace.log"), "--trace", "/dev/full"})).status, 74);
+  EXPECT_EQ(beltgrip(with_config({path("trace.log"), "--log-out", "/dev/full"})).status, 74);
+  EXPECT_EQ(beltgrip(with_config({path("trace.log"), "--json", "/dev/full"})).status, 74);
+}
+
+}  // namespace
+}  // namespace beltgrip::test

@@ -1,0 +1,87 @@
+#include "tools/cli/bus.h"
+
+#include <signal.h>
+#include <sys/signalfd.h>
+
+#include <array>
+#include <optional>
+#include <string_view>
+
+#include "daemon/io/inproc_bus.h"
+#include "daemon/io/socket_port.h"
+#include "tools/cli/exit_codes.h"
+
+namespace beltgrip::cli {
+
+namespace {
+
+constexpr std::string_view kInproc = "inproc:";
+constexpr daemon::Duration kRetryPause = daemon::kMillisecond;  // after a full queue
+
+// False: stopped.
+bool pass_time(daemon::Port& port, daemon::MonoTime until) {
+  std::array<daemon::RxFrame, 64> unwanted;
+  while (port.now() < until) {
+    const daemon::Wake wake = port.wait_until(until);
+    if (wake == daemon::Wake::kClosed) return false;
+    if (wake == daemon::Wake::kFrames) port.receive(unwanted);
+  }
+  return true;
+}
+
+// False: stopped.
+bool send(daemon::Port& port, const std::string& name, const can::CanFrame& frame) {
+  for (;;) {
+    switch (port.send(frame)) {
+      case daemon::SendResult::kSent:
+        return true;
+      case daemon::SendResult::kFull:
+        if (!pass_time(port, port.now() + kRetryPause)) return false;
+        break;
+      case daemon::SendResult::kDown:
+        throw Failure{kUnavailable, name + ": the interface is down"};
+      case daemon::SendResult::kFailed:
+        throw Failure{kUnavailable, name + ": a frame could not be sent"};
+    }
+  }
+}
+
+}  // namespace
+
+int stop_descriptor() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  return signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK);
+}
+
+std::unique_ptr<daemon::Port> open_bus(const std::string& name,
+                                       const std::vector<can::CanId>& identifiers, int stop_fd) {
+  if (name.starts_with(kInproc)) {
+    return daemon::InprocBus::named(name.substr(kInproc.size()))->connect();
+  }
+  auto opened = daemon::SocketPort::open(name, identifiers, stop_fd);
+  if (const auto* error = std::get_if<daemon::BusError>(&opened)) {
+    throw Failure{kUnavailable, error->text};
+  }
+  return std::move(std::get<std::unique_ptr<daemon::SocketPort>>(opened));
+}
+
+bool play(daemon::Port& port, const std::string& name, double speed,
+          const std::function<bool(can::StampedFrame&)>& next) {
+  const daemon::MonoTime origin = port.now();
+  std::optional<std::int64_t> first_ns;
+  can::StampedFrame stamped;
+  while (next(stamped)) {
+    if (stamped.frame.error) continue;  // said by a controller, not sent by a node
+    if (!first_ns) first_ns = stamped.t_ns;
+    const auto after = static_cast<double>(stamped.t_ns - *first_ns) / speed;
+    if (!pass_time(port, origin + static_cast<daemon::Duration>(after))) return false;
+    if (!send(port, name, stamped.frame)) return false;
+  }
+  return true;
+}
+
+}  // namespace beltgrip::cli

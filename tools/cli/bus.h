@@ -1,0 +1,28 @@
+// A bus for the subcommands that work in real time: opened by name, played onto frame by frame.
+// Tools only.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "can_dbc/can_frame.h"
+#include "daemon/core/port.h"
+
+namespace beltgrip::cli {
+
+// From now on SIGINT and SIGTERM end the port's waiting instead of the program. The descriptor for
+// open_bus.
+int stop_descriptor();
+
+// A SocketCAN interface or inproc:NAME. Throws Failure 69. Receives these identifiers only.
+std::unique_ptr<daemon::Port> open_bus(const std::string& name,
+                                       const std::vector<can::CanId>& identifiers, int stop_fd);
+
+// Sends what next() gives, at the frames' distances in time divided by speed. False when it was
+// stopped before the end. Throws Failure 69 when the bus goes away.
+bool play(daemon::Port& port, const std::string& name, double speed,
+          const std::function<bool(can::StampedFrame&)>& next);
+
+}  // namespace beltgrip::cli

@@ -1,0 +1,77 @@
+// BeltGrip's own frames as a person or a script sees them: decoded through beltgrip.dbc, protection
+// checked, as JSON lines or as a table that grows when something changes. Tools only.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "can_dbc/can_frame.h"
+#include "can_dbc/dbc_model.h"
+#include "can_dbc/e2e.h"
+#include "can_dbc/message_codec.h"
+#include "daemon/core/config.h"
+
+namespace beltgrip::cli {
+
+struct OwnFrameView {
+  const can::MessageDef* message = nullptr;
+  std::vector<can::DecodedSignal> signals;  // in the definition's order
+  can::e2e::CheckStatus check = can::e2e::CheckStatus::kOk;
+
+  bool good() const {
+    return check == can::e2e::CheckStatus::kOk || check == can::e2e::CheckStatus::kOkSomeLost;
+  }
+  double value(const char* signal) const;
+  // Text of the value table; empty where the raw value has none.
+  std::string label(const char* signal) const;
+};
+
+class OwnFrameDecoder {
+ public:
+  explicit OwnFrameDecoder(const daemon::FrameIdentifiers& identifiers);
+  // Nothing for frames that are not BeltGrip's.
+  std::optional<OwnFrameView> decode(const can::CanFrame& frame);
+
+ private:
+  struct Message {
+    const can::MessageDef* definition;
+    can::MessageCodec codec;
+    can::e2e::Checker checker;
+  };
+  std::map<std::uint32_t, Message> messages_;
+};
+
+std::string json_line(std::int64_t t_ns, const OwnFrameView& view);
+
+// The table: a row every half second of the bus's time, and one for a change of state, stop flag or
+// result, or of the phase before the stop. Frames that say one change together make one row.
+class BusTable {
+ public:
+  explicit BusTable(std::FILE* out) : out_(out) {}
+  // t_ns as shown.
+  void on_frame(std::int64_t t_ns, const OwnFrameView& view);
+
+ private:
+  struct Picture {
+    std::string state = "-", phase = "-", mu_star = "-", sigma = "-", slope = "-", stop = "-",
+                mu_max = "-", force = "-";
+    // What is worth a row of its own.
+    bool differs(const Picture& other) const {
+      return state != other.state || stop != other.stop || mu_max != other.mu_max ||
+             (stop == "-" && phase != other.phase);
+    }
+  };
+  void row(std::int64_t t_ns);
+
+  std::FILE* out_;
+  Picture now_, shown_;
+  std::optional<std::int64_t> last_row_ns_;
+  std::optional<std::int64_t> change_ns_;  // waits for what belongs to it
+  std::uint64_t rows_ = 0;
+};
+
+}  // namespace beltgrip::cli

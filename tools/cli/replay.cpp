@@ -1,0 +1,190 @@
+// beltgrip replay: the daemon's pipeline over logs, as fast as the machine can.
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tools/cli/bus.h"
+#include "tools/cli/command.h"
+#include "tools/cli/configuration.h"
+#include "tools/cli/output_file.h"
+#include "tools/cli/replay_run.h"
+
+namespace beltgrip::cli {
+
+namespace {
+
+struct Options {
+  std::vector<std::string> logs;
+  std::string config;
+  std::string method;
+  std::string interface;
+  bool join = false;
+  unsigned jobs = 0;
+  std::string json;
+  std::string trace;
+  std::string log_out;
+  std::string bus;
+  double speed = 1.0;
+};
+
+struct Task {
+  std::vector<std::string> paths;
+  std::optional<ReplayResult> result;
+  std::optional<Failure> failure;
+};
+
+void run_task(Task& task, const Options& options, const daemon::Config& config,
+              const ReplayOutputs& outputs) {
+  try {
+    task.result = replay(task.paths, options.interface, config, outputs);
+  } catch (const Failure& failure) {
+    task.failure = failure;
+  } catch (const std::exception& error) {
+    task.failure = Failure{kInternal, task.paths.front() + ": " + error.what()};
+  }
+}
+
+// Runs the tasks on some threads, reports each in its turn as soon as it is done.
+template <typename Report>
+void run_all(std::vector<Task>& tasks, unsigned jobs, const auto& work, const Report& report) {
+  std::atomic<std::size_t> next = 0;
+  std::mutex mutex;
+  std::vector<bool> done(tasks.size(), false);
+  std::size_t reported = 0;
+  const auto worker = [&] {
+    for (std::size_t i = next++; i < tasks.size(); i = next++) {
+      work(tasks[i]);
+      const std::lock_guard lock(mutex);
+      done[i] = true;
+      for (; reported < tasks.size() && done[reported]; ++reported) {
+        report(tasks[reported]);
+        tasks[reported] = {};
+      }
+    }
+  };
+  std::vector<std::jthread> threads;
+  for (unsigned i = 1; i < std::min<std::size_t>(jobs, tasks.size()); ++i) {
+    threads.emplace_back(worker);
+  }
+  worker();
+}
+
+void print_speed(std::uint64_t frames, std::chrono::steady_clock::time_point begin) {
+  const double wall_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  std::fprintf(
+      stderr, "beltgrip: %llu frames in %.3f s, %.2f million frames/s, peak memory %.1f MB\n",
+      static_cast<unsigned long long>(frames), wall_s, static_cast<double>(frames) / wall_s * 1e-6,
+      static_cast<double>(usage.ru_maxrss) / 1024.0);
+}
+
+// The logs as one timeline onto a bus in real time; BeltGrip's own frames stay out.
+void play_logs(const Options& options) {
+  if (!options.json.empty() || !options.trace.empty() || !options.log_out.empty()) {
+    throw Failure{kUsage, "replay: --bus plays the log; it gives no --json, --trace, --log-out"};
+  }
+  if (options.logs.size() > 1 && !options.join) {
+    throw Failure{kUsage, "replay: --bus takes one log, or several with --join"};
+  }
+  daemon::FrameIdentifiers own;
+  if (!options.config.empty()) own = load_configuration(options.config, "").identifiers;
+  const auto timeline = open_timeline(options.logs, options.interface, own);
+  const auto port = open_bus(options.bus, {}, stop_descriptor());
+  play(*port, options.bus, options.speed,
+       [&](can::StampedFrame& frame) { return timeline->next(frame); });
+  if (timeline->counters().frames == 0) {
+    throw Failure{kBadInput, options.logs.front() + ": no readable frame"};
+  }
+  std::fprintf(stderr, "beltgrip: %llu frames played\n",
+               static_cast<unsigned long long>(timeline->counters().frames));
+}
+
+void run(const Options& options) {
+  if (!options.bus.empty()) return play_logs(options);
+  if (options.config.empty()) throw Failure{kUsage, "replay: --config is required"};
+  const bool separate = options.logs.size() > 1 && !options.join;
+  if (separate && (!options.trace.empty() || !options.log_out.empty())) {
+    throw Failure{kUsage, "replay: --trace and --log-out take one log, or several with --join"};
+  }
+  if ((options.json == "-") + (options.trace == "-") + (options.log_out == "-") > 1) {
+    throw Failure{kUsage, "replay: only one of --json, --trace, --log-out can be standard output"};
+  }
+  const daemon::Config config = load_configuration(options.config, options.method);
+  std::vector<Task> tasks;
+  if (separate) {
+    for (const std::string& log : options.logs) tasks.push_back({{log}, {}, {}});
+  } else {
+    tasks.push_back({options.logs, {}, {}});
+  }
+  std::optional<OutputFile> json, trace, log_out;
+  if (!options.json.empty()) json.emplace(options.json);
+  if (!options.trace.empty()) trace.emplace(options.trace);
+  if (!options.log_out.empty()) log_out.emplace(options.log_out);
+  const ReplayOutputs outputs{trace ? trace->get() : nullptr, log_out ? log_out->get() : nullptr};
+  const bool text_to_stdout = options.json != "-" && options.trace != "-" && options.log_out != "-";
+
+  const auto begin = std::chrono::steady_clock::now();
+  std::uint64_t frames = 0;
+  int exit_code = kDone;
+  const unsigned jobs = options.jobs > 0 ? options.jobs : std::thread::hardware_concurrency();
+  run_all(
+      tasks, std::max(jobs, 1u), [&](Task& task) { run_task(task, options, config, outputs); },
+      [&](Task& task) {
+        if (task.failure) {
+          std::fprintf(stderr, "beltgrip: %s\n", task.failure->text.c_str());
+          if (exit_code == kDone) exit_code = task.failure->exit_code;
+          return;
+        }
+        for (const std::string& warning : task.result->warnings) {
+          std::fprintf(stderr, "beltgrip: warning: %s\n", warning.c_str());
+        }
+        frames += task.result->frames;
+        if (json) json->write(json_lines(*task.result));
+        if (text_to_stdout) std::fputs(text(*task.result).c_str(), stdout);
+      });
+  if (json) json->close();
+  if (trace) trace->close();
+  if (log_out) log_out->close();
+  if (frames > 0) print_speed(frames, begin);
+  if (exit_code != kDone) throw Failure{exit_code, ""};
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app) {
+  CLI::App* command =
+      app.add_subcommand("replay", "Run the daemon's pipeline over logs, the stamps are the clock");
+  auto options = std::make_shared<Options>();
+  command->add_option("log", options->logs, "candump logs, also .gz and .zst; '-': standard input")
+      ->required();
+  command->add_option("--config", options->config,
+                      "BeltGrip's configuration; required without --bus");
+  command->add_option("--method", options->method, "Instead of the configuration's")
+      ->check(CLI::IsMember({"robust", "paper"}));
+  command->add_option("--interface", options->interface, "Frames of this interface only");
+  command->add_flag("--join", options->join, "The logs are one timeline, not separate runs");
+  command->add_option("--jobs", options->jobs, "Logs at the same time (default: all processors)")
+      ->check(CLI::Range(1, 1024));
+  command->add_option("--json", options->json, "Results as JSON lines, '-': standard output");
+  command->add_option("--trace", options->trace, "Every sample of the experiments as CSV");
+  command->add_option("--log-out", options->log_out,
+                      "What the daemon would have put on the bus, as a candump log");
+  command->add_option("--bus", options->bus, "Play the log onto this bus in real time instead");
+  command->add_option("--speed", options->speed, "Times real time, with --bus")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-3, 1e3));
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace beltgrip::cli

@@ -1,0 +1,280 @@
+#include "tools/cli/replay_run.h"
+
+#include <cmath>
+#include <memory>
+
+#include "can_dbc/can_log.h"
+#include "daemon/core/loop.h"
+#include "daemon/core/own_frames.h"
+#include "tools/cli/exit_codes.h"
+#include "tools/cli/json_writer.h"
+#include "tools/sim/log_timeline.h"
+#include "tools/sim/replay_port.h"
+
+namespace beltgrip::cli {
+
+namespace {
+
+constexpr std::size_t kBadLinesShown = 3;
+
+std::string outcome_text(daemon::Outcome outcome) {
+  return snake_case(own_label("BeltGripStatus", "Outcome", static_cast<int>(outcome)));
+}
+std::string reason_text(estimator::StopReason reason) {
+  return snake_case(own_label("BeltGripStatus", "StopReason", static_cast<int>(reason)));
+}
+const char* direction_text(estimator::Direction direction) {
+  return direction == estimator::Direction::kDrive ? "drive" : "overrun";
+}
+const char* ratio_text(estimator::EndStop end_stop) {
+  return end_stop == estimator::EndStop::kLow ? "low" : "overdrive";
+}
+
+// Collects the results and writes the trace as samples come.
+class Sink final : public daemon::SampleSink {
+ public:
+  Sink(ReplayResult& result, std::FILE* trace) : result_(result), trace_(trace) {
+    for (int phase = 0; phase < 4; ++phase) {
+      phases_[phase] = own_label("BeltGripSlip", "Phase", phase);
+    }
+    if (trace_ != nullptr) {
+      std::fputs(
+          "t_s,mu_star,sigma_star_percent,slip_variance,friction_slope,phase,clamp_force_N,"
+          "torque_p_Nm,macro_slip_stop\n",
+          trace_);
+    }
+  }
+
+  void on_report(const daemon::SampleReport& report) noexcept override {
+    if (report.new_result) result_.experiments.push_back(report.result);
+    if (trace_ == nullptr || !report.in_experiment || !report.curve.usable) return;
+    const estimator::CurveEstimate& curve = report.curve;
+    row_ = seconds_text(report.t);
+    for (const double value :
+         {curve.mu_star, curve.sigma_star_percent, curve.slip_variance, curve.friction_slope}) {
+      append(value);
+    }
+    row_ += ',';
+    row_ += phases_[static_cast<std::size_t>(curve.phase)];
+    append(curve.clamp_force_N);
+    append(curve.torque_p_Nm);
+    row_ += report.macro_slip_stop ? ",1\n" : ",0\n";
+    std::fwrite(row_.data(), 1, row_.size(), trace_);
+  }
+
+ private:
+  // A value that is no number leaves its cell empty.
+  void append(double value) {
+    row_ += ',';
+    if (!std::isfinite(value)) return;
+    char buffer[32];
+    row_.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
+  }
+
+  ReplayResult& result_;
+  std::FILE* trace_;
+  std::string phases_[4];
+  std::string row_;
+};
+
+std::string joined(const std::vector<std::string>& paths) {
+  std::string name;
+  for (const std::string& path : paths) name += (name.empty() ? "" : "+") + path;
+  return name;
+}
+
+void describe_troubles(const can::LogStats& stats, const sim::TimelineCounters& counters,
+                       ReplayResult& result) {
+  for (std::size_t i = 0; i < stats.first_bad.size() && i < kBadLinesShown; ++i) {
+    result.warnings.push_back(result.log + ":" + std::to_string(stats.first_bad[i].line) + ": " +
+                              stats.first_bad[i].reason);
+  }
+  if (stats.lines_bad > kBadLinesShown) {
+    result.warnings.push_back(result.log + ": " + std::to_string(stats.lines_bad) +
+                              " unreadable lines in all");
+  }
+  if (counters.frames_bad > 0) {
+    result.warnings.push_back(result.log + ": " + std::to_string(counters.frames_bad) +
+                              " frames left out, their time stamps are far from their neighbours'");
+  }
+  if (counters.clock_steps > 0) {
+    result.warnings.push_back(result.log + ": the clock of the log was set " +
+                              std::to_string(counters.clock_steps) +
+                              " times; later times are shifted");
+  }
+}
+
+Failure no_frames(const ReplayResult& result, const can::LogStats& stats,
+                  const std::string& interface) {
+  if (stats.frames > 0 && !interface.empty()) {
+    return {kBadInput, result.log + ": no frame of interface " + interface + " among " +
+                           std::to_string(stats.frames)};
+  }
+  std::string text =
+      result.log + ": no readable frame in " + std::to_string(stats.lines) + " lines";
+  if (!stats.first_bad.empty()) {
+    text += ", line " + std::to_string(stats.first_bad[0].line) + ": " + stats.first_bad[0].reason;
+  }
+  return {kBadInput, text};
+}
+
+std::string format(const char* pattern, auto... arguments) {
+  char buffer[256];
+  std::snprintf(buffer, sizeof buffer, pattern, arguments...);
+  return buffer;
+}
+
+}  // namespace
+
+std::string own_label(const char* message, const char* signal, std::int64_t raw) {
+  const auto* definition = daemon::own_database().find_message(message);
+  return definition->find_signal(signal)->values.at(raw);
+}
+
+std::string snake_case(const std::string& label) {
+  std::string result;
+  for (const char c : label) {
+    const bool upper = c >= 'A' && c <= 'Z';
+    if (upper && !result.empty()) result += '_';
+    result += upper ? static_cast<char>(c - 'A' + 'a') : c;
+  }
+  return result;
+}
+
+std::string seconds_text(std::int64_t t_ns) {
+  std::string digits = std::to_string(t_ns < 0 ? -t_ns : t_ns);
+  if (digits.size() < 10) digits.insert(0, 10 - digits.size(), '0');
+  digits.insert(digits.size() - 9, ".");
+  while (digits.back() == '0') digits.pop_back();
+  if (digits.back() == '.') digits.pop_back();
+  return (t_ns < 0 ? "-" : "") + digits;
+}
+
+std::unique_ptr<sim::LogTimeline> open_timeline(const std::vector<std::string>& paths,
+                                                const std::string& interface,
+                                                const daemon::FrameIdentifiers& own) {
+  std::vector<std::unique_ptr<can::LogReader>> readers;
+  for (const std::string& path : paths) {
+    try {
+      readers.push_back(can::LogReader::open(path));
+    } catch (const can::LogOpenError& error) {
+      throw Failure{kNoInput, error.text};
+    }
+  }
+  sim::FrameSelection selection;
+  selection.interface = interface;
+  for (std::size_t i = 0; i < daemon::kOwnMessageCount; ++i) {
+    selection.ignored.push_back(
+        {daemon::own_identifier(own, static_cast<daemon::OwnMessage>(i)), false});
+  }
+  return std::make_unique<sim::LogTimeline>(std::move(readers), std::move(selection));
+}
+
+ReplayResult replay(const std::vector<std::string>& paths, const std::string& interface,
+                    const daemon::Config& config, const ReplayOutputs& outputs) {
+  ReplayResult result;
+  result.log = joined(paths);
+  const auto timeline = open_timeline(paths, interface, config.identifiers);
+  sim::ReplayPort::Receiver receiver;
+  std::unique_ptr<can::CandumpWriter> writer;
+  if (outputs.log_out != nullptr) {
+    writer = std::make_unique<can::CandumpWriter>(outputs.log_out);
+    receiver = [&](daemon::MonoTime t, const can::CanFrame& frame) {
+      writer->write(t, config.interface, frame);
+    };
+  }
+  sim::ReplayPort port(*timeline, std::move(receiver));
+  const can::LogStats head = timeline->stats();
+  if (head.frames == 0 || port.empty()) throw no_frames(result, head, interface);
+
+  daemon::Pipeline pipeline(config);
+  Sink sink(result, outputs.trace);
+  daemon::run_loop(port, pipeline, config.estimator.sample_rate_hz,
+                   estimator::StopReason::kTraceEnd, &sink);
+
+  const can::LogStats stats = timeline->stats();
+  const sim::TimelineCounters& counters = timeline->counters();
+  result.frames = stats.frames;
+  result.frames_decoded = pipeline.counters().frames_decoded;
+  result.frames_bad = pipeline.counters().frames_bad + counters.frames_bad;
+  result.lines_bad = stats.lines_bad;
+  result.duration_ns = counters.last_ns - counters.first_ns;
+  describe_troubles(stats, counters, result);
+  return result;
+}
+
+std::string json_lines(const ReplayResult& result) {
+  std::string lines;
+  JsonWriter json;
+  for (const daemon::ExperimentResult& e : result.experiments) {
+    const bool completed = e.outcome == daemon::Outcome::kCompleted;
+    const bool inconclusive = e.outcome == daemon::Outcome::kInconclusive;
+    json.begin_object()
+        .field("type", "experiment")
+        .field("log", result.log)
+        .key("start_s")
+        .raw(seconds_text(e.start))
+        .key("stop_s")
+        .raw(e.stopped ? seconds_text(e.end) : "null")
+        .field("outcome", outcome_text(e.outcome))
+        .field("stop_reason", reason_text(e.stop_reason))
+        .field("mu_max", completed ? e.peak.mu_max : kJsonNull)
+        .field("mu_max_std", completed ? e.peak.mu_max_std : kJsonNull)
+        .key("mu_max_ci95");
+    if (completed) {
+      json.begin_array().value(e.peak.ci95_low).value(e.peak.ci95_high).end_array();
+    } else {
+      json.null();
+    }
+    json.field("mu_max_lower_bound", inconclusive ? e.peak.mu_max : kJsonNull)
+        .field("sigma_stop_percent", e.stopped ? e.sigma_stop_percent : kJsonNull)
+        .field("sigma_peak_percent", completed ? e.peak.sigma_peak_percent : kJsonNull)
+        .field("samples", e.samples)
+        .field("direction", direction_text(e.direction))
+        .field("ratio", ratio_text(e.end_stop))
+        .end_object();
+    lines += json.take() + "\n";
+  }
+  json.begin_object()
+      .field("type", "summary")
+      .field("log", result.log)
+      .field("frames", result.frames)
+      .field("frames_decoded", result.frames_decoded)
+      .field("frames_bad", result.frames_bad)
+      .field("lines_bad", result.lines_bad)
+      .key("duration_s")
+      .raw(seconds_text(result.duration_ns))
+      .end_object();
+  return lines + json.take() + "\n";
+}
+
+std::string text(const ReplayResult& result) {
+  std::string out = result.log + "\n";
+  for (const daemon::ExperimentResult& e : result.experiments) {
+    out += "  " + outcome_text(e.outcome) + ", " + direction_text(e.direction) + ", " +
+           ratio_text(e.end_stop) + ": ";
+    const double end_s = static_cast<double>(e.end) * 1e-9;
+    const double length_s = static_cast<double>(e.end - e.start) * 1e-9;
+    out += e.stopped ? format("stopped at %.3f s", end_s) : format("ended at %.3f s", end_s);
+    out += format(" (%s) after %.1f s", reason_text(e.stop_reason).c_str(), length_s);
+    if (e.stopped) out += format(", at %.2f %% slip", e.sigma_stop_percent);
+    out += "\n";
+    if (e.outcome == daemon::Outcome::kCompleted) {
+      out += format("  mu_max %.4f, std %.4f, 95 %% %.4f .. %.4f, peak at %.2f %% slip\n",
+                    e.peak.mu_max, e.peak.mu_max_std, e.peak.ci95_low, e.peak.ci95_high,
+                    e.peak.sigma_peak_percent);
+    } else if (e.outcome == daemon::Outcome::kInconclusive) {
+      out += format("  mu_max is at least %.4f\n", e.peak.mu_max);
+    }
+  }
+  if (result.experiments.empty()) out += "  no experiment\n";
+  out += format("  %llu frames in %.1f s, %llu decoded, %llu bad; %llu bad lines\n",
+                static_cast<unsigned long long>(result.frames),
+                static_cast<double>(result.duration_ns) * 1e-9,
+                static_cast<unsigned long long>(result.frames_decoded),
+                static_cast<unsigned long long>(result.frames_bad),
+                static_cast<unsigned long long>(result.lines_bad));
+  return out;
+}
+
+}  // namespace beltgrip::cli

@@ -1,0 +1,52 @@
+// One replay: the daemon's pipeline over a timeline of logs, and what came out of it as JSON lines
+// and as text. Tools only.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/core/config.h"
+#include "daemon/core/pipeline.h"
+#include "tools/sim/log_timeline.h"
+
+namespace beltgrip::cli {
+
+struct ReplayResult {
+  std::string log;  // its name: the path, joined ones with "+"
+  std::vector<daemon::ExperimentResult> experiments;
+  std::vector<std::string> warnings;  // one line each
+  std::uint64_t frames = 0;           // in the log
+  std::uint64_t frames_decoded = 0;
+  std::uint64_t frames_bad = 0;
+  std::uint64_t lines_bad = 0;
+  std::int64_t duration_ns = 0;
+};
+
+struct ReplayOutputs {
+  std::FILE* trace = nullptr;    // CSV, one row a sample of an experiment
+  std::FILE* log_out = nullptr;  // candump, what the daemon would have sent
+};
+
+// The logs as one timeline without BeltGrip's own frames. Throws Failure 66.
+std::unique_ptr<sim::LogTimeline> open_timeline(const std::vector<std::string>& paths,
+                                                const std::string& interface,
+                                                const daemon::FrameIdentifiers& own);
+
+// Throws Failure: 66 a log is missing, 65 it has no readable frame.
+ReplayResult replay(const std::vector<std::string>& paths, const std::string& interface,
+                    const daemon::Config& config, const ReplayOutputs& outputs);
+
+std::string json_lines(const ReplayResult& result);
+std::string text(const ReplayResult& result);
+
+// "12.345" without a rounding error, whatever the origin of the stamps.
+std::string seconds_text(std::int64_t t_ns);
+// Text of a value of BeltGrip's own frames, as in beltgrip.dbc: ("BeltGripSlip", "Phase", 2) is
+// "Peak".
+std::string own_label(const char* message, const char* signal, std::int64_t raw);
+std::string snake_case(const std::string& label);
+
+}  // namespace beltgrip::cli

@@ -1,0 +1,79 @@
+#include "tools/cli/scenario_options.h"
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include "tools/cli/exit_codes.h"
+#include "tools/cli/json_writer.h"
+#include "tools/sim/resources.h"
+
+namespace beltgrip::cli {
+
+namespace {
+
+constexpr const char* kBase = "paper-rig.toml";
+constexpr std::string_view kSuffix = ".toml";
+
+std::string shipped_names() {
+  std::string names;
+  for (const std::string_view name : sim::resource_names()) {
+    if (!name.ends_with(kSuffix)) continue;
+    names +=
+        (names.empty() ? "" : ", ") + std::string(name.substr(0, name.size() - kSuffix.size()));
+  }
+  return names;
+}
+
+sim::ScenarioLayer layer_of(const std::string& scenario) {
+  if (const auto text = sim::resource(scenario + std::string(kSuffix))) {
+    return {scenario + std::string(kSuffix), std::string(*text)};
+  }
+  std::ifstream file(scenario, std::ios::binary);
+  std::ostringstream text;
+  if (!file || !(text << file.rdbuf())) {
+    throw Failure{kNoInput, scenario + ": neither a readable file nor a shipped scenario (" +
+                                shipped_names() + ")"};
+  }
+  return {scenario, text.str()};
+}
+
+}  // namespace
+
+void ScenarioOptions::add_to(CLI::App& command) {
+  command
+      .add_option("--scenario", scenario,
+                  "A shipped scenario (" + shipped_names() + ") or a TOML file")
+      ->capture_default_str();
+  command.add_option("--belt", belt, "The belt that is mounted: new, worn");
+  command.add_option("--seed", seed, "Seed of the sensor noise")->capture_default_str();
+  command.add_option("--start", start_s, "Leave out the first seconds")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1e6));
+  command.add_option("--duration", duration_s, "Seconds from the start (default: to the end)")
+      ->check(CLI::Range(1e-3, 1e6));
+  command.add_option("--set", settings, "A value of the scenario, e.g. clamp.ramp_N_per_s=100")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+}
+
+sim::Scenario ScenarioOptions::load() const {
+  std::vector<sim::ScenarioLayer> layers{{kBase, std::string(*sim::resource(kBase))}};
+  layers.push_back(layer_of(scenario));
+  for (const std::string& setting : settings) layers.push_back(sim::setting_layer(setting));
+  if (!belt.empty()) layers.push_back({"--belt " + belt, "belt = \"" + belt + "\""});
+  sim::ScenarioResult result = sim::parse_scenario(layers);
+  if (!result.errors.empty()) {
+    std::string text;
+    for (const std::string& error : result.errors) text += (text.empty() ? "" : "\n") + error;
+    throw Failure{kConfiguration, text};
+  }
+  return std::move(result.scenario);
+}
+
+double ScenarioOptions::end_s() const {
+  return duration_s > 0.0 ? start_s + duration_s : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace beltgrip::cli

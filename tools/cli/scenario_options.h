@@ -1,0 +1,27 @@
+// The options that choose and change a scenario, shared by simulate and run-demo. Tools only.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tools/sim/scenario.h"
+
+namespace beltgrip::cli {
+
+struct ScenarioOptions {
+  std::string scenario = "paper-rig";
+  std::string belt;
+  std::uint64_t seed = 1;
+  double start_s = 0.0;
+  double duration_s = 0.0;  // 0: to the end
+  std::vector<std::string> settings;
+
+  void add_to(CLI::App& command);
+  // Throws Failure: 66 no such scenario, 78 its content.
+  sim::Scenario load() const;
+  double end_s() const;
+};
+
+}  // namespace beltgrip::cli
