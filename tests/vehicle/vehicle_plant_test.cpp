@@ -233,8 +233,8 @@ TEST(VehicleEngine, CutsFuelInOverrunAndIdlesBelow) {
   double torque = 0.0;
   for (int i = 0; i < 2000; ++i) torque = engine.step(0.0, 150.0, 0.0, 5e-4);
   EXPECT_TRUE(engine.fuel_cut());
-  EXPECT_NEAR(torque, -36.5, 0.01);
-  EXPECT_NEAR(engine.reported_torque_Nm(), -36.0, 0.01);
+  EXPECT_NEAR(torque, -33.5, 0.01);
+  EXPECT_NEAR(engine.reported_torque_Nm(), -33.0, 0.01);
   for (int i = 0; i < 2000; ++i) torque = engine.step(0.0, 104.0, 0.0, 5e-4);
   EXPECT_TRUE(engine.fuel_cut());  // hysteresis
   for (int i = 0; i < 2000; ++i) torque = engine.step(0.0, 70.0, 0.0, 5e-4);

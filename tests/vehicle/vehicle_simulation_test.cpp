@@ -90,7 +90,7 @@ TEST(Scenarios, DriveTorqueIsSteadyAndColdOilIsNotPermitted) {
   while (!cruise.finished()) {
     cruise.step();
     if (seconds(cruise) < 20.0) continue;
-    ASSERT_NEAR(cruise.signals().torque_e_Nm, 80.0, 12.0);
+    ASSERT_NEAR(cruise.signals().torque_e_Nm, 36.0, 5.0);
     ASSERT_EQ(cruise.truth().ratio, 2.25);
   }
   VehicleSimulation cold(scenario("cold-oil"), 1);

@@ -243,14 +243,19 @@ std::string vehicle_configuration(const VehicleScenario& scenario, std::string_v
                 "trigger = \"%s\"\n"
                 "control = \"command\"\n"
                 "ratio   = \"either\"\n"
-                "secondary_pressure_floor_Pa = %.6g\n",
+                "secondary_pressure_floor_Pa = %.6g\n"
+                "actuator_dead_time_s        = %.6g\n"
+                "actuator_lag_s              = %.6g\n"
+                "cooldown_s                  = 2.0\n"
+                "cooldown_m                  = 0.0\n",
                 scenario.name.c_str(), static_cast<int>(interface.size()), interface.data(),
                 static_cast<int>(dbc_file.size()), dbc_file.data(),
                 v.half_wedge_angle_rad * 180.0 / std::numbers::pi, v.ratio_low, v.ratio_overdrive,
                 radius(v.ratio_overdrive), radius(v.ratio_low), v.secondary_piston_area_m2,
                 v.secondary_spring_force_N, v.secondary_centrifugal_N_s2,
                 scenario.engine.inertia_kg_m2 + v.primary_inertia_kg_m2, "coast_down",
-                scenario.hydraulics.pressure_floor_Pa);
+                scenario.hydraulics.pressure_floor_Pa, 1.2 * scenario.hydraulics.dead_time_s,
+                1.2 * scenario.hydraulics.lag_s);
   return text;
 }
 
