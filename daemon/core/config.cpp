@@ -40,6 +40,7 @@ class Loader {
   void read_signals();
   void check_required_roles(const TomlNode* signals);
   void check_across();
+  void check_command();
   void check_not_there_yet();
 
   const TomlNode* section(std::string_view name) const;
@@ -79,6 +80,7 @@ void Loader::load() {
   read_sensors();
   read_signals();
   check_across();
+  check_command();
   check_not_there_yet();
   if (!result_.errors.empty()) return;
   std::sort(config_.roles.begin(), config_.roles.end(),
@@ -331,6 +333,11 @@ void Loader::check_required_roles(const TomlNode* signals) {
   if (config_.trigger == Trigger::kSignal && !named(Role::kExperimentActive)) {
     require(Role::kExperimentActive, "a signal, as experiment.trigger is \"signal\"");
   }
+  if (config_.control != Control::kCommand) return;
+  for (const Role role : {Role::kExperimentPermitted, Role::kAcceleratorPedal, Role::kBrakePressed,
+                          Role::kLockupClosed, Role::kOilTemperature, Role::kVehicleSpeed}) {
+    if (!named(role)) require(role, "a signal, as experiment.control is \"command\"");
+  }
 }
 
 void Loader::check_across() {
@@ -388,6 +395,27 @@ void Loader::check_across() {
   }
 }
 
+// What a request for clamping force needs beyond what observation does.
+void Loader::check_command() {
+  const ExperimentSettings& settings = config_.experiment;
+  if (settings.torque_min_Nm >= settings.torque_max_Nm) {
+    errors_.add(line_of("experiment", "torque_min_Nm"), "experiment.torque_min_Nm",
+                number_text(settings.torque_min_Nm),
+                "less than torque_max_Nm, " + number_text(settings.torque_max_Nm));
+  }
+  if (config_.control != Control::kCommand) return;
+  if (config_.trigger != Trigger::kCoastDown && config_.trigger != Trigger::kSteady) {
+    errors_.add(line_of("experiment", "trigger"), "experiment.trigger",
+                config_.trigger == Trigger::kSignal ? "\"signal\"" : "\"always\"",
+                "\"coast_down\" or \"steady\", as experiment.control is \"command\"");
+  }
+  if (config_.estimator.torque_is_engine && config_.variator.primary_inertia_kg_m2 <= 0.0) {
+    errors_.add(line_of("variator", "primary_inertia_kg_m2"), "variator.primary_inertia_kg_m2",
+                number_text(config_.variator.primary_inertia_kg_m2),
+                "the inertia, as experiment.control is \"command\": the slip limits rest on it");
+  }
+}
+
 void Loader::check_not_there_yet() {
   constexpr std::string_view kNotThere = ", which this version does not do yet";
   const auto refuse = [&](std::string_view section_name, std::string_view key,
@@ -397,14 +425,6 @@ void Loader::check_not_there_yet() {
     errors_.add(line_of(section_name, key), key_of(section_name, key),
                 (given ? "" : "the default, ") + found + std::string(kNotThere), expected);
   };
-  if (config_.trigger == Trigger::kCoastDown || config_.trigger == Trigger::kSteady) {
-    refuse("experiment", "trigger",
-           config_.trigger == Trigger::kSteady ? "\"steady\"" : "\"coast_down\"",
-           "trigger = \"always\" or \"signal\"");
-  }
-  if (config_.control == Control::kCommand) {
-    refuse("experiment", "control", "\"command\"", "control = \"observe\"");
-  }
   if (config_.estimator.stop_rule == estimator::StopRule::kConfidence) {
     refuse("experiment", "stop", "\"confidence\"", "stop = \"peak\"");
   }

@@ -63,6 +63,21 @@ struct RoleBinding {
 enum class Trigger : std::uint8_t { kCoastDown, kSteady, kSignal, kAlways };
 enum class Control : std::uint8_t { kObserve, kCommand };
 
+// What an experiment in the vehicle needs before it begins and keeps to while it lasts. SI, degrees
+// Celsius.
+struct ExperimentSettings {
+  double torque_min_Nm = 10.0;  // magnitude of the torque on the belt
+  double torque_max_Nm = 100.0;
+  double primary_speed_min_rad_s = 105.0;
+  double oil_temperature_min_degC = 40.0;
+  double friction_expected = 0.11;  // mu_max that must be in reach
+  double secondary_pressure_floor_Pa = 100e3;
+  double actuator_dead_time_s = 0.06;
+  double actuator_lag_s = 0.15;
+  double cooldown_s = 60.0;
+  double cooldown_m = 1000.0;
+};
+
 struct FrameIdentifiers {  // standard 11 bit
   std::uint32_t estimate = 0x6A0, slip = 0x6A1, clamp = 0x6A2, status = 0x6A3;
 };
@@ -78,6 +93,7 @@ struct Config {
   std::string model;  // path as in the file; empty: none
   Trigger trigger = Trigger::kCoastDown;
   Control control = Control::kObserve;
+  ExperimentSettings experiment;
 };
 
 struct ConfigError {

@@ -175,11 +175,15 @@ const Option kOptions[] = {
 
     choice<&Config::trigger>(
         "experiment", "trigger", kTriggers,
-        "When an experiment runs: \"signal\" while experiment_active is 1, \"always\" from the "
-        "first to the\nlast sample. \"coast_down\" and \"steady\" are not in this version."),
+        "When an experiment runs: \"coast_down\" in overrun with the foot off the pedal, "
+        "\"steady\" under a\nsteady drive torque, each while everything in [experiment] holds; "
+        "\"signal\" while experiment_active is 1;\n\"always\" from the first to the last sample."),
     choice<&Config::control>(
         "experiment", "control", kControls,
-        "\"observe\" never sends a clamp request. \"command\" is not in this version."),
+        "\"observe\" never sends a clamp request. \"command\" asks the transmission controller to "
+        "lower the\nclamping force; needs trigger \"coast_down\" or \"steady\", "
+        "variator.primary_inertia_kg_m2, and the roles\nexperiment_permitted, accelerator_pedal, "
+        "brake_pressed, lockup_closed, oil_temperature, vehicle_speed."),
     choice<&Config::estimator, &estimator::EstimatorSettings::ratio>(
         "experiment", "ratio", kRatios, "The end stop at which slip is defined."),
     choice<&Config::estimator, &estimator::EstimatorSettings::stop_rule>(
@@ -188,7 +192,49 @@ const Option kOptions[] = {
     number(
         "experiment", "ramp_rate_max_N_per_s", "N/s", 1.0, 10e3,
         [](Config& c) -> double& { return c.estimator.ramp_rate_max_N_per_s; },
-        "The fastest ramp of the clamping force that is used or to be expected."),
+        "The fastest ramp of the clamping force that is used or to be expected. The rate used is "
+        "chosen up to this:\nthe fastest whose worst-case reaction stays inside the slip limits."),
+    number(
+        "experiment", "torque_min_Nm", "Nm", 3.0, 1000.0,
+        [](Config& c) -> double& { return c.experiment.torque_min_Nm; },
+        "Least magnitude of the torque on the belt, triggers \"coast_down\" and \"steady\"."),
+    number(
+        "experiment", "torque_max_Nm", "Nm", 3.0, 1000.0,
+        [](Config& c) -> double& { return c.experiment.torque_max_Nm; },
+        "And the largest; greater than torque_min_Nm."),
+    number(
+        "experiment", "primary_speed_min_rad_s", "rad/s", 20.0, 1000.0,
+        [](Config& c) -> double& { return c.experiment.primary_speed_min_rad_s; },
+        "Least speed of the primary pulley, the same triggers."),
+    number(
+        "experiment", "oil_temperature_min_degC", "degC", -40.0, 150.0,
+        [](Config& c) -> double& { return c.experiment.oil_temperature_min_degC; },
+        "Least temperature of the oil, the same triggers, where the role is there."),
+    number(
+        "experiment", "friction_expected", "", 0.01, 1.0,
+        [](Config& c) -> double& { return c.experiment.friction_expected; },
+        "The mu_max that must be in reach before a request: the highest to be expected of the "
+        "belt."),
+    number(
+        "experiment", "secondary_pressure_floor_Pa", "Pa", 0.0, 5e6,
+        [](Config& c) -> double& { return c.experiment.secondary_pressure_floor_Pa; },
+        "Secondary pressure below which no request goes."),
+    number(
+        "experiment", "actuator_dead_time_s", "s", 0.0, 1.0,
+        [](Config& c) -> double& { return c.experiment.actuator_dead_time_s; },
+        "Dead time of the clamping pressure, at the longest."),
+    number(
+        "experiment", "actuator_lag_s", "s", 0.001, 2.0,
+        [](Config& c) -> double& { return c.experiment.actuator_lag_s; },
+        "First-order lag of the clamping pressure, at the longest."),
+    number(
+        "experiment", "cooldown_s", "s", 1.0, 86400.0,
+        [](Config& c) -> double& { return c.experiment.cooldown_s; },
+        "Time from the start of the daemon or the end of a request to the next request."),
+    number(
+        "experiment", "cooldown_m", "m", 0.0, 1e6,
+        [](Config& c) -> double& { return c.experiment.cooldown_m; },
+        "Distance likewise; both must have passed."),
 };
 
 constexpr std::string_view kSections[] = {"bus",      "signals",   "sensors",

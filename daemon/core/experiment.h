@@ -1,21 +1,40 @@
 // States and results of an experiment. The state machine decides when an experiment begins, stops,
 // is evaluated and is over; nothing else does. Pure, no clock, no allocation. Real-time thread.
 //
-// Observed experiments (control "observe"; what a request needs comes with control "command"):
-//
 //   state       guard, first that holds                next        action
-//   Inhibited   inputs_usable, bus_up, triggered       Ramping     start
-//               inputs_usable, bus_up                  Idle        -
+//   Inhibited   faulted                                Fault       -
 //   Idle        not inputs_usable or not bus_up        Inhibited   -
-//               triggered                              Ramping     start
+//   Settling    not triggered                          Idle        -
+//               not settled                            Settling    -
+//               cleared                                Ramping     start
+//               otherwise                              Evaluating  refuse
 //   Ramping     not bus_up                             Releasing   abort (Bus)
 //               inputs_lost                            Releasing   abort (Inputs)
+//               withdrawn                              Releasing   abort (withdrawn_reason)
 //               stop_decided                           Evaluating  stop
 //               not triggered                          Evaluating  end
 //   Evaluating  concluded                              Releasing   publish
-//   Releasing   not triggered                          Inhibited   over
-//   others      (not entered in observe)               Inhibited   -
+//   Releasing   stuck                                  Fault       over
+//               not released                           Releasing   -
+//               not cooled                             Cooldown    over
+//               otherwise                              Inhibited   over
+//   Cooldown    faulted                                Fault       -
+//               cooled                                 Inhibited   -
+//   Fault       (until restart)                        Fault       -
 //
+// A request for clamping force stands in Ramping alone; every other state lets go. Forbidden pairs,
+// which the table leaves unreachable: Ramping after anything but Inhibited, Idle, Settling and
+// itself; Evaluating or Releasing to Ramping; Cooldown to Idle, Settling or Ramping; anything after
+// Fault.
+//
+// How the guards are meant, by trigger and control:
+//   triggered   "signal", "always": the trigger asks for an experiment, or for it to go on.
+//               "coast_down", "steady": every precondition holds at this sample.
+//   settled     "signal", "always": at once. Else: triggered has held for the settling time.
+//   cleared     "observe": always. "command": the peak is reachable and a safe ramp was found.
+//   released    "observe": not triggered. "command": the clamping force is back.
+//   cooled      "observe": at once. "command": time and distance have passed since the last
+//   request. withdrawn, stuck, faulted: "command" alone.
 // From the start to "over" one experiment runs; a stop or abort raises MacroSlipStop, which stays
 // up until "over". With trigger "always", triggered never falls: one experiment a run.
 #pragma once
@@ -57,12 +76,20 @@ struct Guards {
   bool inputs_usable = false;  // every input can be used at this sample
   bool inputs_lost = false;    // an input is gone for longer than it may be
   bool bus_up = false;
-  bool triggered = false;     // the trigger asks for an experiment, or for it to go on
-  bool stop_decided = false;  // the estimator says stop
+  bool triggered = false;
+  bool stop_decided = false;  // by the estimator or a backup stop
   bool concluded = false;     // the evaluation is done
+  bool settled = false;
+  bool cleared = false;
+  bool withdrawn = false;  // the request must end: driver, permission, safety monitor
+  bool released = false;
+  bool stuck = false;  // the clamping force does not come back
+  bool cooled = false;
+  bool faulted = false;  // no request before a restart
+  estimator::StopReason withdrawn_reason = estimator::StopReason::kNone;
 };
 
-enum class Action : std::uint8_t { kNone, kStart, kStop, kEnd, kAbort, kPublish, kOver };
+enum class Action : std::uint8_t { kNone, kStart, kRefuse, kStop, kEnd, kAbort, kPublish, kOver };
 
 struct Transition {
   State next = State::kInhibited;

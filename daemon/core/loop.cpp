@@ -82,7 +82,7 @@ class Loop {
       if (result == SendResult::kSent) continue;
       ++counters_.sends_failed;
       // A link that is down has a fault of its own.
-      if (result != SendResult::kDown) pipeline_.on_send_failed(next_);
+      if (result != SendResult::kDown) pipeline_.on_send_failed(outbox_.frames[i], next_);
     }
   }
 

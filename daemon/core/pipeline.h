@@ -25,9 +25,12 @@ struct SampleReport {
   bool macro_slip_stop = false;
   estimator::VariatorSample sample;
   estimator::CurveEstimate curve;
-  bool new_result = false;   // an experiment has come to its outcome with this sample
-  ExperimentResult result;   // the last one; outcome kNone before the first
-  std::uint32_t faults = 0;  // fault_bit()s of faults.h
+  bool new_result = false;       // an experiment has come to its outcome with this sample
+  ExperimentResult result;       // the last one; outcome kNone before the first
+  std::uint32_t faults = 0;      // fault_bit()s of faults.h
+  std::uint32_t inhibits = 0;    // inhibit_bit()s of arming.h, triggers "coast_down" and "steady"
+  double request_force_N = 0.0;  // as asked for with this sample; 0: no request stands
+  double ramp_N_per_s = 0.0;     // of the request that stands
 };
 
 struct PipelineCounters {
@@ -52,7 +55,7 @@ class Pipeline {
   void on_bus_state(BusState state, MonoTime t) noexcept;
   // A sample at t was taken late, or (lost) samples before t were not taken at all.
   void on_late(MonoTime t, bool lost) noexcept;
-  void on_send_failed(MonoTime t) noexcept;
+  void on_send_failed(const can::CanFrame& frame, MonoTime t) noexcept;
   // The sample at t: decides and leaves in outbox what must be sent now.
   const SampleReport& on_sample(MonoTime t, Outbox& outbox) noexcept;
   // The end (stop request, end of a log): ends a running experiment and leaves the last frames. Its

@@ -3,9 +3,12 @@
 
 #include <memory>
 
+#include "daemon/core/arming.h"
+#include "daemon/core/clamp_request.h"
 #include "daemon/core/input_monitor.h"
 #include "daemon/core/pipeline.h"
 #include "daemon/core/publisher.h"
+#include "daemon/core/safety_monitor.h"
 #include "daemon/core/sampler.h"
 #include "daemon/core/tx_gate.h"
 
@@ -16,11 +19,21 @@ struct Pipeline::Parts {
 
   void take_own_frame(const RxFrame& frame) noexcept;
   void raise_bus_faults(MonoTime t) noexcept;
+  bool by_conditions() const noexcept;  // trigger "coast_down" or "steady"
+  bool commands() const noexcept { return config.control == Control::kCommand; }
   bool triggered() const noexcept;
+  double value_or(Role role, double otherwise, bool& fresh) const noexcept;
+  Conditions read_conditions() const noexcept;
+  Duration slowest_stale() const noexcept;
+  ClampRequest::Now request_now(MonoTime t) const noexcept;
+  void arm(MonoTime t) noexcept;
+  void step_request(MonoTime t) noexcept;
+  void withdraw(estimator::StopReason reason) noexcept;
   Guards guards(MonoTime t) const noexcept;
   void apply(const Transition& transition, MonoTime t) noexcept;
   void step(MonoTime t) noexcept;
   void stop(MonoTime t, estimator::StopReason reason) noexcept;
+  void bound_only() noexcept;
   void publish_result(Outcome outcome) noexcept;
   Outcome judged_outcome() const noexcept;
   void report(MonoTime t) noexcept;
@@ -36,10 +49,20 @@ struct Pipeline::Parts {
   FaultSet faults;
   PipelineCounters counters;
   SampleReport last;  // as reported
+  Arming arming;
+  ClampRequest request;
+  SafetyMonitor safety;
+  Conditions conditions;
 
   State state = State::kInhibited;
   bool macro_slip_stop = false;
-  bool samples_lost = false;                // since the last sample
+  bool samples_lost = false;  // since the last sample
+  bool refused = false;       // the experiment under way never began
+  estimator::StopReason backup_stop = estimator::StopReason::kNone;  // at this sample
+  estimator::StopReason withdrawn = estimator::StopReason::kNone;    // at this sample
+  bool clamp_refused = false;               // by the gate, or by the port: since the last sample
+  bool clamp_unconfirmed = false;           // a clamp frame waits for its echo
+  MonoTime clamp_sent = 0;                  // the first that waits
   bool estimate_changed = false;            // with this sample
   ExperimentResult running;                 // the experiment under way
   ExperimentResult result;                  // the last that came to its outcome

@@ -9,6 +9,28 @@ namespace {
 Duration sample_period(const Config& config) {
   return std::llround(static_cast<double>(kSecond) / config.estimator.sample_rate_hz);
 }
+
+// Independent of what the experiment uses: wider than its own limits, and it keeps to them.
+SafetyLimits safety_limits(const Config& config) {
+  SafetyLimits limits;
+  limits.speed_min_rad_s = 0.85 * config.experiment.primary_speed_min_rad_s;
+  limits.rate_max_N_per_s = config.estimator.ramp_rate_max_N_per_s;
+  limits.spring_force_N = config.variator.secondary_spring_force_N;
+  limits.centrifugal_N_s2 = config.variator.secondary_centrifugal_N_s2;
+  limits.floor_force_N =
+      config.variator.secondary_piston_area_m2 * config.experiment.secondary_pressure_floor_Pa;
+  limits.pause_min = std::llround(config.experiment.cooldown_s * static_cast<double>(kSecond));
+  return limits;
+}
+
+// A frame every 10 ms, one sample late at most.
+ClampLimits clamp_limits(const Config& config) {
+  constexpr double kFrameMax_s = 0.016;
+  constexpr double kRounding_N = 1.0;
+  constexpr std::uint32_t kFramesMax = 1510;  // 15 s, and the last ones
+  return {config.variator.secondary_spring_force_N,
+          config.estimator.ramp_rate_max_N_per_s * kFrameMax_s + kRounding_N, kFramesMax};
+}
 }  // namespace
 
 Pipeline::Parts::Parts(const Config& given)
@@ -18,7 +40,10 @@ Pipeline::Parts::Parts(const Config& given)
       estimator(
           estimator::make_slip_curve_estimator(config.estimator, config.variator, config.sensors)),
       publisher(config.identifiers, sample_period(config)),
-      gate(config.identifiers, config.control) {
+      gate(config.identifiers, config.control, clamp_limits(config)),
+      arming(config),
+      request(config),
+      safety(safety_limits(config)) {
   estimator->reset();
 }
 

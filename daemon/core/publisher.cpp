@@ -11,6 +11,7 @@ constexpr Duration kEstimatePeriod = 100 * kMillisecond;
 constexpr Duration kSlipPeriod = 10 * kMillisecond;
 constexpr Duration kSlipPeriodIdle = 100 * kMillisecond;
 constexpr Duration kStatusPeriod = kSecond;
+constexpr Duration kClampPeriod = 10 * kMillisecond;
 }  // namespace
 
 Publisher::Publisher(const FrameIdentifiers& identifiers, Duration sample_period)
@@ -36,6 +37,16 @@ std::uint8_t Publisher::take_counter(OwnMessage message) noexcept {
   return taken;
 }
 
+void Publisher::collect_clamp(MonoTime t, const ClampValues& clamp, Outbox& outbox) noexcept {
+  const bool changed = clamp.request_active != last_request_;
+  last_request_ = clamp.request_active;
+  if (changed) inactive_left_ = kInactiveFrames;
+  if (!clamp.request_active && inactive_left_ == 0) return;
+  if (!due(OwnMessage::kClamp, t, kClampPeriod, changed)) return;
+  if (!clamp.request_active) --inactive_left_;
+  outbox.push(frames_.pack(clamp, take_counter(OwnMessage::kClamp)));
+}
+
 void Publisher::collect(MonoTime t, const Publication& now, Outbox& outbox) noexcept {
   const bool first = !started_;
   started_ = true;
@@ -44,7 +55,8 @@ void Publisher::collect(MonoTime t, const Publication& now, Outbox& outbox) noex
   const bool status_changed = now.status != last_status_;
   last_status_ = now.status;
 
-  // The stop flag before everything else.
+  // What acts on the clamp before everything else.
+  if (now.command) collect_clamp(t, now.clamp, outbox);
   if (due(OwnMessage::kSlip, t, now.in_experiment ? kSlipPeriod : kSlipPeriodIdle,
           first || stop_changed)) {
     outbox.push(frames_.pack(now.slip, take_counter(OwnMessage::kSlip)));
@@ -59,7 +71,16 @@ void Publisher::collect(MonoTime t, const Publication& now, Outbox& outbox) noex
 
 void Publisher::collect_all(MonoTime t, const Publication& now, Outbox& outbox) noexcept {
   started_ = false;
-  collect(t, now, outbox);
+  Publication last = now;
+  last.command = false;
+  if (now.command) {
+    for (int i = 0; i < kInactiveFrames; ++i) {
+      outbox.push(frames_.pack(ClampValues{}, take_counter(OwnMessage::kClamp)));
+    }
+    last_request_ = false;
+    inactive_left_ = 0;
+  }
+  collect(t, last, outbox);
 }
 
 }  // namespace beltgrip::daemon

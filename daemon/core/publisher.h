@@ -1,10 +1,14 @@
-// Which frames leave at a sample: periods and at-once rules of BeltGripEstimate, BeltGripSlip and
-// BeltGripStatus, with their counters. Real-time thread.
+// Which frames leave at a sample: periods and at-once rules of BeltGripEstimate, BeltGripSlip,
+// BeltGripStatus and, with control "command", BeltGripClamp, with their counters. Real-time thread.
 //
 //   message   period                            at once when
 //   Estimate  100 ms                            a new result is there
 //   Slip      10 ms in an experiment, 100 ms    MacroSlipStop changes
 //   Status    1 s                               anything in it changes
+//   Clamp     10 ms while a request stands,     a request begins or ends
+//             and for kInactiveFrames at start
+//             and when one ends; all of those
+//             at once at the end
 //
 // A frame sent at once restarts its period. Where the sample period does not divide a period, the
 // frame leaves at the sample nearest to its instant.
@@ -20,6 +24,8 @@
 namespace beltgrip::daemon {
 
 struct Publication {
+  bool command = false;  // clamp frames are sent at all
+  ClampValues clamp;
   EstimateValues estimate;
   SlipValues slip;
   StatusValues status;
@@ -29,6 +35,8 @@ struct Publication {
 
 class Publisher {
  public:
+  static constexpr int kInactiveFrames = 5;
+
   Publisher(const FrameIdentifiers& identifiers, Duration sample_period);
   // Adds what is due at t. The first call sends every message.
   void collect(MonoTime t, const Publication& publication, Outbox& outbox) noexcept;
@@ -43,12 +51,15 @@ class Publisher {
   // True if the message leaves at t; moves its schedule on.
   bool due(OwnMessage message, MonoTime t, Duration period, bool at_once) noexcept;
   std::uint8_t take_counter(OwnMessage message) noexcept;
+  void collect_clamp(MonoTime t, const ClampValues& clamp, Outbox& outbox) noexcept;
 
   OwnFrames frames_;
   Duration tolerance_;  // half a sample period
   std::array<Schedule, kOwnMessageCount> schedules_{};
   bool started_ = false;
   bool last_stop_ = false;
+  bool last_request_ = false;
+  int inactive_left_ = kInactiveFrames;
   StatusValues last_status_;
 };
 

@@ -39,9 +39,11 @@ bool content_allowed(std::size_t message, const can::CanFrame& frame) noexcept {
 
 }  // namespace
 
-TxGate::TxGate(const FrameIdentifiers& identifiers, Control control) noexcept
+TxGate::TxGate(const FrameIdentifiers& identifiers, Control control,
+               const ClampLimits& clamp) noexcept
     : identifiers_{identifiers.estimate, identifiers.slip, identifiers.clamp, identifiers.status},
-      control_(control) {
+      control_(control),
+      clamp_(clamp) {
   expected_counter_.fill(kAnyCounter);
 }
 
@@ -53,6 +55,29 @@ std::size_t TxGate::message_of(const can::CanFrame& frame) const noexcept {
     if (frame.id.value == identifiers_[i]) return i;
   }
   return kMessages;
+}
+
+// A request that breaks a limit is over: it takes inactive frames before another may begin.
+bool TxGate::request_allowed(const can::CanFrame& frame) noexcept {
+  const double force_N = frame.data[3] + 256.0 * frame.data[4];
+  if ((frame.data[2] & 0x01U) == 0) {
+    if (inactive_frames_ < clamp_.inactive_before) ++inactive_frames_;
+    active_frames_ = 0;
+    return true;
+  }
+  const bool first = active_frames_ == 0;
+  const bool allowed =
+      force_N >= clamp_.floor_N && active_frames_ < clamp_.frames_max &&
+      (first ? inactive_frames_ >= clamp_.inactive_before
+             : force_N <= last_force_N_ && force_N >= last_force_N_ - clamp_.fall_max_N);
+  inactive_frames_ = 0;
+  if (!allowed) {
+    active_frames_ = 0;
+    return false;
+  }
+  last_force_N_ = force_N;
+  ++active_frames_;
+  return true;
 }
 
 bool TxGate::permits(const can::CanFrame& frame) noexcept {
@@ -67,7 +92,7 @@ bool TxGate::permits(const can::CanFrame& frame) noexcept {
       (message != kClamp || control_ == Control::kCommand) && counter <= can::e2e::kCounterMax &&
       (expected == kAnyCounter || counter == expected) &&
       can::e2e::crc_profile1(kDataIds[message], frame.payload().subspan(1)) == frame.data[0] &&
-      content_allowed(message, frame);
+      content_allowed(message, frame) && (message != kClamp || request_allowed(frame));
   if (!allowed) {
     expected = kAnyCounter;
     ++refused_;

@@ -4,7 +4,9 @@
 //
 // Passes: one of the four identifiers, standard, data, classic, 8 bytes, right CRC for its data id,
 // a legal counter that follows the one before (any after a refusal), codes inside their tables,
-// MuMaxValid only with a value; a clamp frame only with control "command".
+// MuMaxValid only with a value; a clamp frame only with control "command", and a request only
+// inside ClampLimits: after enough inactive frames, never below the floor, never rising, never
+// falling by more than a step from frame to frame, no longer than a number of frames.
 #pragma once
 
 #include <array>
@@ -15,9 +17,18 @@
 
 namespace beltgrip::daemon {
 
+// Of a request, as its frames show it. By default none is allowed.
+struct ClampLimits {
+  double floor_N = 1e9;
+  double fall_max_N = 0.0;  // from one frame to the next
+  std::uint32_t frames_max = 0;
+  std::uint32_t inactive_before = 5;  // frames between two requests, and before the first
+};
+
 class TxGate {
  public:
-  TxGate(const FrameIdentifiers& identifiers, Control control) noexcept;
+  TxGate(const FrameIdentifiers& identifiers, Control control,
+         const ClampLimits& clamp = {}) noexcept;
   bool permits(const can::CanFrame& frame) noexcept;  // counts what it refuses
   std::uint64_t refused() const noexcept { return refused_; }
 
@@ -26,10 +37,15 @@ class TxGate {
   static constexpr std::uint8_t kAnyCounter = 0xFF;
 
   std::size_t message_of(const can::CanFrame& frame) const noexcept;  // kMessages: none
+  bool request_allowed(const can::CanFrame& frame) noexcept;
 
   std::array<std::uint32_t, kMessages> identifiers_;
   std::array<std::uint8_t, kMessages> expected_counter_;
   Control control_;
+  ClampLimits clamp_;
+  std::uint32_t active_frames_ = 0;    // of the request that stands
+  std::uint32_t inactive_frames_ = 0;  // in a row, since the last request
+  double last_force_N_ = 0.0;
   std::uint64_t refused_ = 0;
 };
 

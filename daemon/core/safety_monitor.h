@@ -1,0 +1,85 @@
+// The independent guard of clamp requests: judges each sample from signals alone and withdraws the
+// permission to ask. Shares no state and no code with the experiment or the estimator: slip here is
+// the drift of the speed ratio since the request began, so that neither the calibration of the end
+// stops nor the filters matter. SI; slip as a fraction. Real-time thread.
+//
+// A request may stand while all of this holds (strict: the limit itself is still allowed):
+//   every input is there and fresh; both shafts turn, the primary at least at speed_min
+//   |drift of the speed ratio| <= slip_max at every sample, <= slip_debounced over 3 in a row
+//   slip speed <= slip_speed_max
+//   energy, |T| omega_p |drift| while the drift is beyond slip_counted, <= energy_max
+//   the force asked for is >= floor, never rises, and falls no faster than rate_max
+//   it has stood no longer than duration_max, and begins no sooner than pause_min after the last
+// The first violation withdraws the permission until the request has ended; the pause then begins.
+#pragma once
+
+#include <cstdint>
+
+#include "daemon/core/mono_time.h"
+
+namespace beltgrip::daemon {
+
+struct SafetyLimits {
+  double slip_max = 0.08;
+  double slip_debounced = 0.055;
+  double slip_counted = 0.02;
+  double slip_speed_max_m_s = 0.70;
+  double energy_max_J = 80.0;
+  double speed_min_rad_s = 85.0;
+  double rate_max_N_per_s = 300.0;
+  double spring_force_N = 0.0;  // floor = spring + centrifugal * omega_s^2 + floor_force
+  double centrifugal_N_s2 = 0.0;
+  double floor_force_N = 0.0;
+  Duration duration_max = 15 * kSecond;
+  Duration pause_min = 10 * kSecond;
+};
+
+struct SafetySignals {
+  bool fresh = false;  // every input of this sample, and those the request depends on
+  double omega_p_rad_s = 0.0;
+  double omega_s_rad_s = 0.0;
+  double torque_Nm = 0.0;
+  double primary_radius_m = 0.0;
+};
+
+enum class SafetyVerdict : std::uint8_t {
+  kAllowed,
+  kInputs,
+  kSpeed,
+  kSlip,
+  kSlipSpeed,
+  kEnergy,
+  kFloor,
+  kRise,
+  kRate,
+  kDuration,
+  kPause
+};
+
+class SafetyMonitor {
+ public:
+  explicit SafetyMonitor(const SafetyLimits& limits) noexcept : limits_(limits) {}
+
+  // One sample: the force that would be asked for (0: none). Anything but kAllowed: it must not be.
+  SafetyVerdict check(MonoTime t, const SafetySignals& signals, double request_N) noexcept;
+
+ private:
+  SafetyVerdict judge(MonoTime t, const SafetySignals& signals, double request_N) noexcept;
+  SafetyVerdict judge_motion(MonoTime t, const SafetySignals& signals) noexcept;
+  SafetyVerdict judge_request(MonoTime t, double request_N, double floor_N) noexcept;
+  void end(MonoTime t) noexcept;
+
+  SafetyLimits limits_;
+  SafetyVerdict withdrawn_ = SafetyVerdict::kAllowed;
+  bool standing_ = false;
+  bool asked_before_ = false;
+  MonoTime begun_ = 0;
+  MonoTime ended_ = 0;
+  MonoTime last_ = 0;
+  double reference_ratio_ = 0.0;
+  double last_request_N_ = 0.0;
+  double energy_J_ = 0.0;
+  int beyond_ = 0;  // samples in a row beyond slip_debounced
+};
+
+}  // namespace beltgrip::daemon

@@ -1,0 +1,76 @@
+#include "tools/sim/fault_script.h"
+
+#include <limits>
+#include <utility>
+
+namespace beltgrip::sim {
+
+const std::vector<FaultKindRow>& fault_kinds() {
+  static const std::vector<FaultKindRow> rows{
+      {FaultKind::kAccelerator, "accelerator"},
+      {FaultKind::kBrake, "brake"},
+      {FaultKind::kAbs, "abs"},
+      {FaultKind::kPothole, "pothole"},
+      {FaultKind::kTorqueStep, "torque_step"},
+      {FaultKind::kShift, "shift"},
+      {FaultKind::kLockupOpen, "lockup_open"},
+      {FaultKind::kOilTemperature, "oil_temperature"},
+      {FaultKind::kTcuIgnores, "tcu_ignores"},
+      {FaultKind::kTcuDelays, "tcu_delays"},
+      {FaultKind::kTcuUndershoots, "tcu_undershoots"},
+      {FaultKind::kTcuQuantises, "tcu_quantises"},
+      {FaultKind::kTcuLatches, "tcu_latches"},
+      {FaultKind::kTcuWithdraws, "tcu_withdraws"},
+      {FaultKind::kHydraulicLag, "hydraulic_lag"},
+      {FaultKind::kSignalFrozen, "signal_frozen"},
+      {FaultKind::kSignalValue, "signal_value"},
+      {FaultKind::kSignalBias, "signal_bias"},
+      {FaultKind::kSignalGain, "signal_gain"},
+      {FaultKind::kSignalRamp, "signal_ramp"},
+      {FaultKind::kSignalNoise, "signal_noise"},
+      {FaultKind::kSignalSpike, "signal_spike"},
+      {FaultKind::kSignalDelay, "signal_delay"},
+      {FaultKind::kSignalNotAvailable, "signal_not_available"},
+      {FaultKind::kSignalResolution, "signal_resolution"},
+      {FaultKind::kFrameSilent, "frame_silent"},
+      {FaultKind::kFrameLoss, "frame_loss"},
+      {FaultKind::kFrameBitFlips, "frame_bit_flips"},
+      {FaultKind::kFrameTruncated, "frame_truncated"},
+      {FaultKind::kFrameDelay, "frame_delay"},
+      {FaultKind::kFrameJitter, "frame_jitter"},
+      {FaultKind::kFrameRepeat, "frame_repeat"},
+      {FaultKind::kFrameDouble, "frame_double"},
+      {FaultKind::kBusOff, "bus_off"},
+      {FaultKind::kBusPassive, "bus_passive"},
+      {FaultKind::kBusDown, "bus_down"},
+      {FaultKind::kSendFull, "send_full"},
+      {FaultKind::kSendLost, "send_lost"},
+      {FaultKind::kEchoLost, "echo_lost"},
+      {FaultKind::kForeignFrames, "foreign_frames"},
+      {FaultKind::kLoopLate, "loop_late"},
+      {FaultKind::kDaemonDies, "daemon_dies"},
+  };
+  return rows;
+}
+
+FaultScript::FaultScript(std::vector<FaultStep> steps) : steps_(std::move(steps)) {}
+
+void FaultScript::request_began(double t_s) {
+  if (request_s_ < 0.0) request_s_ = t_s;
+}
+
+double FaultScript::start_s(const FaultStep& step) const {
+  if (!step.after_request) return step.at_s;
+  return request_s_ < 0.0 ? std::numeric_limits<double>::infinity() : request_s_ + step.at_s;
+}
+
+const FaultStep* FaultScript::active(FaultKind kind, double t_s, std::string_view channel) const {
+  for (const FaultStep& step : steps_) {
+    if (step.kind != kind || (!step.channel.empty() && step.channel != channel)) continue;
+    const double since_s = t_s - start_s(step);
+    if (since_s >= 0.0 && since_s < step.for_s) return &step;
+  }
+  return nullptr;
+}
+
+}  // namespace beltgrip::sim

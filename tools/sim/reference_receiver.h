@@ -1,0 +1,63 @@
+/* Reference receiver of BeltGripClamp for a transmission controller: what must be checked before a
+ * clamping force is lowered on request. Plain C, no allocation, no clock, no dependency; the caller
+ * gives the time in microseconds (it may wrap). One task; not for concurrent calls.
+ *
+ * A frame is valid if it has 8 bytes, the right CRC (AUTOSAR E2E profile 1, variant 1A, data id
+ * 0x6A2), zero reserved bits, RequestActive = 1 exactly where SecondaryForce > 0, and a counter 1
+ * to BELTGRIP_MAX_DELTA steps after the last correct one. A wrong sequence is not valid, but the
+ * next frame is judged from it: a sender that starts anew is heard with its second frame.
+ *
+ * - An inactive frame with a right CRC ends a request at once, whatever its counter: letting go
+ *   needs no proof.
+ * - No valid active frame for BELTGRIP_TIMEOUT_US: the request is over.
+ * - A request that is over stays over until an inactive frame has been seen: an old or stuck active
+ *   frame cannot start one.
+ * - The controller decides: without its permission, and below its own floor, nothing is obeyed.
+ */
+#ifndef BELTGRIP_REFERENCE_RECEIVER_H
+#define BELTGRIP_REFERENCE_RECEIVER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define BELTGRIP_TIMEOUT_US 50000u
+#define BELTGRIP_MAX_DELTA 3u /* two frames in a row may be lost */
+
+struct beltgrip_receiver {
+  bool synchronised;      /* last_counter is known */
+  uint8_t last_counter;   /* of the last frame with a right CRC */
+  bool may_start;         /* an inactive frame came since the last request */
+  bool active;            /* a request stands */
+  uint32_t last_valid_us; /* instant of the last valid active frame */
+  uint16_t force_N;       /* what it asks */
+  bool lowered;           /* applied_N is below the controller's own force */
+  double applied_N;       /* force of the last call of beltgrip_receiver_force */
+  uint32_t applied_at_us; /* and its instant */
+};
+
+struct beltgrip_limits {
+  double floor_N;               /* never below, whatever is asked */
+  double fall_rate_max_N_per_s; /* never faster, whatever is asked */
+};
+
+void beltgrip_receiver_init(struct beltgrip_receiver* receiver);
+
+/* Every data frame with the identifier of BeltGripClamp, as received. True if it was valid. */
+bool beltgrip_receiver_frame(struct beltgrip_receiver* receiver, const uint8_t* data,
+                             unsigned length, uint32_t now_us);
+
+/* The force to apply now, at least once every 10 ms: own_force_N unless a request stands and
+ * permitted. A withdrawn permission ends the request. Never above own_force_N. */
+double beltgrip_receiver_force(struct beltgrip_receiver* receiver,
+                               const struct beltgrip_limits* limits, double own_force_N,
+                               bool permitted, uint32_t now_us);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,174 @@
+#include "tools/sim/scenario_reader.h"
+
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <charconv>
+#include <sstream>
+
+namespace beltgrip::sim {
+
+namespace {
+
+std::string found_text(const toml::node& node) {
+  std::ostringstream out;
+  node.visit([&out](const auto& value) { out << value; });
+  std::string text = out.str();
+  if (const auto line_end = text.find('\n'); line_end != std::string::npos) {
+    text = text.substr(0, line_end) + "...";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string number_text(double value) {
+  char buffer[32];
+  return {buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr};
+}
+
+struct ScenarioReader::Impl {
+  // Takes the value of a key; reports a wrong one by the text that follows "found ...".
+  using Take = std::function<std::string(const toml::node&)>;
+
+  std::map<std::string, Take> keys;
+  std::map<std::string, std::function<void(ScenarioReader*)>> rows;
+  std::map<std::string, std::string> positions;  // of the last value of each key
+  std::string source;
+
+  // File and line; an argument of the command line stands for itself.
+  std::string place(const toml::node& node) const {
+    return source.starts_with("--") ? source
+                                    : source + ":" + std::to_string(node.source().begin.line);
+  }
+
+  bool is_section(const std::string& name) const {
+    const std::string prefix = name + ".";
+    const auto inside = [&prefix](const auto& key) { return key.first.starts_with(prefix); };
+    return std::any_of(keys.begin(), keys.end(), inside) ||
+           std::any_of(rows.begin(), rows.end(), inside);
+  }
+
+  void apply_rows(const std::string& name, const toml::node& node,
+                  const std::function<void(ScenarioReader*)>& begin,
+                  std::vector<std::string>& errors) {
+    const toml::array* array = node.as_array();
+    if (array == nullptr || !std::all_of(array->begin(), array->end(),
+                                         [](const toml::node& row) { return row.is_table(); })) {
+      errors.push_back(place(node) + ": " + name + ": found " + found_text(node) +
+                       ", expected sections [[" + name + "]]");
+      return;
+    }
+    begin(nullptr);
+    for (const toml::node& row : *array) {
+      ScenarioReader reader;
+      begin(&reader);
+      reader.impl_->source = source;
+      reader.impl_->apply_table(*row.as_table(), "", name + ".", reader.errors_);
+      errors.insert(errors.end(), reader.errors_.begin(), reader.errors_.end());
+    }
+  }
+
+  void apply_table(const toml::table& table, const std::string& prefix,
+                   const std::string& shown_prefix, std::vector<std::string>& errors) {
+    for (const auto& [key, node] : table) {
+      const std::string name = prefix + std::string(key.str());
+      const std::string shown = shown_prefix + std::string(key.str());
+      if (const auto row = rows.find(name); row != rows.end()) {
+        apply_rows(shown, node, row->second, errors);
+      } else if (const auto value = keys.find(name); value != keys.end()) {
+        positions[name] = place(node);
+        const std::string expected = value->second(node);
+        if (!expected.empty()) {
+          errors.push_back(place(node) + ": " + shown + ": found " + found_text(node) +
+                           ", expected " + expected);
+        }
+      } else if (!is_section(name)) {
+        errors.push_back(place(node) + ": " + shown + ": is not a key of a vehicle scenario");
+      } else if (const toml::table* section = node.as_table()) {
+        apply_table(*section, name + ".", shown + ".", errors);
+      } else {
+        errors.push_back(place(node) + ": " + shown + ": found " + found_text(node) +
+                         ", expected a section [" + shown + "]");
+      }
+    }
+  }
+};
+
+ScenarioReader::ScenarioReader() : impl_(std::make_unique<Impl>()) {}
+ScenarioReader::~ScenarioReader() = default;
+
+void ScenarioReader::number(std::string name, double& target, double minimum, double maximum,
+                            std::string reason, double factor, double shift) {
+  impl_->keys[std::move(name)] = [&target, minimum, maximum, reason = std::move(reason), factor,
+                                  shift](const toml::node& node) -> std::string {
+    const auto value = node.is_number() ? node.value<double>() : std::nullopt;
+    if (!value || !(*value >= minimum && *value <= maximum)) {
+      return "a number from " + number_text(minimum) + " to " + number_text(maximum) + ": " +
+             reason;
+    }
+    target = *value * factor + shift;
+    return {};
+  };
+}
+
+void ScenarioReader::text(std::string name, std::string& target) {
+  impl_->keys[std::move(name)] = [&target](const toml::node& node) -> std::string {
+    const auto value = node.value<std::string>();
+    if (!value) return "text";
+    target = *value;
+    return {};
+  };
+}
+
+void ScenarioReader::flag(std::string name, bool& target) {
+  impl_->keys[std::move(name)] = [&target](const toml::node& node) -> std::string {
+    if (!node.is_boolean()) return "true or false";
+    target = *node.value<bool>();
+    return {};
+  };
+}
+
+void ScenarioReader::choice(std::string name, std::vector<std::string> choices,
+                            std::function<void(std::size_t)> take) {
+  impl_->keys[std::move(name)] = [choices = std::move(choices),
+                                  take = std::move(take)](const toml::node& node) -> std::string {
+    const std::string value = node.value_or(std::string());
+    std::string expected;
+    for (std::size_t i = 0; i < choices.size(); ++i) {
+      if (value == choices[i]) {
+        take(i);
+        return {};
+      }
+      expected += (expected.empty() ? "one of \"" : ", \"") + choices[i] + "\"";
+    }
+    return expected;
+  };
+}
+
+void ScenarioReader::rows(std::string name, std::function<void(ScenarioReader* row)> begin) {
+  impl_->rows[std::move(name)] = std::move(begin);
+}
+
+void ScenarioReader::apply(const ScenarioLayer& layer) {
+  impl_->source = layer.source;
+  toml::table table;
+  try {
+    table = toml::parse(layer.text);
+  } catch (const toml::parse_error& error) {
+    errors_.push_back((layer.source.starts_with("--")
+                           ? layer.source
+                           : layer.source + ":" + std::to_string(error.source().begin.line)) +
+                      ": not TOML: " + std::string(error.description()));
+    return;
+  }
+  impl_->apply_table(table, "", "", errors_);
+}
+
+void ScenarioReader::contradiction(const std::string& name, const std::string& text) {
+  const auto position = impl_->positions.find(name);
+  errors_.push_back((position == impl_->positions.end() ? std::string() : position->second + ": ") +
+                    name + ": " + text);
+}
+
+}  // namespace beltgrip::sim

@@ -1,0 +1,235 @@
+#include "tools/sim/vehicle_plant.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/variator_geometry.h"
+
+namespace beltgrip::sim {
+
+namespace {
+
+constexpr double kGravity_m_s2 = 9.81;
+constexpr double kAirDensity_kg_m3 = 1.2;
+constexpr double kClutchWidth_rad_s = 0.5;   // slip at which the lock-up carries 76 % of its torque
+constexpr double kConverter_Nm_s2 = 2.0e-3;  // 150 Nm at 2600 rpm against a standing turbine
+constexpr double kLeastSpeed_rad_s = 5.0;    // slip is relative to at least this
+constexpr double kCoulombWidth_rad_s = 1.0;  // brakes and bearings through standstill
+constexpr double kReferenceForce_N = 3000.0;  // where the belt's mu_max is given
+constexpr double kReferenceSpeed_rad_s = 105.0;
+constexpr double kReferenceTemperature_degC = 80.0;
+
+// (1 + cos^2(theta)) / sin(2 theta), variator-facts 3.4.
+double wedge_factor(double half_angle_rad) {
+  const double cosine = std::cos(half_angle_rad);
+  return (1.0 + cosine * cosine) / std::sin(2.0 * half_angle_rad);
+}
+
+// Solves the 3 by 3 system by elimination with pivots; the matrix I - gamma h J is regular.
+std::array<double, 3> solve(std::array<std::array<double, 3>, 3> a, std::array<double, 3> b) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::size_t pivot = i;
+    for (std::size_t r = i + 1; r < 3; ++r) {
+      if (std::abs(a[r][i]) > std::abs(a[pivot][i])) pivot = r;
+    }
+    std::swap(a[i], a[pivot]);
+    std::swap(b[i], b[pivot]);
+    for (std::size_t r = i + 1; r < 3; ++r) {
+      const double factor = a[r][i] / a[i][i];
+      for (std::size_t c = i; c < 3; ++c) a[r][c] -= factor * a[i][c];
+      b[r] -= factor * b[i];
+    }
+  }
+  for (std::size_t i = 3; i-- > 0;) {
+    for (std::size_t c = i + 1; c < 3; ++c) b[i] -= a[i][c] * b[c];
+    b[i] /= a[i][i];
+  }
+  return b;
+}
+
+}  // namespace
+
+VehiclePlant::VehiclePlant(const VehicleScenario& scenario)
+    : variator_(scenario.variator),
+      belt_(scenario.belt),
+      body_(scenario.body),
+      engine_inertia_kg_m2_(scenario.engine.inertia_kg_m2),
+      secondary_inertia_kg_m2_(variator_.secondary_inertia_kg_m2 +
+                               body_.mass_kg *
+                                   std::pow(body_.wheel_radius_m / body_.final_drive, 2)),
+      cos_wedge_(std::cos(variator_.half_wedge_angle_rad)) {
+  const double span = std::log(variator_.ratio_overdrive / variator_.ratio_low);
+  for (int i = 0; i < kRadii; ++i) {
+    const double ratio = variator_.ratio_low * std::exp(span * i / (kRadii - 1));
+    radius_m_[static_cast<std::size_t>(i)] =
+        estimator::running_radii(ratio, variator_.belt_length_m, variator_.centre_distance_m)
+            .primary_m;
+  }
+}
+
+double VehiclePlant::primary_radius_m(double ratio) const {
+  const double span = std::log(variator_.ratio_overdrive / variator_.ratio_low);
+  const double place = std::clamp(std::log(ratio / variator_.ratio_low) / span, 0.0, 1.0) *
+                       static_cast<double>(kRadii - 1);
+  const auto i = std::min(static_cast<std::size_t>(place), static_cast<std::size_t>(kRadii - 2));
+  const double share = place - static_cast<double>(i);
+  return radius_m_[i] + share * (radius_m_[i + 1] - radius_m_[i]);
+}
+
+double VehiclePlant::speed_m_s() const {
+  return state_.omega_s_rad_s * body_.wheel_radius_m / body_.final_drive;
+}
+
+void VehiclePlant::settle(double speed_m_s, double ratio, double idle_rad_s) {
+  state_.ratio = ratio;
+  state_.omega_s_rad_s = speed_m_s * body_.final_drive / body_.wheel_radius_m;
+  state_.omega_p_rad_s = state_.omega_s_rad_s / ratio;
+  state_.omega_e_rad_s = std::max(state_.omega_p_rad_s, idle_rad_s);
+  observe({});
+}
+
+VehiclePlant::Held VehiclePlant::hold(const DrivelineInput& input) const {
+  Held held;
+  const double span = std::log(variator_.ratio_overdrive / variator_.ratio_low);
+  const double low_share =
+      std::clamp(std::log(variator_.ratio_overdrive / state_.ratio) / span, 0.0, 1.0);
+  held.curve = belt_.overdrive;
+  held.curve.peak_slip_percent +=
+      low_share * (belt_.low_peak_slip_percent - belt_.overdrive.peak_slip_percent);
+  const double speed = std::max(state_.omega_p_rad_s, kLeastSpeed_rad_s) / kReferenceSpeed_rad_s;
+  const double force = std::max(input.secondary_force_N, 1.0) / kReferenceForce_N;
+  held.curve.mu_max *=
+      (1.0 + low_share * (belt_.low_mu_factor - 1.0)) * (1.0 - input.wear) *
+      std::max(0.2, 1.0 + belt_.temperature_per_K * (input.oil_degC - kReferenceTemperature_degC)) *
+      std::max(0.2, 1.0 + belt_.speed_per_ln * std::log(speed)) *
+      std::pow(force, -belt_.load_exponent);
+  held.ratio = state_.ratio * (1.0 - variator_.deformation_per_N * input.secondary_force_N -
+                               variator_.deformation_per_Nm * output_.belt_torque_Nm);
+  held.radius_m = primary_radius_m(state_.ratio);
+  held.torque_per_mu = 2.0 * input.secondary_force_N * held.radius_m / cos_wedge_;
+  return held;
+}
+
+VehiclePlant::Slip VehiclePlant::slip_of(double ratio, double omega_p_rad_s, double omega_s_rad_s) {
+  const double difference = ratio * omega_p_rad_s - omega_s_rad_s;
+  const double primary = ratio * omega_p_rad_s;
+  const double secondary = 0.5 * omega_s_rad_s;  // macro slip of a stalled engine ends at -100 %
+  const double least = ratio * kLeastSpeed_rad_s;
+  if (primary >= secondary && primary >= least) {
+    return {difference / primary, omega_s_rad_s / (primary * omega_p_rad_s), -1.0 / primary};
+  }
+  if (secondary >= least) {
+    return {difference / secondary, ratio / secondary,
+            -1.0 / secondary - 0.5 * difference / (secondary * secondary)};
+  }
+  return {difference / least, ratio / least, -1.0 / least};
+}
+
+VehiclePlant::Rates VehiclePlant::rates(const std::array<double, 3>& omega,
+                                        const DrivelineInput& input, const Held& held) const {
+  const Slip slip = slip_of(held.ratio, omega[1], omega[2]);
+  const FrictionPoint friction = friction_at(held.curve, slip.value);
+  const double belt = held.torque_per_mu * friction.mu;
+  const double belt_per_p = held.torque_per_mu * friction.slope * slip.per_p;
+  const double belt_per_s = held.torque_per_mu * friction.slope * slip.per_s;
+
+  const double difference = omega[0] - omega[1];
+  const double t = std::tanh(difference / kClutchWidth_rad_s);
+  const double clutch =
+      input.lockup_capacity_Nm * t + kConverter_Nm_s2 * difference * std::abs(difference);
+  const double clutch_slope = input.lockup_capacity_Nm * (1.0 - t * t) / kClutchWidth_rad_s +
+                              2.0 * kConverter_Nm_s2 * std::abs(difference);
+
+  const double loss =
+      variator_.primary_loss_Nm + variator_.primary_loss_Nm_per_N * input.secondary_force_N;
+  const double tp = std::tanh(omega[1] / kCoulombWidth_rad_s);
+  const double ts = std::tanh(omega[2] / kCoulombWidth_rad_s);
+  const double speed_per_omega = body_.wheel_radius_m / body_.final_drive;
+  const double speed = omega[2] * speed_per_omega;
+  const double weight_N = body_.mass_kg * kGravity_m_s2;
+  const double coulomb_Nm = variator_.secondary_loss_Nm + input.brake_Nm +
+                            weight_N * body_.rolling_resistance * speed_per_omega;
+  const double air = 0.5 * kAirDensity_kg_m3 * body_.drag_area_m2 * speed_per_omega;
+  const double road =
+      coulomb_Nm * ts + variator_.secondary_loss_Nm_s * omega[2] + air * speed * std::abs(speed) +
+      weight_N * body_.grade_percent / 100.0 * speed_per_omega + input.disturbance_Nm;
+  const double road_slope = coulomb_Nm * (1.0 - ts * ts) / kCoulombWidth_rad_s +
+                            variator_.secondary_loss_Nm_s +
+                            2.0 * air * std::abs(speed) * speed_per_omega;
+
+  Rates r;
+  const double je = engine_inertia_kg_m2_;
+  const double jp = variator_.primary_inertia_kg_m2;
+  const double js = secondary_inertia_kg_m2_;
+  r.value = {(input.engine_torque_Nm - clutch) / je, (clutch - loss * tp - belt) / jp,
+             (belt / held.ratio - road) / js};
+  r.jacobian[0] = {-clutch_slope / je, clutch_slope / je, 0.0};
+  r.jacobian[1] = {clutch_slope / jp,
+                   (-clutch_slope - loss * (1.0 - tp * tp) / kCoulombWidth_rad_s - belt_per_p) / jp,
+                   -belt_per_s / jp};
+  r.jacobian[2] = {0.0, belt_per_p / held.ratio / js, (belt_per_s / held.ratio - road_slope) / js};
+  return r;
+}
+
+void VehiclePlant::shift(const DrivelineInput& input, double step_s) {
+  const double force_ratio =
+      std::max(input.primary_force_N, 1.0) / std::max(input.secondary_force_N, 1.0);
+  const double capacity_Nm =
+      2.0 * output_.mu_max * input.secondary_force_N * output_.primary_radius_m / cos_wedge_;
+  const double load = std::clamp(output_.belt_torque_Nm / std::max(capacity_Nm, 1.0), -1.0, 1.0);
+  const double equilibrium =
+      variator_.force_ratio_slope * std::log(state_.ratio) + variator_.force_ratio_load * load;
+  const double rate = std::max(state_.omega_p_rad_s, 0.0) * variator_.shift_gain *
+                      wedge_factor(variator_.half_wedge_angle_rad) * state_.ratio *
+                      (std::log(force_ratio) - equilibrium);
+  state_.ratio =
+      std::clamp(state_.ratio + rate * step_s, variator_.ratio_low, variator_.ratio_overdrive);
+}
+
+void VehiclePlant::observe(const DrivelineInput& input) {
+  const Held held = hold(input);
+  const Slip slip = slip_of(held.ratio, state_.omega_p_rad_s, state_.omega_s_rad_s);
+  output_.slip = slip.value;
+  output_.mu = friction_at(held.curve, slip.value).mu;
+  output_.mu_max = held.curve.mu_max;
+  output_.peak_slip = held.curve.peak_slip_percent / 100.0;
+  output_.geometric_ratio = held.ratio;
+  output_.primary_radius_m = held.radius_m;
+  output_.belt_torque_Nm = held.torque_per_mu * output_.mu;
+  const double secondary_radius_m = held.radius_m / held.ratio;
+  output_.slip_speed_m_s =
+      std::abs(held.ratio * state_.omega_p_rad_s - state_.omega_s_rad_s) * secondary_radius_m;
+  output_.slip_power_W = std::abs(output_.belt_torque_Nm) * output_.slip_speed_m_s / held.radius_m;
+}
+
+void VehiclePlant::step(const DrivelineInput& input, double step_s) {
+  // W = I - gamma h J;  W k1 = f(x);  W k2 = f(x + h k1) - 2 k1;  x += h (3 k1 + k2) / 2.
+  const Held held = hold(input);
+  const double gamma_h = (1.0 - std::sqrt(0.5)) * step_s;
+  const std::array<double, 3> x{state_.omega_e_rad_s, state_.omega_p_rad_s, state_.omega_s_rad_s};
+  const Rates first = rates(x, input, held);
+  std::array<std::array<double, 3>, 3> w{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      w[i][j] = (i == j ? 1.0 : 0.0) - gamma_h * first.jacobian[i][j];
+    }
+  }
+  const std::array<double, 3> k1 = solve(w, first.value);
+  std::array<double, 3> trial{};
+  for (std::size_t i = 0; i < 3; ++i) trial[i] = x[i] + step_s * k1[i];
+  Rates second = rates(trial, input, held);
+  for (std::size_t i = 0; i < 3; ++i) second.value[i] -= 2.0 * k1[i];
+  const std::array<double, 3> k2 = solve(w, second.value);
+  state_.omega_e_rad_s += step_s * (1.5 * k1[0] + 0.5 * k2[0]);
+  state_.omega_p_rad_s += step_s * (1.5 * k1[1] + 0.5 * k2[1]);
+  state_.omega_s_rad_s += step_s * (1.5 * k1[2] + 0.5 * k2[2]);
+  shift(input, step_s);
+  observe(input);
+}
+
+bool VehiclePlant::finite() const {
+  return std::isfinite(state_.omega_e_rad_s) && std::isfinite(state_.omega_p_rad_s) &&
+         std::isfinite(state_.omega_s_rad_s) && std::isfinite(state_.ratio);
+}
+
+}  // namespace beltgrip::sim

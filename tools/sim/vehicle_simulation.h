@@ -1,0 +1,109 @@
+// The whole virtual vehicle in virtual time: driver, engine, driveline, hydraulics, controller.
+// Integer nanoseconds. Keeps the truth that the invariants are judged by. Simulation only.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "can_dbc/can_frame.h"
+#include "tools/sim/fault_script.h"
+#include "tools/sim/hydraulic_actuator.h"
+#include "tools/sim/tcu_model.h"
+#include "tools/sim/vehicle_driver.h"
+#include "tools/sim/vehicle_engine.h"
+#include "tools/sim/vehicle_plant.h"
+
+namespace beltgrip::sim {
+
+// True values of what the vehicle's sensors measure, SI.
+struct VehicleSignals {
+  double omega_e_rad_s = 0.0;
+  double omega_p_rad_s = 0.0;
+  double omega_s_rad_s = 0.0;
+  double angle_p_rad = 0.0;
+  double angle_s_rad = 0.0;
+  double torque_e_Nm = 0.0;  // as the engine's controller knows it
+  double accelerator = 0.0;
+  double secondary_pressure_Pa = 0.0;
+  double primary_pressure_Pa = 0.0;
+  double secondary_pressure_command_Pa = 0.0;
+  double oil_degC = 0.0;
+  double speed_m_s = 0.0;
+  double brake_pressed = 0.0;
+  double lockup_closed = 0.0;
+  double experiment_permitted = 0.0;
+};
+
+// What no sensor sees.
+struct VehicleTruth {
+  DrivelineOutput belt;
+  double secondary_force_N = 0.0;
+  double ratio = 0.0;
+  bool obeying = false;  // the controller obeys a request
+  double own_force_N = 0.0;
+  bool engine_running = true;
+  int stalls = 0;
+};
+
+// One request that the controller obeyed, from its begin until kAfter_s after its end.
+struct RequestTruth {
+  static constexpr double kAfter_s = 1.0;
+  double begin_s = 0.0;
+  double end_s = 0.0;
+  bool over = false;
+  double mu_max = 0.0;  // of the belt when it peaked, or at the end
+  bool peak_passed = false;
+  double slip_max = 0.0;  // fraction, magnitude
+  double slip_speed_max_m_s = 0.0;
+  double slip_at_end = 0.0;     // when the controller took its force back
+  double macro_energy_J = 0.0;  // dissipated beyond the slip at the peak
+  double mu_star_max = 0.0;     // largest coefficient in use
+  double force_min_N = 0.0;
+};
+
+class VehicleSimulation {
+ public:
+  VehicleSimulation(const VehicleScenario& scenario, std::uint64_t seed);
+
+  void step();
+  // A frame that reaches the transmission controller at t_ns.
+  void deliver(const can::CanFrame& frame, std::int64_t t_ns);
+  bool finished() const { return now_ns_ >= end_ns_; }
+  bool finite() const { return plant_.finite(); }
+  std::int64_t now_ns() const { return now_ns_; }
+  std::int64_t step_ns() const { return step_ns_; }
+  const VehicleSignals& signals() const { return signals_; }
+  const VehicleTruth& truth() const { return truth_; }
+  const std::vector<RequestTruth>& requests() const { return requests_; }
+  const TcuOutput& tcu() const { return tcu_.output(); }
+  const FaultScript& faults() const { return faults_; }
+  const VehicleScenario& scenario() const { return scenario_; }
+
+ private:
+  void control(double t_s, const DriverOutput& driver);
+  void observe(double t_s);
+
+  VehicleScenario scenario_;
+  FaultScript faults_;
+  VehicleDriver driver_;
+  VehicleEngine engine_;
+  VehiclePlant plant_;
+  TcuModel tcu_;
+  HydraulicActuator secondary_;
+  HydraulicActuator primary_;
+  CoulombPlay play_;
+  std::int64_t step_ns_;
+  std::int64_t end_ns_;
+  std::int64_t cycle_ns_;
+  std::int64_t next_cycle_ns_ = 0;
+  std::int64_t now_ns_ = 0;
+  double step_s_;
+  std::deque<can::StampedFrame> to_tcu_;
+  VehicleSignals signals_;
+  VehicleTruth truth_;
+  std::vector<RequestTruth> requests_;
+};
+
+}  // namespace beltgrip::sim
