@@ -10,7 +10,7 @@ TEST(Program, HelpsAndNamesItsVersionEverywhere) {
   const RunResult help = beltgrip({"--help"});
   EXPECT_EQ(help.status, 0);
   EXPECT_EQ(help.err, "");
-  for (const char* name : {"init", "replay", "simulate"}) {
+  for (const char* name : {"init", "monitor", "replay", "run-demo", "simulate"}) {
     EXPECT_NE(help.out.find(name), std::string::npos) << name;
     const RunResult own = beltgrip({name, "--help"});
     EXPECT_EQ(own.status, 0) << name;
@@ -45,6 +45,11 @@ TEST(Program, AMistakeOnTheCommandLineIsOneLine) {
       {"simulate", "--seed", "x", "--log-out", "-"},
       {"simulate", "--start", "-1", "--log-out", "-"},
       {"simulate", "--log-out", "a", "--out-dir", "b"},
+      {"simulate", "--bus", "vcan0", "--speed", "0"},
+      {"replay", "x.log", "--bus", "vcan0", "--json", "-"},
+      {"replay", "x.log", "y.log", "--bus", "vcan0"},
+      {"monitor"},
+      {"run-demo", "--method", "magic"},
       {"init"}};
   for (const auto& arguments : mistakes) {
     const RunResult result = beltgrip(arguments);
@@ -53,6 +58,17 @@ TEST(Program, AMistakeOnTheCommandLineIsOneLine) {
     EXPECT_EQ(lines(result.err), 1) << shown << ": " << result.err;
     EXPECT_EQ(result.out, "") << shown;
   }
+}
+
+// In real time: five seconds.
+TEST(Program, DemoEndsWithTheVerdictBesideTheTruth) {
+  const RunResult result = beltgrip({"run-demo", "--start", "88", "--duration", "5"});
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_NE(result.out.find("STOP"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("peak at 89.51 s"), std::string::npos) << result.out;
+  const std::string mistake = beltgrip({"run-demo", "--start", "5000"}).err;
+  EXPECT_NE(mistake.find("--start"), std::string::npos) << mistake;
+  EXPECT_EQ(beltgrip({"run-demo", "--set", "run.cycles=-1"}).status, 78);
 }
 
 }  // namespace

@@ -83,10 +83,15 @@ void print_speed(std::uint64_t frames, std::chrono::steady_clock::time_point beg
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
-  std::fprintf(
-      stderr, "beltgrip: %llu frames in %.3f s, %.2f million frames/s, peak memory %.1f MB\n",
-      static_cast<unsigned long long>(frames), wall_s, static_cast<double>(frames) / wall_s * 1e-6,
-      static_cast<double>(usage.ru_maxrss) / 1024.0);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_usec) * 1e-6;
+  };
+  std::fprintf(stderr,
+               "beltgrip: %llu frames in %.3f s, %.2f million frames/s; processor %.3f s, peak "
+               "memory %.1f MB\n",
+               static_cast<unsigned long long>(frames), wall_s,
+               static_cast<double>(frames) / wall_s * 1e-6,
+               static_cast<double>(usage.ru_maxrss) / 1024.0);
 }
 
 // The logs as one timeline onto a bus in real time; BeltGrip's own frames stay out.
