@@ -66,7 +66,8 @@ std::string lower(std::string_view text) {
 // What a role says in its TOML value.
 struct RoleText {
   std::string signal;
-  std::optional<std::string> unit;
+  std::string unit;
+  bool has_unit = false;
   double scale = 1.0, offset = 0.0;
   std::optional<double> period_ms;
   std::uint32_t signal_line = 0, unit_line = 0;
@@ -97,6 +98,7 @@ std::optional<RoleText> read_role(const std::string& key, const TomlNode& node,
       if (child.type != TomlType::kText) wrong(child, "text \"Message.Signal\"");
     } else if (child.key == "unit") {
       text.unit = child.text;
+      text.has_unit = true;
       text.unit_line = child.line;
       if (child.type != TomlType::kText) wrong(child, "text such as \"rpm\"");
     } else if (child.key == "scale") {
@@ -131,9 +133,9 @@ std::optional<can::Unit> role_unit(Role role, const std::string& key, const Role
                                    const can::SignalDef& signal, const std::string& dbc_path,
                                    ConfigErrors& errors) {
   const can::Dimension dimension = role_dimension(role);
-  const std::string unit_text = text.unit.value_or(signal.unit);
+  const std::string& unit_text = text.has_unit ? text.unit : signal.unit;
   const std::optional<can::Unit> unit = can::parse_unit(unit_text);
-  const std::string where = text.unit ? "" : " in " + dbc_path;
+  const std::string where = text.has_unit ? "" : " in " + dbc_path;
   const std::string found =
       unit_text.empty() ? "no unit" + where : "unit " + in_quotes(unit_text) + where;
   if (dimension == can::Dimension::kNone) {
@@ -147,7 +149,8 @@ std::optional<can::Unit> role_unit(Role role, const std::string& key, const Role
   }
   const std::string wanted = "a unit of " + std::string(can::dimension_name(dimension)) +
                              " such as " + std::string(can::si_unit_text(dimension));
-  const std::string hint = text.unit ? "" : "; set unit in { signal = \"...\", unit = \"...\" }";
+  const std::string hint =
+      text.has_unit ? "" : "; set unit in { signal = \"...\", unit = \"...\" }";
   if (!unit || unit->dimension == can::Dimension::kNone) {
     errors.add(text.unit_line, key, found, wanted + hint);
     return {};

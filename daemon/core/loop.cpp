@@ -8,8 +8,9 @@ namespace beltgrip::daemon {
 namespace {
 
 constexpr std::size_t kBatch = 64;
-// Samples that are later than this are given up: their inputs would be stale.
-constexpr Duration kLatenessMaximum = 50 * kMillisecond;
+// Samples that are later than this are given up: the socket's buffer may not have held their
+// frames.
+constexpr Duration kLatenessMaximum = 100 * kMillisecond;
 
 class Loop {
  public:
@@ -39,6 +40,8 @@ class Loop {
  private:
   void receive() noexcept {
     const std::size_t count = port_.receive(frames_);
+    // A port that announces frames and has none must not keep the samples from their turn.
+    if (count == 0 && port_.now() >= next_) sample();
     for (std::size_t i = 0; i < count; ++i) {
       // A frame that came after a sample's instant is not seen by that sample, however late it is.
       while (frames_[i].t > next_) sample();

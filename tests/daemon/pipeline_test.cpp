@@ -388,6 +388,29 @@ TEST(Pipeline, SamplesThatAreLostAbortAndTheLoopGoesOn) {
   }
 }
 
+TEST(Pipeline, APortThatAnnouncesFramesItHasNotDoesNotStopTheSamples) {
+  class EmptyPort final : public Port {
+   public:
+    MonoTime now() noexcept override { return now_; }
+    Wake wait_until(MonoTime) noexcept override {
+      now_ += kMillisecond;
+      return ++waits_ > 1000 ? Wake::kClosed : Wake::kFrames;
+    }
+    std::size_t receive(std::span<RxFrame>) noexcept override { return 0; }
+    SendResult send(const can::CanFrame&) noexcept override { return SendResult::kSent; }
+    BusState bus_state() noexcept override { return BusState::kActive; }
+
+   private:
+    int waits_ = 0;
+    MonoTime now_ = 0;
+  };
+  EmptyPort port;
+  test::ReportKeeper keeper;
+  Pipeline pipeline(test::vehicle_config());
+  run_loop(port, pipeline, 200.0, StopReason::kShutdown, &keeper);
+  EXPECT_NEAR(static_cast<double>(keeper.reports.size()), 202.0, 2.0);
+}
+
 TEST(Pipeline, OwnIdentifiersAreNoInputAndAForeignSenderIsLatched) {
   const Config config = test::vehicle_config();
   Pipeline pipeline(config);

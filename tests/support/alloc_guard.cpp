@@ -40,6 +40,15 @@ using beltgrip::test::note_allocation;
 using beltgrip::test::note_free;
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define BELTGRIP_SANITIZER_ALLOCATES
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || \
+    __has_feature(memory_sanitizer)
+#define BELTGRIP_SANITIZER_ALLOCATES
+#endif
+#endif
+
+#ifdef BELTGRIP_SANITIZER_ALLOCATES
 
 extern "C" {
 void __sanitizer_malloc_hook(const volatile void*, std::size_t size) { note_allocation(size); }
