@@ -397,12 +397,6 @@ void Loader::check_across() {
 
 // What a request for clamping force needs beyond what observation does.
 void Loader::check_command() {
-  const ExperimentSettings& settings = config_.experiment;
-  if (settings.torque_min_Nm >= settings.torque_max_Nm) {
-    errors_.add(line_of("experiment", "torque_min_Nm"), "experiment.torque_min_Nm",
-                number_text(settings.torque_min_Nm),
-                "less than torque_max_Nm, " + number_text(settings.torque_max_Nm));
-  }
   if (config_.control != Control::kCommand) return;
   if (config_.trigger != Trigger::kCoastDown && config_.trigger != Trigger::kSteady) {
     errors_.add(line_of("experiment", "trigger"), "experiment.trigger",

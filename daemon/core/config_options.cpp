@@ -176,14 +176,14 @@ const Option kOptions[] = {
     choice<&Config::trigger>(
         "experiment", "trigger", kTriggers,
         "When an experiment runs: \"coast_down\" in overrun with the foot off the pedal, "
-        "\"steady\" under a\nsteady drive torque, each while everything in [experiment] holds; "
-        "\"signal\" while experiment_active is 1;\n\"always\" from the first to the last sample."),
+        "\"steady\" under a\nsteady drive torque, each while everything below holds; \"signal\" "
+        "while experiment_active is 1;\n\"always\" from the first to the last sample."),
     choice<&Config::control>(
         "experiment", "control", kControls,
         "\"observe\" never sends a clamp request. \"command\" asks the transmission controller to "
-        "lower the\nclamping force; needs trigger \"coast_down\" or \"steady\", "
-        "variator.primary_inertia_kg_m2, and the roles\nexperiment_permitted, accelerator_pedal, "
-        "brake_pressed, lockup_closed, oil_temperature, vehicle_speed."),
+        "lower the\nclamping force; it needs trigger \"coast_down\" or \"steady\", "
+        "variator.primary_inertia_kg_m2, and\nthe roles experiment_permitted, accelerator_pedal, "
+        "brake_pressed, lockup_closed, oil_temperature\nand vehicle_speed."),
     choice<&Config::estimator, &estimator::EstimatorSettings::ratio>(
         "experiment", "ratio", kRatios, "The end stop at which slip is defined."),
     choice<&Config::estimator, &estimator::EstimatorSettings::stop_rule>(
@@ -193,15 +193,15 @@ const Option kOptions[] = {
         "experiment", "ramp_rate_max_N_per_s", "N/s", 1.0, 10e3,
         [](Config& c) -> double& { return c.estimator.ramp_rate_max_N_per_s; },
         "The fastest ramp of the clamping force that is used or to be expected. The rate used is "
-        "chosen up to this:\nthe fastest whose worst-case reaction stays inside the slip limits."),
+        "the "
+        "fastest\nup to this whose worst-case reaction stays inside the slip limits."),
     number(
-        "experiment", "torque_min_Nm", "Nm", 3.0, 1000.0,
+        "experiment", "torque_min_Nm", "Nm", 3.0, 50.0,
         [](Config& c) -> double& { return c.experiment.torque_min_Nm; },
         "Least magnitude of the torque on the belt, triggers \"coast_down\" and \"steady\"."),
     number(
-        "experiment", "torque_max_Nm", "Nm", 3.0, 1000.0,
-        [](Config& c) -> double& { return c.experiment.torque_max_Nm; },
-        "And the largest; greater than torque_min_Nm."),
+        "experiment", "torque_max_Nm", "Nm", 51.0, 1000.0,
+        [](Config& c) -> double& { return c.experiment.torque_max_Nm; }, "And the largest."),
     number(
         "experiment", "primary_speed_min_rad_s", "rad/s", 20.0, 1000.0,
         [](Config& c) -> double& { return c.experiment.primary_speed_min_rad_s; },

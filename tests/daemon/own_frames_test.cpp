@@ -41,7 +41,7 @@ std::string text_of(const can::CanFrame& frame, const std::string& name) {
   return at == values.end() ? "" : at->second;
 }
 bool passes(const can::CanFrame& frame) {
-  TxGate gate(FrameIdentifiers{}, Control::kCommand);
+  TxGate gate(FrameIdentifiers{}, Control::kCommand, {0.0, 65535.0, 1U << 30, 0});
   return gate.permits(frame);
 }
 

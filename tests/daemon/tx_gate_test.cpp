@@ -34,8 +34,11 @@ can::CanFrame frame_of(std::uint32_t id, std::uint16_t data_id, std::uint8_t cou
   return frame;
 }
 
+// A request of any force may stand at once.
+constexpr ClampLimits kAnyRequest{0.0, 65535.0, 1U << 30, 0};
+
 bool permits(const can::CanFrame& frame, Control control = Control::kObserve) {
-  TxGate gate(FrameIdentifiers{}, control);
+  TxGate gate(FrameIdentifiers{}, control, kAnyRequest);
   const bool permitted = gate.permits(frame);
   EXPECT_EQ(gate.refused(), permitted ? 0U : 1U);
   return permitted;
@@ -146,6 +149,74 @@ TEST(TxGate, ClampIsActiveWithAForceOrNeither) {
   EXPECT_FALSE(clamp(0, 1, 0, 0));
   EXPECT_FALSE(clamp(2, 1, 0, 0));
   EXPECT_FALSE(clamp(1, 1, 0, 1));
+}
+
+// Clamp frames in a row with the right counter.
+class Requests {
+ public:
+  explicit Requests(const ClampLimits& limits)
+      : gate_(FrameIdentifiers{}, Control::kCommand, limits) {}
+  bool ask(unsigned force_N) {
+    const can::CanFrame frame = frame_of(
+        0x6A2, 0x6A2, counter_,
+        {0, static_cast<std::uint8_t>(force_N > 0), static_cast<std::uint8_t>(force_N & 255U),
+         static_cast<std::uint8_t>(force_N >> 8)});
+    counter_ = static_cast<std::uint8_t>((counter_ + 1) % 15);
+    return gate_.permits(frame);
+  }
+  void prepare() {
+    for (int i = 0; i < 5; ++i) EXPECT_TRUE(ask(0));
+  }
+
+ private:
+  TxGate gate_;
+  std::uint8_t counter_ = 0;
+};
+
+TEST(TxGate, NoRequestWithoutLimits) {
+  Requests requests{ClampLimits{}};
+  requests.prepare();
+  EXPECT_FALSE(requests.ask(3000));
+}
+
+TEST(TxGate, EachLimitOfARequestAlone) {
+  const ClampLimits limits{1000.0, 4.0, 20};
+  const auto prepared = [&limits] {
+    Requests requests(limits);
+    requests.prepare();
+    return requests;
+  };
+  Requests early(limits);
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(early.ask(0));
+  EXPECT_FALSE(early.ask(3000));  // five inactive frames first
+
+  Requests falls = prepared();
+  EXPECT_TRUE(falls.ask(3000));
+  EXPECT_TRUE(falls.ask(3000));
+  EXPECT_TRUE(falls.ask(2996));
+  EXPECT_FALSE(falls.ask(2991));
+  EXPECT_FALSE(falls.ask(2991));  // over: inactive frames before the next
+  falls.prepare();
+  EXPECT_TRUE(falls.ask(2000));
+
+  Requests rises = prepared();
+  EXPECT_TRUE(rises.ask(3000));
+  EXPECT_FALSE(rises.ask(3001));
+
+  Requests floor = prepared();
+  EXPECT_FALSE(floor.ask(999));
+  floor.prepare();
+  EXPECT_TRUE(floor.ask(1000));
+  EXPECT_FALSE(floor.ask(999));
+
+  Requests lasts = prepared();
+  for (int i = 0; i < 20; ++i) EXPECT_TRUE(lasts.ask(3000));
+  EXPECT_FALSE(lasts.ask(3000));
+
+  Requests pause = prepared();
+  EXPECT_TRUE(pause.ask(3000));
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(pause.ask(0));
+  EXPECT_FALSE(pause.ask(3000));
 }
 
 TEST(TxGate, ConfiguredIdentifiersKeepTheirDataIds) {
