@@ -79,6 +79,7 @@ std::optional<SeenFrame> BusSocket::receive(Milliseconds limit) const {
   message.msg_control = control.data();
   message.msg_controllen = control.size();
   const ssize_t size = recvmsg(fd_, &message, 0);
+  if (size < 0 && (errno == ENETDOWN || errno == ENODEV)) return std::nullopt;
   if (size < 0) fail("recvmsg");
   seen.fd = size == CANFD_MTU;
   for (cmsghdr* each = CMSG_FIRSTHDR(&message); each; each = CMSG_NXTHDR(&message, each)) {

@@ -35,7 +35,7 @@ class BusSocket {
 
   void send(canid_t id, const std::vector<std::uint8_t>& data) const;
   void send_fd(canid_t id, const std::vector<std::uint8_t>& data) const;
-  // The next frame, or nothing within the limit.
+  // The next frame, or nothing within the limit or once the interface has gone down.
   std::optional<SeenFrame> receive(Milliseconds limit) const;
   // The first frame for which `wanted` holds; the frames before it are dropped.
   std::optional<SeenFrame> receive_until(const std::function<bool(const SeenFrame&)>& wanted,
