@@ -1,7 +1,10 @@
 // beltgripd as a process on SocketCAN: start, stop, and an interface that is missing, down,
 // deleted.
 #include <gtest/gtest.h>
+#include <linux/can/error.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <fstream>
@@ -219,16 +222,107 @@ TEST_F(Daemon, TwoInterfacesAreTwoWorlds) {
   EXPECT_EQ(published1.problems(), std::vector<std::string>{});
 }
 
+bool fault(const PublishedFrames& published, const std::string& name) {
+  return has_status(published) && published.last("BeltGripStatus").signals.at("Fault" + name) == 1;
+}
+
 TEST_F(Daemon, AnotherNodeThatSendsItsFramesIsAFault) {
   const BusSocket bus("vcan0");
   const Process daemon(argv());
   PublishedFrames published;
   ASSERT_TRUE(listen(bus, published, has_status));
-  EXPECT_EQ(published.last("BeltGripStatus").signals.at("FaultForeignSender"), 0);
+  EXPECT_FALSE(fault(published, "ForeignSender"));
   bus.send(0x6A1, {0, 0, 0, 0, 0, 0, 0, 0});
+  EXPECT_TRUE(listen(bus, published,
+                     [](const PublishedFrames& seen) { return fault(seen, "ForeignSender"); }));
+}
+
+TEST_F(Daemon, ASecondDaemonOnTheSameBusIsAFaultInBoth) {
+  const BusSocket bus("vcan0");
+  Process first(argv());
+  Process second(argv());
+  EXPECT_TRUE(first.wait_for_error("ForeignSender", kLimit)) << first.err();
+  EXPECT_TRUE(second.wait_for_error("ForeignSender", kLimit)) << second.err();
+}
+
+// Frames that the daemon must not take for an input, though they have its identifier.
+struct WrongFrame {
+  const char* name;
+  canid_t id;
+  std::vector<std::uint8_t> data;
+  bool fd;
+};
+
+class WrongFrames : public Daemon, public testing::WithParamInterface<WrongFrame> {};
+
+TEST_P(WrongFrames, AreAFaultThatGoesAgain) {
+  const BusSocket bus("vcan0");
+  const Process player(canplayer(write_steady_log(folder()), "vcan0", true));
+  Process daemon(argv());
+  PublishedFrames published;
+  ASSERT_TRUE(listen(bus, published, has_inputs)) << daemon.err();
+  EXPECT_FALSE(fault(published, "InputFrame"));
+  if (GetParam().fd) {
+    bus.send_fd(GetParam().id, GetParam().data);
+  } else {
+    bus.send(GetParam().id, GetParam().data);
+  }
+  ASSERT_TRUE(listen(bus, published, [](const PublishedFrames& seen) {
+    return fault(seen, "InputFrame");
+  })) << daemon.err();
   EXPECT_TRUE(listen(bus, published, [](const PublishedFrames& seen) {
-    return seen.last("BeltGripStatus").signals.at("FaultForeignSender") == 1;
+    return has_inputs(seen) && !fault(seen, "InputFrame");
+  })) << daemon.err();
+  EXPECT_EQ(published.problems(), std::vector<std::string>{});
+}
+
+INSTANTIATE_TEST_SUITE_P(, WrongFrames,
+                         testing::Values(WrongFrame{"TooShort", 0x110, {1, 2, 3}, false},
+                                         WrongFrame{"Empty", 0x120, {}, false},
+                                         WrongFrame{"Fd", 0x130, {1, 2, 3, 4, 5, 6}, true},
+                                         WrongFrame{"FdLong", 0x110,
+                                                    std::vector<std::uint8_t>(64, 0xFF), true}),
+                         [](const auto& test) { return test.param.name; });
+
+TEST_F(Daemon, BusOffIsAFaultUntilFramesComeAgain) {
+  const std::string steady = write_steady_log(folder());
+  const BusSocket bus("vcan0");
+  const Process daemon(argv());
+  PublishedFrames published;
+  ASSERT_TRUE(listen(bus, published, has_status));
+  bus.send(CAN_ERR_FLAG | CAN_ERR_BUSOFF, {0, 0, 0, 0, 0, 0, 0, 0});
+  ASSERT_TRUE(
+      listen(bus, published, [](const PublishedFrames& seen) { return fault(seen, "BusOff"); }));
+  const Process player(canplayer(steady, "vcan0", true));
+  EXPECT_TRUE(listen(bus, published, [](const PublishedFrames& seen) {
+    return has_inputs(seen) && !fault(seen, "BusOff");
   }));
+}
+
+// What cannot be foreseen: every kind of frame that can-utils make, as fast as they can.
+TEST_F(Daemon, OutlivesRandomFrames) {
+  const BusSocket bus("vcan0");
+  Process daemon(argv());
+  PublishedFrames published;
+  ASSERT_TRUE(listen(bus, published, has_status));
+  const std::vector<std::vector<std::string>> kinds{{}, {"-e"}, {"-f"}, {"-R"}, {"-e", "-f"}};
+  for (const std::vector<std::string>& kind : kinds) {
+    std::vector<std::string> cangen{"cangen", "vcan0", "-g", "0", "-n", "4000", "-i", "-x"};
+    cangen.insert(cangen.end(), kind.begin(), kind.end());
+    EXPECT_EQ(run(cangen, kLimit).status, 0);
+  }
+  // Inputs with random content, in range or not.
+  for (const char* id : {"110", "120", "130"}) {
+    EXPECT_EQ(run({"cangen", "vcan0", "-g", "0", "-n", "2000", "-I", id, "-L", "r"}, kLimit).status,
+              0);
+  }
+  const Process player(canplayer(write_steady_log(folder()), "vcan0", true));
+  const BusSocket quiet("vcan0");
+  PublishedFrames after;
+  EXPECT_TRUE(listen(quiet, after, has_inputs)) << daemon.err();
+  EXPECT_EQ(after.problems(), std::vector<std::string>{});
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(kStopLimit), 0) << daemon.err();
 }
 
 }  // namespace
