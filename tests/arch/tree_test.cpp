@@ -79,6 +79,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Planted{"daemon/io/a.cpp", "port.send(frame);"},
                     Planted{"daemon/io/a.cpp", "port->send(frame);"},
                     Planted{"daemon/io/a.cpp", "n = sendmmsg(fd, m, 1, 0);"},
+                    Planted{"daemon/io/a.cpp", "if (::write(fd, &frame, n) != n) return;"},
                     Planted{"estimator/a.cpp", "auto* p = new Sample;"},
                     Planted{"estimator/a.cpp", "samples.push_back(s);"},
                     Planted{"daemon/core/pipeline.cpp", "std::function<void()> f;"},
@@ -112,6 +113,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Planted{"estimator/a.cpp", "int renewed = 1'000'000; int n = renewed;"},
                     Planted{"estimator/a.cpp", "char c = '\"'; int n = 0; char d = '\"';"},
                     Planted{"daemon/core/config.cpp", "roles.push_back(role);"},
+                    Planted{"can_dbc/a.cpp", "void Writer::write(int a) {}"},
                     Planted{"daemon/io/socket_port.cpp", "#include <sys/socket.h>"},
                     Planted{"tools/sim/a.cpp", "#include \"estimator/variator_geometry.h\""},
                     Planted{"README.md", "the framework/work of vcan"}));
