@@ -192,9 +192,8 @@ const Option kOptions[] = {
     number(
         "experiment", "ramp_rate_max_N_per_s", "N/s", 1.0, 10e3,
         [](Config& c) -> double& { return c.estimator.ramp_rate_max_N_per_s; },
-        "The fastest ramp of the clamping force that is used or to be expected. The rate used is "
-        "the "
-        "fastest\nup to this whose worst-case reaction stays inside the slip limits."),
+        "The fastest ramp of the clamping force that is used or to be expected. The rate used is\n"
+        "the fastest up to this whose worst-case reaction stays inside the slip limits."),
     number(
         "experiment", "torque_min_Nm", "Nm", 3.0, 50.0,
         [](Config& c) -> double& { return c.experiment.torque_min_Nm; },

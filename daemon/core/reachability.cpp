@@ -26,7 +26,7 @@ struct Growth {
   }
   double area(double t) const noexcept {  // integral of slip
     const double e = std::expm1(a * t);
-    return b / (a * a) * ((e - a * t) / a - 0.5 * t * t) + v0 / a * (e / a - t);
+    return b / (a * a) * ((e - a * t) / a - 0.5 * a * t * t) + v0 / a * (e / a - t);
   }
 };
 

@@ -25,6 +25,8 @@ const std::array kLayers{
     LayerRule{"daemon/core/tx_gate.",
               {"can_dbc/", "daemon/core/tx_gate.h", "daemon/core/config.h", "daemon/core/result.h",
                "daemon/core/mono_time.h"}},
+    LayerRule{"daemon/core/safety_monitor.",
+              {"daemon/core/safety_monitor.h", "daemon/core/mono_time.h"}},
     LayerRule{"daemon/core/", {"can_dbc/", "estimator/", "daemon/core/"}},
     LayerRule{"daemon/io/", {"can_dbc/", "estimator/", "daemon/core/", "daemon/io/"}},
     LayerRule{"daemon/", {"can_dbc/", "estimator/", "daemon/"}},

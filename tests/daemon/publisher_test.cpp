@@ -150,5 +150,32 @@ TEST(Publisher, TheEndSendsEverythingOnceMore) {
   EXPECT_EQ(outbox.size, 3U);
 }
 
+TEST(Publisher, ClampFramesWithControlCommandOnly) {
+  Bench bench;
+  bench.now.command = true;
+  const auto run = [&](MonoTime& t, Duration duration) {
+    std::size_t count = 0;
+    for (const MonoTime end = t + duration; t < end; t += kFive) {
+      count += count_of(bench.at(t), 0x6A2);
+    }
+    return count;
+  };
+  MonoTime t = 0;
+  EXPECT_EQ(run(t, kSecond), 5U);  // at start
+  bench.now.clamp = {true, 3000.0};
+  EXPECT_EQ(count_of(bench.at(t), 0x6A2), 1U);  // at once
+  t += kFive;
+  EXPECT_EQ(run(t, kSecond), 100U);
+  bench.now.clamp = {};
+  EXPECT_EQ(count_of(bench.at(t), 0x6A2), 1U);
+  t += kFive;
+  EXPECT_EQ(run(t, kSecond), 4U);
+  Outbox last;
+  bench.publisher.collect_all(t, bench.now, last);
+  EXPECT_EQ(count_of(last, 0x6A2), 5U);
+  EXPECT_EQ(last.frames[0].id.value, 0x6A2U);  // before everything else
+  EXPECT_EQ(last.size, 8U);
+}
+
 }  // namespace
 }  // namespace beltgrip::daemon
