@@ -91,6 +91,7 @@ void print_speed(std::uint64_t frames, std::chrono::steady_clock::time_point beg
                "memory %.1f MB\n",
                static_cast<unsigned long long>(frames), wall_s,
                static_cast<double>(frames) / wall_s * 1e-6,
+               seconds(usage.ru_utime) + seconds(usage.ru_stime),
                static_cast<double>(usage.ru_maxrss) / 1024.0);
 }
 
