@@ -19,6 +19,7 @@ constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::uint32_t kExtendedFlag = 0x8000'0000U;
 constexpr std::string_view kIndependentMessage = "VECTOR__INDEPENDENT_SIG_MSG";
 constexpr std::uint32_t kIndependentId = 0xC000'0000U;
+constexpr std::size_t kExcerptLength = 24;  // of the text that a message quotes
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
@@ -72,7 +73,7 @@ class StatementReader {
   bool expect_name(std::string_view& name, const char* what);
   bool expect_string(std::string& text, StringContext context, const char* what);
   void expect_semicolon();
-  bool fail(const char* expected) { return fail_at(scan_.position(), expected); }
+  bool fail(const char* expected);
   bool fail_at(std::size_t offset, const char* expected);
   void names_until_semicolon(std::vector<std::string>& names);
   std::string take_text(const StringToken& token);
@@ -122,14 +123,21 @@ const std::array<StatementReader::Row, 32> StatementReader::kRows{{
 }};
 
 bool StatementReader::fail_at(std::size_t offset, const char* expected) {
-  const std::size_t line_end = scan_.line_end_from(offset);
-  const std::string found =
-      offset >= draft_.text.size() ? "the end of the file"
-      : line_end == offset
-          ? "the end of the line"
-          : "\"" + clip(scan_.slice(offset, std::min(line_end, offset + 24))) + "\"";
+  const std::string_view rest = scan_.line_rest(offset, kExcerptLength);
+  const std::string found = offset >= draft_.text.size() ? "the end of the file"
+                            : rest.empty()               ? "the end of the line"
+                                                         : "\"" + clip(rest) + "\"";
   draft_.problems.error(offset, "syntax", "found " + found + ", expected " + expected);
   return false;
+}
+
+// What is missing is missing at the end of its line, not at the start of the next.
+bool StatementReader::fail(const char* expected) {
+  const std::size_t offset = scan_.position();
+  std::size_t end = offset;
+  while (end > start_ && static_cast<unsigned char>(draft_.text[end - 1]) <= ' ') --end;
+  const bool next_line = scan_.line_rest(end, offset - end).size() < offset - end;
+  return fail_at(next_line ? end : offset, expected);
 }
 
 bool StatementReader::expect(char c, const char* what) { return scan_.accept(c) || fail(what); }
@@ -192,6 +200,7 @@ bool StatementReader::expect_id(std::uint32_t& raw_id) {
 bool StatementReader::expect_name(std::string_view& name, const char* what) {
   scan_.skip_blank();
   const std::size_t offset = scan_.position();
+  if (scan_.keyword_at(offset)) return fail(what);
   name = scan_.name();
   if (name.empty()) return fail(what);
   if (name.size() > kNameLengthMax) return fail_at(offset, "a name of at most 1024 characters");
@@ -232,10 +241,9 @@ void StatementReader::expect_semicolon() {
     draft_.problems.warn(offset, "semicolon", "expected \";\" at the end of the statement");
     return;
   }
-  draft_.problems.warn(
-      offset, "trailing-text",
-      "text \"" + clip(scan_.slice(offset, std::min(scan_.line_end_from(offset), offset + 24))) +
-          "\" before the end of the statement; kept as text");
+  draft_.problems.warn(offset, "trailing-text",
+                       "text \"" + clip(scan_.line_rest(offset, kExcerptLength)) +
+                           "\" before the end of the statement; kept as text");
   scan_.seek(scan_.statement_end_from(offset));
   draft_.keep(start_, scan_.position());
 }
@@ -280,7 +288,10 @@ void StatementReader::run() {
       draft_.keep(start_, scan_.position());
     }
   }
+  LineCounter lines(draft_.text);
   for (const SourceComment& source : scan_.comments()) {
+    draft_.database.source_comments.push_back(
+        {lines.at(source.offset).line, draft_.utf8(source.text)});
     draft_.problems.warn(source.offset, source.closed ? "source-comment" : "unclosed-comment",
                          source.closed
                              ? "comment in the source, which the format does not have; kept"
@@ -290,10 +301,9 @@ void StatementReader::run() {
 
 void StatementReader::unknown_statement() {
   const std::size_t end = std::max(scan_.statement_end_from(start_), start_ + 1);
-  draft_.problems.warn(start_, "unknown-statement",
-                       "unknown statement \"" +
-                           clip(scan_.slice(start_, std::min(end, scan_.line_end_from(start_)))) +
-                           "\"; kept as text");
+  draft_.problems.warn(
+      start_, "unknown-statement",
+      "unknown statement \"" + clip(scan_.slice(start_, end)) + "\"; kept as text");
   draft_.keep(start_, end);
   scan_.seek(end);
 }
@@ -381,8 +391,9 @@ bool StatementReader::nodes() {
       scan_.seek(at + 1);
       continue;
     }
+    const bool keyword = scan_.keyword_at(at);
     const std::string_view name = scan_.name();
-    if (name.empty() || name.size() > kNameLengthMax || is_statement_keyword(name)) {
+    if (name.empty() || name.size() > kNameLengthMax || keyword) {
       // Not a line of names.
       const bool first_line = scan_.slice(start_, start_ + 3) == "BU_";
       if (first_line) return fail_at(at, "node names");
@@ -409,11 +420,11 @@ bool StatementReader::message() {
   if (!expect_name(name, "a message name")) return false;
   scan_.skip_blank();
   if (scan_.peek() != ':') {
-    const std::string_view line = scan_.slice(name_offset, scan_.line_end_from(name_offset));
+    const std::string_view line = scan_.line_rest(name_offset, kNameLengthMax);
     const std::size_t colon = line.find(':');
     const bool on_line = colon != std::string_view::npos;
     if (!on_line && !is_digit(scan_.peek())) return fail("\":\" after the message name");
-    if (on_line && colon <= kNameLengthMax) {
+    if (on_line) {
       name = line.substr(0, colon);
       while (name.back() <= ' ') name.remove_suffix(1);
       scan_.seek(name_offset + colon);
@@ -581,16 +592,18 @@ void StatementReader::signal_tail(SignalDef& signal) {
   scan_.accept('[');
   scan_.skip_spaces();
   const auto minimum = scan_.number();
-  const bool bar = scan_.accept('|');
+  if (!minimum) return incomplete("the minimum");
+  if (!scan_.accept('|')) return incomplete("\"|\" between minimum and maximum");
   scan_.skip_spaces();
   const auto maximum = scan_.number();
-  if (!minimum || !bar || !maximum || !scan_.accept(']')) {
-    return incomplete("the range [minimum|maximum]");
-  }
+  if (!maximum) return incomplete("the maximum");
+  if (!scan_.accept(']')) return incomplete("\"]\" after the maximum");
   signal.minimum = minimum->value;
   signal.maximum = maximum->value;
 
+  const std::size_t behind_range = scan_.position();
   scan_.skip_blank();
+  if (scan_.peek() != '"') scan_.seek(behind_range);
   const auto unit = scan_.string(StringContext::kUnit);
   if (!unit) return incomplete("the unit in quotes");
   signal.unit = take_text(*unit);
@@ -883,8 +896,9 @@ void StatementReader::names_until_semicolon(std::vector<std::string>& names) {
     scan_.skip_blank();
     if (scan_.accept(',')) continue;
     const std::size_t at = scan_.position();
+    if (scan_.keyword_at(at)) return;
     const std::string_view name = scan_.name();
-    if (name.empty() || name.size() > kNameLengthMax || is_statement_keyword(name)) {
+    if (name.empty() || name.size() > kNameLengthMax) {
       scan_.seek(at);
       return;
     }

@@ -216,7 +216,14 @@ bool Scanner::keyword_at(std::size_t position) const noexcept {
   std::size_t end = position;
   constexpr std::size_t kLongestKeyword = 17;
   while (end < text_.size() && end - position < kLongestKeyword && is_word_char(text_[end])) ++end;
-  return is_statement_keyword(slice(position, end));
+  const std::string_view word = slice(position, end);
+  if (!is_statement_keyword(word)) return false;
+  if (word.back() == '_') return true;
+  // FILTER and VERSION may as well be names; they start a statement at the start of a line.
+  while (position > 0 && is_blank(text_[position - 1])) {
+    if (is_line_break(text_[--position])) return true;
+  }
+  return position == 0;
 }
 
 std::size_t Scanner::line_end_from(std::size_t position) const noexcept {
@@ -294,7 +301,7 @@ std::optional<StringToken> Scanner::string(StringContext context) {
     const std::size_t quote = text_.find('"', scan);
     const std::size_t until = quote == kNone ? text_.size() : quote;
     for (std::size_t at = scan; statement == kNone && at < until;) {
-      at = std::min(text_.find_first_of("\r\n", at), until);
+      while (at < until && !is_line_break(text_[at])) ++at;
       while (at < until && is_blank(text_[at])) ++at;
       if (at < until && keyword_at(at)) statement = at;
     }

@@ -2,6 +2,7 @@
 // Forgiving where real files are (see StringContext), linear in the text whatever it holds.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -130,6 +131,11 @@ class Scanner {
   // True if a statement keyword stands at `position`.
   bool keyword_at(std::size_t position) const noexcept;
   std::size_t line_end_from(std::size_t position) const noexcept;
+  // The rest of the line, but no more than `longest` of it.
+  std::string_view line_rest(std::size_t position, std::size_t longest) const noexcept {
+    const std::string_view rest = text_.substr(std::min(position, text_.size()), longest);
+    return rest.substr(0, rest.find_first_of("\r\n"));
+  }
   // From `position` to past the ";" that ends a statement, or to the line on which the next starts.
   std::size_t statement_end_from(std::size_t position) const noexcept;
 
