@@ -306,7 +306,7 @@ TEST_F(Replay, ConfigurationsThatAreWrong) {
       {"[\"vehicle.dbc\"]", "[\"vehicle.dbc\", \"twin.dbc\"]", 78, "twin.dbc"},
       {"method = \"robust\"", "method = \"magic\"", 78, "method"},
       {"[estimator]", "[estimater]", 78, "estimater"},
-      {"trigger = \"always\"", "trigger = \"coast_down\"", 78, "trigger"},
+      {"trigger = \"always\"", "trigger = \"sometimes\"", 78, "trigger"},
       {"[estimator]", "[estimator", 78, "wrong.toml"},
   };
   place_->write("twin.dbc", place_->read("vehicle.dbc"));

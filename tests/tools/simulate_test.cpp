@@ -125,6 +125,10 @@ TEST(Simulate, SettingsAndMistakes) {
   const RunResult missing = beltgrip({"simulate", "--scenario", "no-rig", "--log-out", "-"});
   EXPECT_EQ(missing.status, 66);
   EXPECT_NE(missing.err.find("paper-rig"), std::string::npos);
+  const RunResult vehicle =
+      beltgrip({"simulate", "--scenario", "coast-overdrive", "--log-out", "-"});
+  EXPECT_EQ(vehicle.status, 78);
+  EXPECT_EQ(lines(vehicle.err), 1) << vehicle.err;
   EXPECT_EQ(beltgrip({"simulate", "--belt", "gold", "--log-out", "-"}).status, 78);
   EXPECT_EQ(beltgrip({"simulate", "--log-out", "/nonexistent/x.log"}).status, 73);
   EXPECT_EQ(beltgrip({"simulate", "--out-dir", "/proc/x"}).status, 73);

@@ -8,6 +8,7 @@
 #include "tools/cli/exit_codes.h"
 #include "tools/cli/json_writer.h"
 #include "tools/sim/resources.h"
+#include "tools/sim/vehicle_scenario.h"
 
 namespace beltgrip::cli {
 
@@ -19,7 +20,7 @@ constexpr std::string_view kSuffix = ".toml";
 std::string shipped_names() {
   std::string names;
   for (const std::string_view name : sim::resource_names()) {
-    if (!name.ends_with(kSuffix)) continue;
+    if (!name.ends_with(kSuffix) || sim::is_vehicle_scenario(*sim::resource(name))) continue;
     names +=
         (names.empty() ? "" : ", ") + std::string(name.substr(0, name.size() - kSuffix.size()));
   }
@@ -61,6 +62,13 @@ void ScenarioOptions::add_to(CLI::App& command) {
 sim::Scenario ScenarioOptions::load() const {
   std::vector<sim::ScenarioLayer> layers{{kBase, std::string(*sim::resource(kBase))}};
   layers.push_back(layer_of(scenario));
+  if (sim::is_vehicle_scenario(layers.back().text)) {
+    throw Failure{kConfiguration,
+                  layers.back().source +
+                      ": plant: found \"vehicle\", which this version does not run; "
+                      "shipped are " +
+                      shipped_names()};
+  }
   for (const std::string& setting : settings) layers.push_back(sim::setting_layer(setting));
   if (!belt.empty()) layers.push_back({"--belt " + belt, "belt = \"" + belt + "\""});
   sim::ScenarioResult result = sim::parse_scenario(layers);
