@@ -222,6 +222,22 @@ void check_circles(const MessageDef& message, const MessageSource& source, Probl
   }
 }
 
+// Quick look before the thorough one: without multiplexing, every bit of a frame-sized payload has
+// one owner.
+bool bits_taken_twice(const MessageDef& message) {
+  std::bitset<kFdLengthMax * 8> taken;
+  for (const SignalDef& signal : message.signals) {
+    const std::uint64_t first = first_bit(signal);
+    const bool little = signal.byte_order == ByteOrder::kLittle;
+    for (std::uint64_t k = first; k < first + std::min(signal.length, 64U); ++k) {
+      const std::uint64_t bit = little ? k : k / 8 * 8 + 7 - k % 8;
+      if (bit >= taken.size() || taken[bit]) return true;
+      taken[bit] = true;
+    }
+  }
+  return false;
+}
+
 void check_message(const MessageDef& message, const MessageSource& source, ProblemList& problems) {
   const std::uint32_t longest = message.j1939 ? kJ1939LengthMax
                                 : message.fd  ? kFdLengthMax
@@ -234,18 +250,28 @@ void check_message(const MessageDef& message, const MessageSource& source, Probl
                        : message.fd  ? "CAN FD frame"
                                      : "classic frame, and is not marked as CAN FD"));
   }
-  std::set<std::string_view> names;
+  std::vector<std::pair<std::size_t, std::size_t>> names;  // hash, signal
+  names.reserve(message.signals.size());
   for (std::size_t i = 0; i < message.signals.size(); ++i) {
-    const SignalDef& signal = message.signals[i];
-    check_signal(message, signal, source.signals[i].offset, problems);
-    if (!names.insert(signal.name).second) {
-      problems.warn(source.signals[i].offset, "duplicate-signal",
-                    "message \"" + clip(message.name) + "\" has a second signal \"" +
-                        clip(signal.name) + "\"");
-    }
+    check_signal(message, message.signals[i], source.signals[i].offset, problems);
+    names.emplace_back(std::hash<std::string>()(message.signals[i].name), i);
   }
-  check_circles(message, source, problems);
-  OverlapCheck(message, source, problems).run();
+  std::sort(names.begin(), names.end());
+  for (std::size_t i = 1; i < names.size(); ++i) {
+    const SignalDef& signal = message.signals[names[i].second];
+    if (names[i].first != names[i - 1].first ||
+        signal.name != message.signals[names[i - 1].second].name) {
+      continue;
+    }
+    problems.warn(
+        source.signals[names[i].second].offset, "duplicate-signal",
+        "message \"" + clip(message.name) + "\" has a second signal \"" + clip(signal.name) + "\"");
+  }
+  const bool multiplexed =
+      std::any_of(message.signals.begin(), message.signals.end(),
+                  [](const SignalDef& s) { return s.multiplexed_by.has_value(); });
+  if (multiplexed) check_circles(message, source, problems);
+  if (multiplexed || bits_taken_twice(message)) OverlapCheck(message, source, problems).run();
 }
 
 // Each node used but not declared: once, where it is used first.
@@ -258,7 +284,10 @@ void check_nodes(Draft& draft) {
                           "a second node \"" + clip(db.nodes[i]) + "\"");
     }
   }
+  std::string_view last;
   const auto used = [&](const std::string& node, std::size_t offset) {
+    if (node == last) return;
+    last = node;
     if (!known.insert(node).second) return;
     draft.problems.warn(offset, "undeclared-node",
                         "node \"" + clip(node) + "\" is not declared in BU_");

@@ -30,7 +30,7 @@ constexpr std::array<bool, 256> name_characters() {
 }
 constexpr std::array<bool, 256> kNameCharacters = name_characters();
 
-constexpr std::array<std::string_view, 36> kKeywords{"BA_",
+constexpr std::array<std::string_view, 35> kKeywords{"BA_",
                                                      "BA_DEF_",
                                                      "BA_DEF_DEF_",
                                                      "BA_DEF_DEF_REL_",
@@ -64,13 +64,13 @@ constexpr std::array<std::string_view, 36> kKeywords{"BA_",
                                                      "SIG_VALTYPE_",
                                                      "VAL_",
                                                      "VAL_TABLE_",
-                                                     "VERSION",
-                                                     "VERSION_"};
+                                                     "VERSION"};
 
 }  // namespace
 
 bool is_statement_keyword(std::string_view word) noexcept {
   if (word.size() < 3 || word.size() > 16) return false;
+  if (word.back() != '_' && word != "FILTER" && word != "VERSION") return false;
   return std::find(kKeywords.begin(), kKeywords.end(), word) != kKeywords.end();
 }
 
