@@ -13,6 +13,7 @@ constexpr double kKnownMargin = 1.05;     // the belt may have run in since its 
 constexpr double kPeakSlipOverdrive = 0.020;
 constexpr double kPeakSlipLow = 0.035;
 constexpr double kDetection_s = 0.03;  // filters and sampler
+constexpr double kBeyondPeak_s = 1.0;  // acquisition at the start, and slip until it is seen
 constexpr double kSecondsPerTick = 1e-9;
 
 }  // namespace
@@ -99,7 +100,9 @@ std::uint32_t Arming::clearance(const Now& now) noexcept {
   const double left_s =
       slowing > 0.0 ? (now.omega_p_rad_s - settings_.primary_speed_min_rad_s) / slowing : 1e9;
   const double longest_s = static_cast<double>(kRequestMax) * kSecondsPerTick;
-  return ramp_.duration_s > std::min(left_s, longest_s) ? inhibit_bit(Inhibit::kTime) : 0U;
+  return ramp_.duration_s + kBeyondPeak_s > std::min(left_s, longest_s)
+             ? inhibit_bit(Inhibit::kTime)
+             : 0U;
 }
 
 void Arming::step(const Now& now) noexcept {

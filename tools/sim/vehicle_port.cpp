@@ -68,7 +68,7 @@ void VehiclePort::advance(std::int64_t t_ns, bool stop_at_frame) {
 }
 
 daemon::Wake VehiclePort::wait_until(daemon::MonoTime deadline) noexcept {
-  if (active(FaultKind::kDaemonDies) != nullptr) return daemon::Wake::kClosed;
+  if (daemon_is_dead()) return daemon::Wake::kClosed;
   std::int64_t until = deadline;
   if (const FaultStep* fault = active(FaultKind::kLoopLate)) {
     until = std::max<std::int64_t>(until, deadline + std::llround(fault->size * 1e9));
@@ -99,6 +99,7 @@ std::size_t VehiclePort::receive(std::span<daemon::RxFrame> out) noexcept {
 }
 
 daemon::SendResult VehiclePort::send(const can::CanFrame& frame) noexcept {
+  if (daemon_is_dead()) return daemon::SendResult::kSent;
   if (active(FaultKind::kBusDown) != nullptr) return daemon::SendResult::kDown;
   if (active(FaultKind::kBusOff) != nullptr || active(FaultKind::kSendFull) != nullptr) {
     return daemon::SendResult::kFull;

@@ -30,6 +30,8 @@ class VehiclePort final : public daemon::Port {
   daemon::SendResult send(const can::CanFrame& frame) noexcept override;
   daemon::BusState bus_state() noexcept override;
 
+  // By the script the daemon is gone: whatever it still says, nobody hears.
+  bool daemon_is_dead() const { return active(FaultKind::kDaemonDies) != nullptr; }
   // Runs the rest without the daemon.
   void run_alone();
   const VehicleSimulation& vehicle() const { return vehicle_; }

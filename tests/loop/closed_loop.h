@@ -1,0 +1,43 @@
+// One run of the daemon's own loop and pipeline against the virtual vehicle, in virtual time, with
+// the invariants watched and the truth kept; and the same vehicle without the daemon.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "daemon/core/config.h"
+#include "daemon/core/experiment.h"
+#include "tools/sim/vehicle_simulation.h"
+
+namespace beltgrip::test {
+
+// A configuration that fits a scenario, as a user would load it. Settings replace its lines by key.
+daemon::Config vehicle_config(const sim::VehicleScenario& scenario,
+                              const std::map<std::string, std::string>& settings = {});
+
+struct LoopRun {
+  std::vector<daemon::ExperimentResult> results;
+  std::vector<sim::RequestTruth> requests;
+  std::map<std::string, std::string> broken;  // invariants
+  std::vector<double> slip_bins;              // largest |slip| of each kBin_s
+  std::vector<double> speed_bins;             // and slip speed, m/s
+  std::vector<double> request_end_s;          // sample at which each request ended
+  std::uint32_t inhibits = 0;                 // all that were ever set once a trigger was near
+  std::uint32_t faults = 0;                   // all that were ever set
+  daemon::State last_state = daemon::State::kInhibited;
+  int stalls = 0;
+  double finite_until_s = -1.0;  // >= 0: the plant's state was no number from there on
+
+  static constexpr double kBin_s = 0.25;
+  // Largest values from begin_s to end_s.
+  double slip_max(double begin_s, double end_s) const;
+  double slip_speed_max(double begin_s, double end_s) const;
+};
+
+LoopRun run_closed(const sim::VehicleScenario& scenario, const daemon::Config& config,
+                   std::uint64_t seed);
+LoopRun run_alone(const sim::VehicleScenario& scenario, std::uint64_t seed);
+
+}  // namespace beltgrip::test

@@ -1,0 +1,183 @@
+#include "tests/support/invariants.h"
+
+#include <cmath>
+
+namespace beltgrip::test {
+
+using daemon::Fault;
+using daemon::fault_bit;
+using daemon::State;
+
+namespace {
+
+constexpr std::uint32_t kClamp = 0x6A2;
+constexpr double kFloorTolerance_N = 1e-6;
+constexpr daemon::Duration kMs = daemon::kMillisecond;
+
+// With one of these no request may stand (I3).
+constexpr std::uint32_t kForbidding =
+    fault_bit(Fault::kInputMissing) | fault_bit(Fault::kInputStale) |
+    fault_bit(Fault::kInputFrozen) | fault_bit(Fault::kBusOff) | fault_bit(Fault::kBusDown) |
+    fault_bit(Fault::kForeignSender) | fault_bit(Fault::kFrameRefused);
+// With one of these frames may be missing from the bus.
+constexpr std::uint32_t kGaps = fault_bit(Fault::kSendFailed) | fault_bit(Fault::kBusDown) |
+                                fault_bit(Fault::kBusOff) | fault_bit(Fault::kSampleLate) |
+                                fault_bit(Fault::kFrameRefused);
+
+std::uint8_t crc(const can::CanFrame& frame) {
+  unsigned value = 0;
+  const auto add = [&value](unsigned byte) {
+    value ^= byte;
+    for (int bit = 0; bit < 8; ++bit)
+      value = (value & 0x80U) != 0 ? value << 1 ^ 0x11DU : value << 1;
+  };
+  add(frame.id.value & 0xFFU);
+  add(frame.id.value >> 8);
+  for (std::size_t i = 1; i < 8; ++i) add(frame.data[i]);
+  return static_cast<std::uint8_t>(value);
+}
+
+std::string text(double value) { return std::to_string(value); }
+
+}  // namespace
+
+Invariants::Invariants(const daemon::Config& config) : config_(config) {}
+
+void Invariants::broken(const std::string& which, const std::string& how) {
+  problems_.try_emplace(which, how + " at " + text(static_cast<double>(before_.t) * 1e-9) + " s");
+}
+
+void Invariants::on_sent(const can::CanFrame& frame) { frames_.push_back(frame); }
+
+void Invariants::on_report(const daemon::SampleReport& now) noexcept {
+  check_report(now);
+  check_request(now);
+  check_frames(now);
+  frames_.clear();
+  before_ = now;
+  any_ = true;
+}
+
+void Invariants::check_report(const daemon::SampleReport& now) {
+  // The end is reported at the present instant, which may be that of the last sample.
+  const bool end = now.t == before_.t && now.state == State::kInhibited;
+  if (any_ && now.t <= before_.t && !end) broken("I8", "the time of a sample does not increase");
+  for (const double value :
+       {now.curve.mu_star, now.curve.sigma_star_percent, now.curve.friction_slope,
+        now.curve.clamp_force_N, now.curve.torque_p_Nm, now.curve.slip_energy_J,
+        now.result.peak.mu_max, now.result.peak.mu_max_std, now.result.sigma_stop_percent,
+        now.request_force_N}) {
+    if (!std::isfinite(value)) broken("I7", "an estimate is no number");
+  }
+  if (now.result.peak.kind == estimator::PeakKind::kValue && !(now.result.peak.mu_max_std > 0.0)) {
+    broken("I7", "a value without a deviation");
+  }
+  if (any_ && before_.macro_slip_stop && !now.macro_slip_stop && now.in_experiment) {
+    broken("I4", "MacroSlipStop fell within the experiment");
+  }
+}
+
+void Invariants::check_request(const daemon::SampleReport& now) {
+  const bool stands = now.request_force_N > 0.0;
+  const bool stood = any_ && before_.request_force_N > 0.0;
+  if (stands && (now.state != State::kRamping || config_.control != daemon::Control::kCommand)) {
+    broken("I1", "a request outside Ramping");
+  }
+  if (stands && (now.faults & kForbidding) != 0) {
+    broken("I3", "a request with faults " + std::to_string(now.faults));
+  }
+  if (stands && now.macro_slip_stop) broken("I3", "a request with MacroSlipStop");
+  if (stands && !stood) {
+    const double pause_s = static_cast<double>(now.t - request_ended_) * 1e-9;
+    if (pause_s < config_.experiment.cooldown_s) broken("I2", "no cool-down: " + text(pause_s));
+    request_begun_ = now.t;
+    asked_ = true;
+  }
+  if (stands && stood) {
+    const double fall_N = before_.request_force_N - now.request_force_N;
+    const double fall_max_N =
+        config_.estimator.ramp_rate_max_N_per_s * static_cast<double>(now.t - before_.t) * 1e-9;
+    if (fall_N < 0.0) broken("I2", "the request rises by " + text(-fall_N) + " N");
+    if (fall_N > fall_max_N + 1e-6) broken("I2", "the request falls by " + text(fall_N) + " N");
+    if (now.t - request_begun_ > 15 * daemon::kSecond + 5 * kMs) broken("I2", "longer than 15 s");
+  }
+  if (stands) {
+    const auto& v = config_.variator;
+    const double omega_s = now.sample.omega_s_rad_s;
+    const double floor_N =
+        v.secondary_spring_force_N + v.secondary_centrifugal_N_s2 * omega_s * omega_s +
+        v.secondary_piston_area_m2 * config_.experiment.secondary_pressure_floor_Pa;
+    if (now.request_force_N < floor_N - kFloorTolerance_N) {
+      broken("I2", "below the floor by " + text(floor_N - now.request_force_N) + " N");
+    }
+  }
+  if (!stands && stood) {
+    request_ended_ = now.t;
+    inactive_due_ = 5;
+  }
+}
+
+void Invariants::check_clamp(const can::CanFrame& frame, const daemon::SampleReport& now) {
+  const bool active = frame.data[2] == 1;
+  const double force_N = frame.data[3] + 256.0 * frame.data[4];
+  if (config_.control != daemon::Control::kCommand) broken("I14", "a clamp frame in observe");
+  if (active != (now.request_force_N > 0.0)) broken("I1", "the frame and the report differ");
+  if (active && std::abs(force_N - now.request_force_N) > 0.51) {
+    broken("I5", "another force in the frame");
+  }
+  if (!active && inactive_due_ > 0) --inactive_due_;
+  if (active && asked_ && before_.request_force_N > 0.0 && now.t - last_clamp_ > 16 * kMs &&
+      (now.faults & kGaps) == 0) {
+    broken("I5", "a clamp frame is late");
+  }
+  last_clamp_ = now.t;
+}
+
+void Invariants::check_frames(const daemon::SampleReport& now) {
+  bool slip_sent = false;
+  for (const can::CanFrame& frame : frames_) {
+    const std::uint32_t id = frame.id.value;
+    if (id < 0x6A0 || id > 0x6A3 || frame.id.extended || frame.remote || frame.error || frame.fd ||
+        frame.length != 8) {
+      broken("I5", "a frame that is none of ours");
+      continue;
+    }
+    if (frame.data[0] != crc(frame)) broken("I5", "a wrong CRC");
+    const unsigned counter = frame.data[1] & 0x0FU;
+    const auto last = counters_.find(id);
+    if (last != counters_.end() && counter != (last->second + 1) % 15 &&
+        (now.faults & kGaps) == 0) {
+      broken("I5", "a counter that does not follow");
+    }
+    counters_[id] = counter;
+    if (id == kClamp) check_clamp(frame, now);
+    if (id == 0x6A0) {
+      const unsigned kind = frame.data[1] >> 4 & 3U;
+      const bool valid = (frame.data[1] & 0x40U) != 0;
+      const unsigned mu = frame.data[2] | (frame.data[3] & 0x7FU) << 8;
+      if (valid && (kind != 1 || mu == 0)) broken("I6", "MuMaxValid without a value");
+      if (valid != (kind == 1)) broken("I6", "a value that is not valid");
+    }
+    if (id == 0x6A1) {
+      slip_sent = true;
+      if (((frame.data[1] & 0x10U) != 0) != now.macro_slip_stop) broken("I5", "another stop flag");
+    }
+  }
+  if (any_ && now.macro_slip_stop != before_.macro_slip_stop && !slip_sent &&
+      (now.faults & kGaps) == 0) {
+    broken("I5", "MacroSlipStop changed without a frame");
+  }
+  const bool ended = any_ && before_.request_force_N > 0.0 && !(now.request_force_N > 0.0);
+  if (ended && (now.faults & kGaps) == 0) {
+    bool inactive = false;
+    for (const can::CanFrame& frame : frames_) {
+      inactive = inactive || (frame.id.value == kClamp && frame.data[2] == 0);
+    }
+    if (!inactive) broken("I3", "no inactive frame at once");
+  }
+  if (inactive_due_ > 0 && now.t - request_ended_ > 60 * kMs && (now.faults & kGaps) == 0) {
+    broken("I5", "fewer than five inactive frames");
+  }
+}
+
+}  // namespace beltgrip::test
