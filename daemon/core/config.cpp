@@ -25,7 +25,7 @@ class Loader {
         result_(result),
         errors_(path, result.errors) {}
 
-  void load();
+  void load(ConfigScope scope);
 
  private:
   bool read_document();
@@ -73,15 +73,17 @@ std::string range_text(double minimum, double maximum) {
   return "a number from " + number_text(minimum) + " to " + number_text(maximum);
 }
 
-void Loader::load() {
+void Loader::load(ConfigScope scope) {
   if (!read_document()) return;
   check_keys();
   read_options();
   read_sensors();
-  read_signals();
+  if (scope != ConfigScope::kVariator) read_signals();
   check_across();
-  check_command();
-  check_not_there_yet();
+  if (scope == ConfigScope::kAll) {
+    check_command();
+    check_not_there_yet();
+  }
   if (!result_.errors.empty()) return;
   std::sort(config_.roles.begin(), config_.roles.end(),
             [](const RoleBinding& a, const RoleBinding& b) { return a.role < b.role; });
@@ -429,9 +431,9 @@ void Loader::check_not_there_yet() {
 
 }  // namespace
 
-ConfigResult load_config(const std::string& path) {
+ConfigResult load_config(const std::string& path, ConfigScope scope) {
   ConfigResult result;
-  Loader(path, result).load();
+  Loader(path, result).load(scope);
   return result;
 }
 

@@ -110,7 +110,10 @@ struct ConfigResult {
   int exit_code() const { return errors.empty() ? 0 : errors.front().exit_code; }
 };
 
-ConfigResult load_config(const std::string& path);
+// How much of it is wanted: for the daemon, for reading logs, or (without [signals] and DBC files)
+// for tables whose columns are named by role.
+enum class ConfigScope { kAll, kSignals, kVariator };
+ConfigResult load_config(const std::string& path, ConfigScope scope = ConfigScope::kAll);
 // Every key with default, unit, range and help: the commented default file.
 std::string default_config_text();
 

@@ -1,0 +1,116 @@
+#include "tools/cli/diagnose.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/core/config.h"
+#include "tools/cli/output_file.h"
+#include "tools/diagnose/diagnose.h"
+#include "tools/diagnose/json.h"
+
+namespace beltgrip::cli {
+namespace {
+
+struct Options {
+  std::string config, model, json, report, model_out;
+  std::vector<std::string> logs, held_out;
+  int jobs = 1;
+};
+
+volatile std::sig_atomic_t stop_requested = 0;
+void request_stop(int) { stop_requested = 1; }
+
+bool is_table(const std::string& path) { return path.ends_with(".csv"); }
+
+daemon::Config load(const Options& options) {
+  const auto all_tables = [](const std::vector<std::string>& paths) {
+    return std::all_of(paths.begin(), paths.end(), is_table);
+  };
+  const bool tables = all_tables(options.logs) && all_tables(options.held_out);
+  const daemon::ConfigResult result = daemon::load_config(
+      options.config, tables ? daemon::ConfigScope::kVariator : daemon::ConfigScope::kSignals);
+  for (const std::string& warning : result.warnings) std::fprintf(stderr, "%s\n", warning.c_str());
+  if (!result.config) {
+    for (std::size_t i = 0; i + 1 < result.errors.size(); ++i) {
+      std::fprintf(stderr, "beltgrip: %s\n", result.errors[i].text.c_str());
+    }
+    throw Failure{result.exit_code(), result.errors.back().text};
+  }
+  return *result.config;
+}
+
+diagnose::SignalTable read(const std::string& path) {
+  if (!is_table(path))
+    throw Failure{kConfiguration, path + ": logs are not in this version, only .csv"};
+  try {
+    return diagnose::read_csv(path);
+  } catch (const diagnose::TableError& error) {
+    throw Failure{error.missing_file ? kNoInput : kBadInput, error.text};
+  }
+}
+
+void show_progress(double share, const std::string& what) {
+  constexpr int kWidth = 30;
+  const int filled = static_cast<int>(share * kWidth);
+  std::fprintf(stderr, "\r[%s%s] %-12s", std::string(static_cast<std::size_t>(filled), '#').c_str(),
+               std::string(static_cast<std::size_t>(kWidth - filled), ' ').c_str(), what.c_str());
+  if (share >= 1.0) std::fprintf(stderr, "\n");
+}
+
+void run(const Options& options) {
+  const daemon::Config config = load(options);
+  diagnose::Request request;
+  request.model = diagnose::nominal_model(config.variator);
+  if (!options.model.empty()) {
+    try {
+      request.model = diagnose::read_model(options.model, request.model);
+    } catch (const diagnose::ModelError& error) {
+      throw Failure{error.missing_file ? kNoInput : kConfiguration, error.text};
+    }
+  }
+  for (const std::string& path : options.logs) request.experiments.push_back(read(path));
+  for (const std::string& path : options.held_out) request.held_out.push_back(read(path));
+  const auto output = [](const std::string& path) {
+    return path.empty() ? nullptr : std::make_unique<OutputFile>(path);
+  };
+  const auto json = output(options.json);
+  const auto model_out = output(options.model_out);
+  std::signal(SIGINT, request_stop);
+  std::signal(SIGTERM, request_stop);
+  request.stop = [] { return stop_requested != 0; };
+  if (isatty(STDERR_FILENO) != 0) request.progress = show_progress;
+  const diagnose::Answer answer = diagnose::diagnose(std::move(request));
+  if (options.json != "-") std::fputs(diagnose::plain_text(answer.diagnosis).c_str(), stdout);
+  if (json) {
+    json->write(diagnose::json_text(answer.diagnosis));
+    json->close();
+  }
+  if (model_out) {
+    model_out->write(diagnose::model_text(answer.extended));
+    model_out->close();
+  }
+}
+
+}  // namespace
+
+void add_diagnose(CLI::App& app) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand(
+      "diagnose", "shows what the simulation gets wrong, names the cause, extends the model");
+  command->add_option("LOG", options->logs, "one experiment each: .csv, or a log")->required();
+  command->add_option("--config", options->config, "configuration (TOML)")->required();
+  command->add_option("--model", options->model, "model file: what the simulation believes");
+  command->add_option("--held-out", options->held_out, "experiments for the gain only");
+  command->add_option("--json", options->json, "result as JSON; - for standard output");
+  command->add_option("--model-out", options->model_out, "writes the extended model");
+  command->add_option("--jobs", options->jobs, "cores to use")->check(CLI::PositiveNumber);
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace beltgrip::cli

@@ -1,0 +1,8 @@
+// beltgrip diagnose: what the simulation gets wrong, why, and what the correction is worth.
+#pragma once
+
+#include "tools/cli/command.h"
+
+namespace beltgrip::cli {
+void add_diagnose(CLI::App& app);
+}  // namespace beltgrip::cli

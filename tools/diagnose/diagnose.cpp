@@ -1,0 +1,330 @@
+#include "tools/diagnose/diagnose.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "tools/diagnose/engine.h"
+#include "tools/diagnose/gain.h"
+#include "tools/diagnose/namer.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+constexpr int kSamplesMin = 100;     // 10 s of usable data
+constexpr double kDetectable = 5.0;  // sigmas: found with 90 % and more
+constexpr double kRealistic = 3.0;   // in usual sizes: an effect is hardly ever larger
+
+double quantile_975(double degrees) {
+  double low = 0.0, high = 100.0;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (student_p(middle, degrees) > 0.05 ? low : high) = middle;
+  }
+  return low;
+}
+
+std::string text_of(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.3g", value);
+  return buffer;
+}
+
+class Run {
+ public:
+  explicit Run(Request request) : request_(std::move(request)) {}
+
+  Answer run() {
+    answer_.extended = request_.model;
+    std::vector<ExperimentData> runs;
+    for (const SignalTable& table : request_.experiments) {
+      runs.push_back(prepare(table, request_.model.variator));
+    }
+    out().experiments = static_cast<int>(runs.size());
+    for (const ExperimentData& run : runs) {
+      out().samples += run.valid_count;
+      for (const std::string& note : run.notes) out().notes.push_back(note);
+      if (run.valid_count == 0) {
+        out().notes.push_back(run.name + ": " + why_unusable(run));
+      }
+    }
+    check_same_machine(runs);
+    if (out().samples < kSamplesMin) {
+      out().notes.push_back("too little data: " + text_of(0.1 * out().samples) +
+                            " s usable, at least 10 s are needed; nothing can be said");
+      nothing_identifiable("too little data");
+      return std::move(answer_);
+    }
+    progress(0.1, "fit");
+    Engine engine(make_campaign(std::move(runs), request_.model));
+    Naming naming = name_effects(engine, stop());
+    progress(0.8, "gain");
+    fill(engine, naming);
+    progress(1.0, "done");
+    return std::move(answer_);
+  }
+
+ private:
+  Diagnosis& out() { return answer_.diagnosis; }
+  std::function<bool()> stop() const {
+    return request_.stop ? request_.stop : [] { return false; };
+  }
+  void progress(double share, const std::string& what) const {
+    if (request_.progress) request_.progress(share, what);
+  }
+
+  static std::string why_unusable(const ExperimentData& run) {
+    std::string missing;
+    const auto need = [&](const GridSignal& signal, const char* name) {
+      if (!signal.present) missing += (missing.empty() ? "" : ", ") + std::string(name);
+    };
+    need(run.omega_p, "primary_speed");
+    need(run.omega_s, "secondary_speed");
+    need(run.pressure, "secondary_pressure");
+    need(run.torque, "primary_torque or engine_torque");
+    if (!missing.empty()) return "not used: no " + missing;
+    int at_stop = 0;
+    for (const int stop : run.stop) at_stop += stop != kNoStop;
+    if (at_stop == 0) {
+      return "not used: the speed ratio is never near an end stop (units of the speeds, "
+             "ratio_low and ratio_overdrive of [variator]?)";
+    }
+    return "not used: never 1.6 s without gaps, shifts, saturation or run-away at an end stop";
+  }
+
+  void nothing_identifiable(const std::string& reason) {
+    std::string last;
+    for (const EffectRow& row : effect_rows()) {
+      if (row.id == last) continue;
+      last = row.id;
+      out().not_identifiable.push_back({std::string(row.id), {}, reason});
+    }
+  }
+
+  // Two machines cannot be one model: end-stop ratios that differ by more than any belt slips.
+  void check_same_machine(const std::vector<ExperimentData>& runs) {
+    for (const int stop : {kOverdriveStop, kLowStop}) {
+      double low = std::numeric_limits<double>::infinity(), high = 0.0;
+      std::string low_name, high_name;
+      for (const ExperimentData& run : runs) {
+        double largest = 0.0;
+        for (int k = 0; k < run.size(); ++k) {
+          if (!run.valid[static_cast<std::size_t>(k)] ||
+              run.stop[static_cast<std::size_t>(k)] != stop) {
+            continue;
+          }
+          largest = std::max(largest, run.omega_s.value[k] / run.omega_p.value[k]);
+        }
+        if (largest == 0.0) continue;
+        if (largest < low) low = largest, low_name = run.name;
+        if (largest > high) high = largest, high_name = run.name;
+      }
+      if (high > 1.03 * low && std::isfinite(low)) {
+        out().notes.push_back(low_name + " and " + high_name + ": end-stop ratios " + text_of(low) +
+                              " and " + text_of(high) + " cannot be of one machine");
+        different_machines_ = true;
+      }
+    }
+  }
+
+  void fill(Engine& engine, const Naming& naming) {
+    const Campaign& campaign = engine.campaign();
+    const ModelState& extended = naming.hypothesis.state;
+    out().complete = !stop()();
+    fill_machine(engine, naming);
+    fill_baseline(engine, naming);
+    fill_not_identifiable(engine, naming);
+    if (different_machines_) {
+      nothing_identifiable("the experiments are not of one machine");
+      out().verdict = Verdict::kUnexplained;
+      out().unexplained = Unexplained{"ratio", {"experiment"}, 1.0};
+      return;
+    }
+    std::vector<int> slots;
+    for (const Accepted& each : naming.accepted) slots.push_back(each.slot);
+    Gain gain;
+    if (request_.held_out.empty()) {
+      if (campaign.runs.size() >= 3) gain = left_out_gain(engine, naming.nominal, extended, slots);
+    } else {
+      std::vector<ExperimentData> runs;
+      for (const SignalTable& table : request_.held_out) {
+        runs.push_back(prepare(table, request_.model.variator));
+      }
+      Campaign held_out = campaign;
+      held_out.runs = std::move(runs);
+      gain = held_out_gain(held_out, naming.nominal, extended);
+    }
+    out().held_out = gain.signals;
+    out().mu_max = gain.mu_max;
+    fill_findings(engine, naming, gain);
+    if (naming.unknown) {
+      out().unexplained =
+          Unexplained{naming.unknown->acts_on, {naming.unknown->depends_on}, naming.unknown->share};
+    }
+    out().verdict = naming.unknown           ? Verdict::kUnexplained
+                    : out().findings.empty() ? Verdict::kNothingWrong
+                                             : Verdict::kExplained;
+    propose(engine, naming);
+    answer_.extended = request_.model;
+    store_machine(extended.nuisance, answer_.extended);
+    store_effects(campaign.slots, campaign.switched_on + extended.effects, extended.nuisance,
+                  answer_.extended);
+  }
+
+  void fill_machine(const Engine& engine, const Naming& naming) {
+    const Fit& fit = naming.hypothesis.fit;
+    for (std::size_t j = 0; j < engine.active_nuisances().size(); ++j) {
+      const int p = engine.active_nuisances()[j];
+      const auto i = static_cast<Eigen::Index>(j);
+      const double sigma = std::sqrt(std::max(fit.covariance(i, i), 0.0)) * engine.scale(p);
+      const double value = naming.hypothesis.state.nuisance[p];
+      const bool ln = p == kLnMuMax || p == kLnPeakSlipOverdrive || p == kLnPeakSlipLow;
+      const auto shown = [&](double v) { return ln ? std::exp(v) : v; };
+      std::string name(engine.campaign().nuisances[static_cast<std::size_t>(p)].name);
+      if (ln) name = name.substr(3);
+      out().machine[name] = {shown(value), shown(value - 1.96 * sigma),
+                             shown(value + 1.96 * sigma)};
+    }
+  }
+
+  void fill_baseline(const Engine& engine, const Naming& naming) {
+    const Campaign& campaign = engine.campaign();
+    std::map<std::string, SignalErrors::Sum> sums;
+    for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+      for (const auto& [name, sum] :
+           signal_errors(campaign, static_cast<int>(e), naming.nominal).signal) {
+        sums[name].squares += sum.squares;
+        sums[name].count += sum.count;
+      }
+    }
+    const auto floors = noise_floors(campaign, naming.nominal);
+    for (const auto& [name, sum] : sums) {
+      if (sum.count == 0.0) continue;
+      BaselineSignal signal;
+      signal.rmse = std::sqrt(sum.squares / sum.count);
+      signal.noise_floor = floors.at(name);
+      signal.unexplained_share =
+          std::max(0.0, 1.0 - std::pow(signal.noise_floor / std::max(signal.rmse, 1e-300), 2.0));
+      for (const UnknownGroup& group : naming.nominal_groups) {
+        const bool here = name == "secondary_speed"    ? group.acts_on == "ratio"
+                          : name == "secondary_torque" ? group.acts_on == "torque"
+                                                       : group.acts_on == "friction";
+        if (here) signal.tests[group.depends_on] = std::erfc(std::sqrt(group.chi2 / 2.0));
+      }
+      out().baseline[name] = signal;
+    }
+  }
+
+  void fill_findings(const Engine& engine, const Naming& naming, const Gain& gain) {
+    const Campaign& campaign = engine.campaign();
+    for (const Accepted& each : naming.accepted) {
+      const Slot& slot = campaign.slots[static_cast<std::size_t>(each.slot)];
+      const auto& h = naming.hypothesis;
+      const auto at = std::find(h.slots.begin(), h.slots.end(), each.slot) - h.slots.begin();
+      const auto column = static_cast<Eigen::Index>(engine.active_nuisances().size()) + at;
+      const double value = h.state.effects[each.slot];
+      const double sigma = std::sqrt(std::max(h.fit.covariance(column, column), 0.0)) *
+                           engine.scale(kNuisanceCount + each.slot);
+      const double half = quantile_975(h.degrees[static_cast<std::size_t>(at)]) * sigma;
+      const auto found = std::find_if(out().findings.begin(), out().findings.end(),
+                                      [&](const Finding& f) { return f.effect == slot.row->id; });
+      Finding& finding = found == out().findings.end() ? out().findings.emplace_back() : *found;
+      finding.effect = slot.row->id;
+      finding.probability = std::max(finding.probability, each.probability);
+      finding.separate_by = slot.row->separating;
+      finding.equation = slot.row->equation;
+      finding.acts_on = slot.row->acts_on;
+      finding.role = slot.role;
+      if (slot.counts_experiments()) finding.fixed["at"] = slot.index;
+      const double a = slot.to_contract(value - half, h.state.nuisance);
+      const double b = slot.to_contract(value + half, h.state.nuisance);
+      finding.parameters[std::string(slot.row->parameter)] = {
+          slot.to_contract(value, h.state.nuisance), std::min(a, b), std::max(a, b)};
+      for (const int alias : each.aliases) {
+        const std::string id(campaign.slots[static_cast<std::size_t>(alias)].row->id);
+        if (id != finding.effect && std::find(finding.aliases.begin(), finding.aliases.end(), id) ==
+                                        finding.aliases.end()) {
+          finding.aliases.push_back(id);
+        }
+      }
+      finding.gain = gain.signals;
+    }
+    for (Finding& finding : out().findings) {
+      if (finding.aliases.empty()) finding.separate_by.clear();
+    }
+  }
+
+  // What an effect would have to be like to be seen; those that hardly ever are that large.
+  void fill_not_identifiable(const Engine& engine, const Naming& naming) {
+    const Campaign& campaign = engine.campaign();
+    std::map<std::string, std::map<std::string, double>> smallest;
+    std::map<std::string, bool> visible;
+    std::map<std::string, double> absorbed;
+    for (const Score& score : naming.last_screen) {
+      const Slot& slot = campaign.slots[static_cast<std::size_t>(score.slot)];
+      const std::string id(slot.row->id), parameter(slot.row->parameter);
+      const double size =
+          score.sigma > 0.0 ? kDetectable * score.sigma : std::numeric_limits<double>::infinity();
+      auto& known = smallest[id];
+      if (!known.contains(parameter) || size < known[parameter]) known[parameter] = size;
+      visible[id] |= size < kRealistic * slot.row->typical;
+      absorbed[id] = std::max(absorbed[id], score.absorbed);
+    }
+    for (const EffectRow& row : effect_rows()) {
+      const std::string id(row.id);
+      if (visible.contains(id) || row.apply == nullptr) continue;
+      visible[id] = false;
+      const bool accepted =
+          std::any_of(naming.accepted.begin(), naming.accepted.end(), [&](const Accepted& each) {
+            return campaign.slots[static_cast<std::size_t>(each.slot)].row->id == id;
+          });
+      if (!accepted) out().not_identifiable.push_back({id, {}, "no signal in these data shows it"});
+    }
+    for (const auto& [id, seen] : visible) {
+      if (seen || smallest[id].empty()) continue;
+      out().not_identifiable.push_back({id, smallest[id],
+                                        absorbed[id] > 0.99
+                                            ? "absorbed by a fitted constant of the machine"
+                                            : "the experiments hardly move what it depends on"});
+    }
+  }
+
+  void propose(const Engine& engine, const Naming& naming) {
+    for (const Finding& finding : out().findings) {
+      if (!finding.aliases.empty()) {
+        out().next_experiment = finding.separate_by;
+        return;
+      }
+    }
+    if (naming.unknown) {
+      out().next_experiment = "repeat one experiment with only " + naming.unknown->depends_on +
+                              " changed, at three levels, the first one again at the end";
+      return;
+    }
+    if (engine.campaign().runs.size() < 3) {
+      out().next_experiment =
+          "repeat the reference experiment three times: the scatter between "
+          "experiments is not known";
+      return;
+    }
+    if (!out().not_identifiable.empty()) {
+      const std::string& id = out().not_identifiable.front().effect;
+      for (const EffectRow& row : effect_rows()) {
+        if (row.id == id) {
+          out().next_experiment = row.separating;
+          return;
+        }
+      }
+    }
+  }
+
+  Request request_;
+  Answer answer_;
+  bool different_machines_ = false;
+};
+
+}  // namespace
+
+Answer diagnose(Request request) { return Run(std::move(request)).run(); }
+
+}  // namespace beltgrip::diagnose

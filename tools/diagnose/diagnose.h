@@ -1,0 +1,29 @@
+// The whole diagnosis: tables in, one result out.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tools/diagnose/diagnosis.h"
+#include "tools/diagnose/model_file.h"
+#include "tools/diagnose/signal_table.h"
+
+namespace beltgrip::diagnose {
+
+struct Request {
+  std::vector<SignalTable> experiments;  // in the order in which they were made
+  std::vector<SignalTable> held_out;     // empty: experiments are held out in turn
+  ModelFile model;
+  std::function<bool()> stop;  // true: end with what is known
+  std::function<void(double share, const std::string& what)> progress;
+};
+
+struct Answer {
+  Diagnosis diagnosis;
+  ModelFile extended;  // the model with what was found
+};
+
+Answer diagnose(Request request);
+
+}  // namespace beltgrip::diagnose

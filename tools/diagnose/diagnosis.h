@@ -1,0 +1,72 @@
+// The result of a diagnosis: one plain value, from which text, JSON, model file and report are
+// made.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace beltgrip::diagnose {
+
+struct Interval {
+  double value = 0.0, low = 0.0, high = 0.0;  // 95 %
+};
+
+struct BeforeAfter {
+  double before = 0.0, after = 0.0;
+  double low = 0.0, high = 0.0;  // 95 % of before - after
+};
+
+struct Finding {
+  std::string effect;
+  std::map<std::string, Interval> parameters;
+  std::map<std::string, double> fixed;  // what is counted, not estimated: wear's "at"
+  std::string role;                     // channel_skew
+  double probability = 0.0;
+  std::vector<std::string> aliases;
+  std::string separate_by;
+  std::map<std::string, BeforeAfter> gain;
+  std::string equation, acts_on;
+};
+
+struct Unexplained {
+  std::string acts_on;
+  std::vector<std::string> depends_on;
+  double share = 0.0;
+};
+
+struct NotIdentifiable {
+  std::string effect;
+  std::map<std::string, double> smallest_detectable;
+  std::string reason;
+};
+
+struct BaselineSignal {
+  double rmse = 0.0, noise_floor = 0.0, unexplained_share = 0.0;
+  std::map<std::string, double> tests;
+};
+
+struct MuMaxError {
+  double before = 0.0, after = 0.0, low = 0.0, high = 0.0;
+};
+
+enum class Verdict { kNothingWrong, kExplained, kUnexplained };
+
+struct Diagnosis {
+  Verdict verdict = Verdict::kNothingWrong;
+  std::map<std::string, BaselineSignal> baseline;
+  std::vector<Finding> findings;
+  std::optional<Unexplained> unexplained;
+  std::vector<NotIdentifiable> not_identifiable;
+  std::map<std::string, BeforeAfter> held_out;
+  std::optional<MuMaxError> mu_max;
+  std::string next_experiment;  // empty: none
+  std::vector<std::string> notes;
+  std::map<std::string, Interval> machine;  // constants of the nominal machine, as fitted
+  int experiments = 0;
+  int samples = 0;
+  bool complete = true;  // false: stopped on the way
+};
+
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,36 @@
+#include "tools/diagnose/effects/measurement.h"
+
+namespace beltgrip::diagnose {
+
+namespace {
+Eigen::ArrayXd shift_change(const GridSignal& signal, double dt_s, double shift_s) {
+  return shifted(signal, dt_s, shift_s) - signal.slow;
+}
+}  // namespace
+
+void apply_torque_bias(Context& c, const Slot&, double bias_Nm) { c.torque -= bias_Nm; }
+void apply_torque_gain(Context& c, const Slot&, double gain) { c.torque /= 1.0 + gain; }
+void apply_torque_delay(Context& c, const Slot&, double delay_s) {
+  c.torque += shift_change(c.run.torque, c.run.dt_s, delay_s);
+}
+void apply_pressure_offset(Context& c, const Slot&, double offset_Pa) { c.pressure -= offset_Pa; }
+void apply_pressure_gain(Context& c, const Slot&, double gain) { c.pressure /= 1.0 + gain; }
+void apply_speed_scale_primary(Context& c, const Slot&, double scale) { c.omega_p /= 1.0 + scale; }
+void apply_speed_scale_secondary(Context& c, const Slot&, double scale) {
+  c.omega_s /= 1.0 + scale;
+}
+
+void apply_channel_skew(Context& c, const Slot& slot, double delay_s) {
+  const double dt_s = c.run.dt_s;
+  if (slot.role == "primary_speed") {
+    c.omega_p += shift_change(c.run.omega_p, dt_s, delay_s);
+  } else if (slot.role == "secondary_speed") {
+    c.omega_s += shift_change(c.run.omega_s, dt_s, delay_s);
+  } else if (slot.role == "secondary_pressure") {
+    c.pressure += shift_change(c.run.pressure, dt_s, delay_s);
+  } else {
+    c.torque += shift_change(c.run.torque, dt_s, delay_s);
+  }
+}
+
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,397 @@
+#include "tools/diagnose/engine.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace beltgrip::diagnose {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr double kSaturatedPrecision = 50.0;
+constexpr double kSizePrior = 3.0;  // one sigma of an effect's size, in usual sizes
+
+bool stop_used(const Campaign& campaign, int stop) {
+  for (const ExperimentData& run : campaign.runs) {
+    for (std::size_t k = 0; k < run.valid.size(); ++k) {
+      if (run.valid[k] && run.stop[k] == stop) return true;
+    }
+  }
+  return false;
+}
+
+// Huber weights from the present residuals.
+void reweigh(const Campaign& campaign, const ModelState& state, Whitening& whitening) {
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    const ExperimentData& data = campaign.runs[e];
+    if (data.valid_count == 0) continue;
+    const Residuals at = residuals_of(campaign, static_cast<int>(e), state);
+    for (std::size_t kind = 0; kind < kResidualKinds; ++kind) {
+      if (at.value[kind].size() == 0) continue;
+      std::vector<double> size;
+      for (int k = 0; k < data.size(); ++k) {
+        if (data.valid[static_cast<std::size_t>(k)]) size.push_back(std::abs(at.value[kind][k]));
+      }
+      std::vector<double> sorted = size;
+      std::nth_element(sorted.begin(),
+                       sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
+                       sorted.end());
+      const double bound = 6.0 * 1.4826 * sorted[sorted.size() / 2] + 1.0;
+      for (std::size_t i = 0; i < size.size(); ++i) {
+        whitening.weight[e][kind][static_cast<Index>(i)] =
+            size[i] > bound ? std::sqrt(bound / size[i]) : 1.0;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model) {
+  Campaign out;
+  out.runs = std::move(runs);
+  out.variator = model.variator;
+  out.nuisances = nuisances_of(model);
+  out.slots = make_slots(out.runs);
+  out.switched_on = slot_values(model, out.slots);
+  for (const ExperimentData& run : out.runs) {
+    out.has_balance |= run.valid_count > 0 && run.torque_s.present;
+    out.has_tracking |= run.valid_count > 0 && run.command.present;
+  }
+  return out;
+}
+
+Engine::Engine(Campaign campaign) : campaign_(std::move(campaign)) {
+  state_.nuisance.resize(kNuisanceCount);
+  for (int i = 0; i < kNuisanceCount; ++i) {
+    state_.nuisance[i] = campaign_.nuisances[static_cast<std::size_t>(i)].nominal;
+  }
+  state_.effects = VectorXd::Zero(static_cast<Index>(campaign_.slots.size()));
+  const bool low = stop_used(campaign_, kLowStop);
+  const bool overdrive = stop_used(campaign_, kOverdriveStop);
+  for (int i = 0; i < kNuisanceCount; ++i) {
+    const bool is_low =
+        i == kLnPeakSlipLow || (i >= kShapeLow && i <= kEndOfShapes) || i == kLnRatioLow;
+    const bool is_overdrive = i == kLnPeakSlipOverdrive ||
+                              (i >= kShapeOverdrive && i < kShapeLow) || i == kLnRatioOverdrive;
+    if ((is_low && !low) || (is_overdrive && !overdrive)) continue;
+    if (i == kSecondaryInertia_kgm2 && !campaign_.has_balance) continue;
+    if ((i == kCommandGain || i == kCommandOffset_Pa) && !campaign_.has_tracking) continue;
+    nuisances_.push_back(i);
+  }
+}
+
+double Engine::scale(int parameter) const {
+  return parameter < kNuisanceCount
+             ? campaign_.nuisances[static_cast<std::size_t>(parameter)].tolerance
+             : campaign_.slots[static_cast<std::size_t>(parameter - kNuisanceCount)].row->typical;
+}
+
+Prior Engine::prior(const std::vector<int>& parameters, const ModelState& at) const {
+  const auto n = static_cast<Index>(parameters.size());
+  Prior out{VectorXd::Zero(n), VectorXd::Ones(n)};
+  for (Index j = 0; j < n; ++j) {
+    const int p = parameters[static_cast<std::size_t>(j)];
+    if (p < kNuisanceCount) {
+      out.pull[j] =
+          (campaign_.nuisances[static_cast<std::size_t>(p)].nominal - at.nuisance[p]) / scale(p);
+    } else {
+      out.pull[j] = -at.effects[p - kNuisanceCount] / scale(p);
+      out.precision[j] = 1.0 / (kSizePrior * kSizePrior);
+    }
+  }
+  return out;
+}
+
+std::vector<int> Engine::with_nuisances(const std::vector<int>& slots) const {
+  std::vector<int> out = nuisances_;
+  for (const int slot : slots) out.push_back(kNuisanceCount + slot);
+  return out;
+}
+
+std::vector<int> Engine::columns_of(const std::vector<int>& parameters) const {
+  std::vector<int> out;
+  for (const int p : parameters) {
+    const auto found = std::find(summary_parameters_.begin(), summary_parameters_.end(), p);
+    out.push_back(static_cast<int>(found - summary_parameters_.begin()));
+  }
+  return out;
+}
+
+Engine::Optimum Engine::minimise(const std::vector<int>& parameters, const ModelState& start,
+                                 const Whitening& whitening, const Scatter& scatter, int iterations,
+                                 int scatter_iterations) const {
+  VectorXd scales(static_cast<Index>(parameters.size()));
+  for (Index j = 0; j < scales.size(); ++j) {
+    scales[j] = scale(parameters[static_cast<std::size_t>(j)]);
+  }
+  std::vector<int> columns(parameters.size());
+  for (std::size_t i = 0; i < columns.size(); ++i) columns[i] = static_cast<int>(i);
+  const auto summaries_at = [&](const ModelState& state, const std::vector<int>& wanted) {
+    std::vector<Summary> out;
+    for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
+      if (campaign_.runs[e].valid_count == 0) continue;
+      out.push_back(summarise(campaign_, static_cast<int>(e), state, wanted, scales, whitening));
+    }
+    return out;
+  };
+  // Log likelihood of staying at a state.
+  const auto standing = [&](const ModelState& state, const std::vector<Summary>& summaries,
+                            const Scatter& with) {
+    const Fit none = fit_linear(summaries, {}, Prior{VectorXd(0), VectorXd(0)}, with, 0);
+    const Prior here = prior(parameters, state);
+    return none.log_likelihood - 0.5 * here.pull.cwiseAbs2().dot(here.precision);
+  };
+  Optimum best;
+  best.state = start;
+  best.summaries = summaries_at(start, parameters);
+  best.fit =
+      fit_linear(best.summaries, columns, prior(parameters, start), scatter, scatter_iterations);
+  best.objective = standing(start, best.summaries, best.fit.scatter);
+  double damping = 1e-4;
+  for (int i = 0; i < iterations; ++i) {
+    VectorXd diagonal = VectorXd::Zero(scales.size());
+    for (const Summary& each : best.summaries) {
+      diagonal += each.aa.diagonal().head(scales.size());
+    }
+    const Prior here = prior(parameters, best.state);
+    double gained = 0.0;
+    bool moved = false;
+    for (int attempt = 0; attempt < 7 && !moved; ++attempt) {
+      Prior damped = here;
+      damped.precision += damping * diagonal;
+      damped.pull = here.pull.cwiseProduct(here.precision).cwiseQuotient(damped.precision);
+      const Fit step = fit_linear(best.summaries, columns, damped, best.fit.scatter, 0);
+      ModelState next = best.state;
+      move(parameters, step.step, 1.0, next);
+      gained = standing(next, summaries_at(next, {}), best.fit.scatter) - best.objective;
+      moved = gained > 0.0;
+      damping = std::clamp(moved ? 0.1 * damping : 10.0 * damping, 1e-8, 1e4);
+      if (moved) best.state = next;
+    }
+    if (!moved) break;
+    best.summaries = summaries_at(best.state, parameters);
+    best.fit = fit_linear(best.summaries, columns, prior(parameters, best.state), best.fit.scatter,
+                          scatter_iterations);
+    best.objective = standing(best.state, best.summaries, best.fit.scatter);
+    if (gained < 0.02) break;
+  }
+  return best;
+}
+
+void Engine::fit_machine() {
+  campaign_.noise = estimate_noise_levels(campaign_, state_);
+  const ModelState start = state_;
+  ModelState best = start;
+  double best_objective = -std::numeric_limits<double>::infinity();
+  for (const double peak : {0.012, 0.02, 0.035}) {
+    state_ = start;
+    state_.nuisance[kLnPeakSlipOverdrive] = std::log(peak);
+    state_.nuisance[kLnPeakSlipLow] = std::log(1.4 * peak);
+    Whitening whitening = identity_whitening(campaign_);
+    Optimum optimum;
+    for (int round = 0; round < 4; ++round) {  // outliers of the last round
+      optimum = minimise(nuisances_, state_, whitening, default_scatter(), 6, 0);
+      state_ = optimum.state;
+      reweigh(campaign_, state_, whitening);
+    }
+    if (optimum.objective > best_objective) {
+      best_objective = optimum.objective;
+      best = state_;
+      whitening_ = whitening;
+    }
+  }
+  state_ = best;
+}
+
+void Engine::update_noise() {
+  std::vector<int> slots(campaign_.slots.size());
+  for (std::size_t i = 0; i < slots.size(); ++i) slots[i] = static_cast<int>(i);
+  summary_parameters_ = with_nuisances(slots);
+  VectorXd scales(static_cast<Index>(summary_parameters_.size()));
+  for (Index j = 0; j < scales.size(); ++j) {
+    scales[j] = scale(summary_parameters_[static_cast<std::size_t>(j)]);
+  }
+  // A tight prior on sizes: together, all effects could explain the noise itself.
+  Prior all = prior(summary_parameters_, state_);
+  for (Index j = static_cast<Index>(nuisances_.size()); j < all.precision.size(); ++j) {
+    all.precision[j] = kSaturatedPrecision;
+    all.pull[j] = 0.0;
+  }
+  for (int pass = 0; pass < 2; ++pass) {
+    whitening_ = fit_whitening(campaign_, state_, summary_parameters_, scales, all, whitening_);
+  }
+  summaries_.clear();
+  for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
+    if (campaign_.runs[e].valid_count == 0) continue;
+    summaries_.push_back(
+        summarise(campaign_, static_cast<int>(e), state_, summary_parameters_, scales, whitening_));
+  }
+  const std::vector<int> parameters = with_nuisances(accepted_);
+  base_ = fit_linear(summaries_, columns_of(parameters), prior(parameters, state_),
+                     default_scatter(), 25);
+}
+
+double Engine::degrees(double with_scatter, double without_scatter) const {
+  const double share = std::clamp(1.0 - with_scatter / std::max(without_scatter, 1e-300), 0.0, 1.0);
+  const double between = std::max(1.0, static_cast<double>(summaries_.size()) - 2.0 -
+                                           static_cast<double>(accepted_.size())) +
+                         kScatterPriorRuns;
+  return between / std::max(share * share, 1e-6);
+}
+
+std::vector<Score> Engine::screen() const {
+  std::vector<Score> out;
+  const std::vector<int> base = with_nuisances(accepted_);
+  const std::vector<int> base_columns = columns_of(base);
+  const Prior base_prior = prior(base, state_);
+  for (int slot = 0; slot < static_cast<int>(campaign_.slots.size()); ++slot) {
+    if (std::find(accepted_.begin(), accepted_.end(), slot) != accepted_.end()) continue;
+    std::vector<int> parameters = base;
+    parameters.push_back(kNuisanceCount + slot);
+    const std::vector<int> columns = columns_of(parameters);
+    const Fit fit = fit_linear(summaries_, columns, prior(parameters, state_), base_.scatter, 8);
+    const Information info =
+        information_on(summaries_, base_columns, base_prior, columns.back(), fit.scatter);
+    Score score;
+    score.slot = slot;
+    double energy = 0.0;
+    for (const Summary& each : summaries_) energy += each.aa(columns.back(), columns.back());
+    score.absorbed = energy > 0.0 ? 1.0 - info.without_scatter / energy : 1.0;
+    const double unit = scale(kNuisanceCount + slot);
+    const auto last = fit.step.size() - 1;
+    score.value = fit.step[last] * unit;
+    score.sigma = std::sqrt(std::max(fit.covariance(last, last), 0.0)) * unit;
+    score.chi2 = chi2_of_student(fit.step[last] / std::sqrt(fit.covariance(last, last)),
+                                 degrees(info.with_scatter, info.without_scatter));
+    score.gain = 2.0 * (fit.log_likelihood - base_.log_likelihood);
+    out.push_back(score);
+  }
+  return out;
+}
+
+double Engine::linear_gain(const std::vector<int>& slots) const {
+  const std::vector<int> parameters = with_nuisances(slots);
+  const Fit fit =
+      fit_linear(summaries_, columns_of(parameters), prior(parameters, state_), base_.scatter, 3);
+  return 2.0 * (fit.log_likelihood - base_.log_likelihood);
+}
+
+Engine::Replacement Engine::replace(const std::vector<int>& slots, int instead_of) const {
+  const int column = columns_of({kNuisanceCount + instead_of}).front();
+  const double back = -state_.effects[instead_of] / scale(kNuisanceCount + instead_of);
+  std::vector<Summary> moved = summaries_;
+  for (Summary& each : moved) {  // the residual's column after the step back
+    const auto last = each.aa.rows() - 1;
+    const double power = each.aa(last, last) + 2.0 * back * each.aa(column, last) +
+                         back * back * each.aa(column, column);
+    const VectorXd cross = each.aa.col(last) + back * each.aa.col(column);
+    each.aa.col(last) = cross;
+    each.aa.row(last) = cross.transpose();
+    each.aa(last, last) = power;
+    each.ua.col(last) += back * each.ua.col(column);
+  }
+  const std::vector<int> parameters = with_nuisances(slots);
+  const Fit fit =
+      fit_linear(moved, columns_of(parameters), prior(parameters, state_), base_.scatter, 3);
+  Replacement out{2.0 * (fit.log_likelihood - base_.log_likelihood), state_};
+  out.state.effects[instead_of] = 0.0;
+  move(parameters, fit.step, 1.0, out.state);
+  return out;
+}
+
+void Engine::move(const std::vector<int>& parameters, const VectorXd& step, double share,
+                  ModelState& state) const {
+  for (std::size_t j = 0; j < parameters.size(); ++j) {
+    const double by = share * step[static_cast<Index>(j)] * scale(parameters[j]);
+    if (parameters[j] < kNuisanceCount) {
+      state.nuisance[parameters[j]] += by;
+    } else {
+      const int slot = parameters[j] - kNuisanceCount;
+      const EffectRow& row = *campaign_.slots[static_cast<std::size_t>(slot)].row;
+      state.effects[slot] = std::clamp(state.effects[slot] + by, row.low, row.high);
+    }
+  }
+}
+
+Hypothesis Engine::refine(const std::vector<int>& slots, int iterations) const {
+  return refine_from(state_, slots, iterations);
+}
+
+Hypothesis Engine::refine_from(const ModelState& from, const std::vector<int>& slots,
+                               int iterations) const {
+  Hypothesis out;
+  out.slots = slots;
+  ModelState start = from;
+  for (Index i = 0; i < start.effects.size(); ++i) {
+    if (std::find(slots.begin(), slots.end(), static_cast<int>(i)) == slots.end()) {
+      start.effects[i] = 0.0;
+    }
+  }
+  const std::vector<int> parameters = with_nuisances(slots);
+  VectorXd scales(static_cast<Index>(parameters.size()));
+  for (Index j = 0; j < scales.size(); ++j) {
+    scales[j] = scale(parameters[static_cast<std::size_t>(j)]);
+  }
+  std::vector<int> columns(parameters.size());
+  for (std::size_t i = 0; i < columns.size(); ++i) columns[i] = static_cast<int>(i);
+  const Optimum optimum = minimise(parameters, start, whitening_, base_.scatter, iterations, 6);
+  const ModelState& best = optimum.state;
+  const Fit& fit = optimum.fit;
+  const std::vector<Summary>& summaries = optimum.summaries;
+  const double here = optimum.objective;
+  out.state = best;
+  out.fit = fit;
+  out.log_likelihood = here;
+  out.log_evidence = here;
+  for (std::size_t s = 0; s < slots.size(); ++s) {
+    const auto j = static_cast<Index>(nuisances_.size() + s);
+    const double variance = std::max(fit.covariance(j, j), 1e-300);
+    const double value = best.effects[slots[s]] / scales[j];
+    std::vector<int> others = columns;
+    others.erase(others.begin() + j);
+    std::vector<int> other_parameters = parameters;
+    other_parameters.erase(other_parameters.begin() + j);
+    const Information info = information_on(summaries, others, prior(other_parameters, best),
+                                            static_cast<int>(j), fit.scatter);
+    out.degrees.push_back(degrees(info.with_scatter, info.without_scatter));
+    out.chi2.push_back(chi2_of_student(value / std::sqrt(variance), out.degrees.back()));
+    // Occam: width of the posterior over that of the prior (its height is in the likelihood).
+    out.log_evidence += 0.5 * std::log(variance / (kSizePrior * kSizePrior));
+  }
+  return out;
+}
+
+void Engine::accept(const Hypothesis& hypothesis) {
+  accepted_ = hypothesis.slots;
+  state_ = hypothesis.state;
+}
+
+double Engine::left_out_gain(const std::vector<int>& slots) const {
+  const auto density = [&](const std::vector<int>& set) {
+    const std::vector<int> parameters = with_nuisances(set);
+    const std::vector<int> columns = columns_of(parameters);
+    const Prior here = prior(parameters, state_);
+    double total = 0.0;
+    for (std::size_t e = 0; e < summaries_.size(); ++e) {
+      std::vector<Summary> others = summaries_;
+      const std::vector<Summary> left_out{others[e]};
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(e));
+      const Fit fit = fit_linear(others, columns, here, base_.scatter, 0);
+      // Predictive: the others' posterior as the prior of the one left out; its gain in evidence.
+      std::vector<Summary> all = others;
+      all.push_back(left_out[0]);
+      const Fit with = fit_linear(all, columns, here, base_.scatter, 0);
+      const double ln_det = fit.covariance.ldlt().vectorD().array().max(1e-300).log().sum() -
+                            with.covariance.ldlt().vectorD().array().max(1e-300).log().sum();
+      total += with.log_likelihood - fit.log_likelihood - 0.5 * ln_det;
+    }
+    return total;
+  };
+  return density(slots) - density(accepted_);
+}
+
+}  // namespace beltgrip::diagnose

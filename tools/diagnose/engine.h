@@ -1,0 +1,100 @@
+// Fits: the nominal machine to the data, the noise that is left, and any set of effects jointly
+// with the machine's constants. All hypotheses at one stage share whitening and weights, so that
+// their likelihoods compare.
+#pragma once
+
+#include <vector>
+
+#include "tools/diagnose/infer.h"
+#include "tools/diagnose/model_file.h"
+
+namespace beltgrip::diagnose {
+
+struct Hypothesis {
+  std::vector<int> slots;
+  ModelState state;             // at the optimum
+  Fit fit;                      // linear fit there; columns: active nuisances, then slots
+  double log_likelihood = 0.0;  // with priors on the machine's constants and the sizes
+  double log_evidence = 0.0;    // sizes integrated out
+  std::vector<double> chi2;     // per slot: equivalent chi-square(1) of its being there
+  std::vector<double> degrees;  // per slot: of freedom
+};
+
+struct Score {
+  int slot = 0;
+  double chi2 = 0.0;      // equivalent chi-square(1), sparse scatter counted
+  double gain = 0.0;      // of twice the log likelihood
+  double value = 0.0;     // linear estimate
+  double sigma = 0.0;     // its one sigma
+  double absorbed = 0.0;  // share of the column's energy that the machine's constants explain
+};
+
+class Engine {
+ public:
+  explicit Engine(Campaign campaign);
+
+  const Campaign& campaign() const { return campaign_; }
+  const ModelState& state() const { return state_; }
+  const std::vector<int>& accepted() const { return accepted_; }
+  const std::vector<Summary>& summaries() const { return summaries_; }
+  const Whitening& whitening() const { return whitening_; }
+  const std::vector<int>& active_nuisances() const { return nuisances_; }
+
+  // Constants of the nominal machine from the data: robust, from several starts.
+  void fit_machine();
+  // Noise model and matrices at the present state; call after fit_machine and accept.
+  void update_noise();
+  // All slots one at a time on top of the accepted ones.
+  std::vector<Score> screen() const;
+  // Full non-linear fit of a set of slots (all of them, accepted or not).
+  Hypothesis refine(const std::vector<int>& slots, int iterations = 5) const;
+  Hypothesis refine_from(const ModelState& start, const std::vector<int>& slots,
+                         int iterations = 5) const;
+  // Gain of twice the log likelihood of a set over the accepted one, linear.
+  double linear_gain(const std::vector<int>& slots) const;
+  // The same for `slots` in place of the accepted one `instead_of`, whose size goes back to zero.
+  struct Replacement {
+    double gain = 0.0;
+    ModelState state;  // of the linear fit: a start for refine_from
+  };
+  Replacement replace(const std::vector<int>& slots, int instead_of) const;
+  // Makes the hypothesis the present state.
+  void accept(const Hypothesis& hypothesis);
+  // Sum of log predictive densities of left-out experiments, relative to the accepted hypothesis.
+  double left_out_gain(const std::vector<int>& slots) const;
+
+  double scale(int parameter) const;
+  Prior prior(const std::vector<int>& parameters, const ModelState& at) const;
+  std::vector<int> with_nuisances(const std::vector<int>& slots) const;  // parameter numbers
+  double degrees(double with_scatter, double without_scatter) const;
+
+  // Adds a scaled step, effects kept within their bounds.
+  void move(const std::vector<int>& parameters, const Eigen::VectorXd& step, double share,
+            ModelState& state) const;
+
+ private:
+  struct Optimum {
+    ModelState state;
+    Fit fit;
+    double objective = 0.0;  // log likelihood with priors, at the state
+    std::vector<Summary> summaries;
+  };
+  // Levenberg-Marquardt on the marginal likelihood, scatter re-estimated on the way.
+  Optimum minimise(const std::vector<int>& parameters, const ModelState& start,
+                   const Whitening& whitening, const Scatter& scatter, int iterations,
+                   int scatter_iterations) const;
+  std::vector<int> columns_of(const std::vector<int>& parameters) const;
+
+  Campaign campaign_;
+  ModelState state_;
+  std::vector<int> accepted_;
+  std::vector<int> nuisances_;
+  Whitening whitening_;
+  std::vector<int> summary_parameters_;
+  std::vector<Summary> summaries_;
+  Fit base_;
+};
+
+Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model);
+
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,253 @@
+#include "tools/diagnose/experiment_data.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace beltgrip::diagnose {
+namespace {
+
+using Eigen::ArrayXd;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kGrid_s = 0.1;
+constexpr double kKernelSigma_s = 0.07;
+constexpr double kSlowSigma_s = 0.25;
+constexpr double kTrim_s = 0.3;            // either end of a gapless stretch
+constexpr double kSlipMax = 0.06;          // beyond: damage, not friction to be explained
+constexpr double kSlipRateMax_1_s = 0.03;  // the run-away: ratios of derivatives, no statics
+constexpr double kRatioTolerance = 0.085;  // ln; around an end stop
+constexpr double kSpeedMin_rad_s = 10.0;
+constexpr double kForceMin_N = 200.0;
+
+double median_period_s(const Channel& channel) {
+  if (channel.t_s.size() < 3) return kNaN;
+  std::vector<double> steps(channel.t_s.size() - 1);
+  for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = channel.t_s[i + 1] - channel.t_s[i];
+  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2),
+                   steps.end());
+  return steps[steps.size() / 2];
+}
+
+// Value and slope at each grid instant: local linear fit; between the samples of a slow channel
+// linear interpolation; nothing across a gap.
+GridSignal to_grid(const Channel& channel, double start_s, int n, double dt_s) {
+  GridSignal out;
+  out.value = ArrayXd::Constant(n, kNaN);
+  out.slope = ArrayXd::Zero(n);
+  if (channel.t_s.size() < 3) return out;
+  const double period_s = median_period_s(channel);
+  const double sigma_s = std::max(kKernelSigma_s, 0.7 * (dt_s - kGrid_s + kKernelSigma_s));
+  const double half_s = 3.0 * sigma_s;
+  const double gap_s = std::max(0.25, 3.5 * period_s);
+  std::size_t first = 0;
+  for (int k = 0; k < n; ++k) {
+    const double t = start_s + k * dt_s;
+    while (first < channel.t_s.size() && channel.t_s[first] < t - half_s) ++first;
+    double w0 = 0.0, w1 = 0.0, w2 = 0.0, y0 = 0.0, y1 = 0.0;
+    double nearest_before = -1e9, nearest_after = 1e9;
+    for (std::size_t i = first; i < channel.t_s.size() && channel.t_s[i] <= t + half_s; ++i) {
+      const double u = (channel.t_s[i] - t) / sigma_s;
+      (u <= 0.0 ? nearest_before : nearest_after) = u <= 0.0 ? u : std::min(nearest_after, u);
+      const double w = std::exp(-0.5 * u * u);
+      w0 += w;
+      w1 += w * u;
+      w2 += w * u * u;
+      y0 += w * channel.value[i];
+      y1 += w * u * channel.value[i];
+    }
+    if ((nearest_after - nearest_before) * sigma_s > gap_s && k > 0 && k + 1 < n) {
+      // Too far apart for the fit; a slow channel may still be interpolated below.
+    } else if (const double determinant = w0 * w2 - w1 * w1; determinant > 0.02 * w0 * w0) {
+      out.value[k] = (w2 * y0 - w1 * y1) / determinant;
+      out.slope[k] = (w0 * y1 - w1 * y0) / determinant / sigma_s;
+      out.present = true;
+      continue;
+    }
+    const auto after = std::upper_bound(channel.t_s.begin(), channel.t_s.end(), t);
+    if (after == channel.t_s.begin() || after == channel.t_s.end()) continue;
+    const auto i = static_cast<std::size_t>(after - channel.t_s.begin());
+    const double width_s = channel.t_s[i] - channel.t_s[i - 1];
+    if (width_s > gap_s) continue;
+    const double share = (t - channel.t_s[i - 1]) / width_s;
+    out.value[k] = (1.0 - share) * channel.value[i - 1] + share * channel.value[i];
+    out.slope[k] = (channel.value[i] - channel.value[i - 1]) / width_s;
+    out.present = true;
+  }
+  return out;
+}
+
+// The slow copy of what is on the grid.
+void add_slow(GridSignal& signal, double dt_s) {
+  const auto n = static_cast<int>(signal.value.size());
+  signal.slow = signal.value;
+  signal.slow_slope = signal.slope;
+  const int reach = static_cast<int>(std::ceil(3.0 * kSlowSigma_s / dt_s));
+  std::vector<double> weight;
+  for (int i = 0; i <= reach; ++i) {
+    weight.push_back(std::exp(-0.5 * std::pow(i * dt_s / kSlowSigma_s, 2.0)));
+  }
+  for (int k = 0; k < n; ++k) {
+    double w0 = 0.0, w1 = 0.0, w2 = 0.0, y0 = 0.0, y1 = 0.0;
+    for (int i = std::max(0, k - reach); i <= std::min(n - 1, k + reach); ++i) {
+      const double y = signal.value[i];
+      if (!std::isfinite(y)) continue;
+      const double w = weight[static_cast<std::size_t>(std::abs(i - k))];
+      const double u = (i - k) * dt_s;
+      w0 += w;
+      w1 += w * u;
+      w2 += w * u * u;
+      y0 += w * y;
+      y1 += w * u * y;
+    }
+    const double determinant = w0 * w2 - w1 * w1;
+    if (!std::isfinite(signal.value[k]) || determinant <= 0.02 * w0 * w0 * dt_s * dt_s) continue;
+    signal.slow[k] = (w2 * y0 - w1 * y1) / determinant;
+    signal.slow_slope[k] = (w0 * y1 - w1 * y0) / determinant;
+  }
+}
+
+// Samples that sit on the channel's largest or smallest value for half a second and more while the
+// channel moves elsewhere.
+std::vector<bool> saturated_samples(const Channel& channel, double start_s, int n, double dt_s) {
+  std::vector<bool> out(static_cast<std::size_t>(n), false);
+  if (channel.value.size() < 10) return out;
+  const auto [low, high] = std::minmax_element(channel.value.begin(), channel.value.end());
+  if (*low == *high) return out;
+  for (const double bound : {*low, *high}) {
+    std::size_t i = 0;
+    while (i < channel.value.size()) {
+      std::size_t end = i;
+      while (end < channel.value.size() && channel.value[end] == bound) ++end;
+      if (end > i + 5 && channel.t_s[end - 1] - channel.t_s[i] >= 0.5) {
+        const int from = static_cast<int>((channel.t_s[i] - start_s) / dt_s) - 1;
+        const int to = static_cast<int>((channel.t_s[end - 1] - start_s) / dt_s) + 1;
+        for (int k = std::max(0, from); k <= std::min(n - 1, to); ++k) {
+          out[static_cast<std::size_t>(k)] = true;
+        }
+      }
+      i = std::max(end, i + 1);
+    }
+  }
+  return out;
+}
+
+int stop_of(double speed_ratio, const estimator::VariatorParameters& variator) {
+  if (!(speed_ratio > 0.0)) return kNoStop;
+  if (std::abs(std::log(speed_ratio / variator.ratio_overdrive)) < kRatioTolerance) {
+    return kOverdriveStop;
+  }
+  if (std::abs(std::log(speed_ratio / variator.ratio_low)) < kRatioTolerance) return kLowStop;
+  return kNoStop;
+}
+
+void trim_and_segment(ExperimentData& data) {
+  const int n = data.size();
+  const int trim = static_cast<int>(std::lround(kTrim_s / data.dt_s));
+  std::vector<bool> kept(data.valid.size(), false);
+  for (int k = 0; k < n;) {
+    if (!data.valid[static_cast<std::size_t>(k)]) {
+      ++k;
+      continue;
+    }
+    int end = k;
+    while (end < n && data.valid[static_cast<std::size_t>(end)] &&
+           data.stop[static_cast<std::size_t>(end)] == data.stop[static_cast<std::size_t>(k)]) {
+      ++end;
+    }
+    if (end - k > 2 * trim + 10) {
+      data.start_of_segment.push_back(k + trim);
+      for (int i = k + trim; i < end - trim; ++i) kept[static_cast<std::size_t>(i)] = true;
+      data.valid_count += end - k - 2 * trim;
+    }
+    k = end;
+  }
+  data.valid = kept;
+}
+
+}  // namespace
+
+ArrayXd shifted(const GridSignal& signal, double dt_s, double shift_s) {
+  const ArrayXd& x = signal.slow;
+  const auto n = x.size();
+  ArrayXd out(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const double at = static_cast<double>(k) + shift_s / dt_s;
+    const double clamped = std::clamp(at, 0.0, static_cast<double>(n - 1));
+    const auto i = std::min(static_cast<Eigen::Index>(clamped), n - 2);
+    const double u = clamped - static_cast<double>(i);
+    // Hermite: values and slopes of the fit at both ends.
+    const double a = x[i], b = x[i + 1];
+    const double da = signal.slow_slope[i] * dt_s, db = signal.slow_slope[i + 1] * dt_s;
+    const double v = 1.0 - u;
+    const double y =
+        v * v * (1.0 + 2.0 * u) * a + u * u * (1.0 + 2.0 * v) * b + u * v * (v * da - u * db);
+    out[k] = std::isfinite(y) ? y : x[k];
+  }
+  return out;
+}
+
+ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator) {
+  ExperimentData data;
+  data.name = table.name;
+  data.notes = table.notes;
+  const Channel& speed = table[Role::kPrimarySpeed];
+  if (speed.t_s.size() < 10) {
+    data.notes.push_back(table.name + ": no primary_speed");
+    return data;
+  }
+  const double start_s = speed.t_s.front();
+  data.dt_s = std::max(kGrid_s, median_period_s(speed));
+  const int n = static_cast<int>((speed.t_s.back() - start_s) / data.dt_s) + 1;
+  const auto on_grid = [&](Role role) {
+    GridSignal out = to_grid(table[role], start_s, n, data.dt_s);
+    add_slow(out, data.dt_s);
+    return out;
+  };
+  data.t_s = ArrayXd::LinSpaced(n, 0.0, (n - 1) * data.dt_s);
+  data.omega_p = on_grid(Role::kPrimarySpeed);
+  data.omega_s = on_grid(Role::kSecondarySpeed);
+  data.pressure = on_grid(Role::kSecondaryPressure);
+  data.torque_is_engine = table[Role::kPrimaryTorque].empty();
+  data.torque = on_grid(data.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque);
+  data.torque_s = on_grid(Role::kSecondaryTorque);
+  data.pressure_p = on_grid(Role::kPrimaryPressure);
+  data.command = on_grid(Role::kSecondaryPressureCommand);
+  data.temperature = on_grid(Role::kOilTemperature);
+
+  const std::vector<bool> saturated =
+      saturated_samples(table[Role::kSecondaryPressure], start_s, n, data.dt_s);
+  data.stop.assign(static_cast<std::size_t>(n), kNoStop);
+  data.valid.assign(static_cast<std::size_t>(n), false);
+  const auto usable = [](const GridSignal& signal, int k) {
+    return !signal.present || std::isfinite(signal.value[k]);
+  };
+  for (int k = 0; k < n; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    if (!(data.omega_p.value[k] > kSpeedMin_rad_s) || !std::isfinite(data.omega_s.value[k]))
+      continue;
+    data.stop[i] = stop_of(data.omega_s.value[k] / data.omega_p.value[k], variator);
+    if (data.stop[i] == kNoStop) continue;
+    const double ratio = data.stop[i] == kLowStop ? variator.ratio_low : variator.ratio_overdrive;
+    const double slip = 1.0 - data.omega_s.value[k] / (data.omega_p.value[k] * ratio);
+    const double slip_rate = (data.omega_s.value[k] * data.omega_p.slope[k] /
+                                  (data.omega_p.value[k] * data.omega_p.value[k]) -
+                              data.omega_s.slope[k] / data.omega_p.value[k]) /
+                             ratio;
+    const double force_N = variator.secondary_piston_area_m2 * data.pressure.value[k] +
+                           variator.secondary_spring_force_N;
+    data.valid[i] = std::abs(slip) < kSlipMax && std::abs(slip_rate) < kSlipRateMax_1_s &&
+                    data.pressure.present && force_N > kForceMin_N && data.torque.present &&
+                    usable(data.pressure, k) && usable(data.torque, k) &&
+                    usable(data.torque_s, k) && usable(data.command, k) &&
+                    usable(data.temperature, k) && usable(data.pressure_p, k) && !saturated[i];
+    data.saturated_pressure |= saturated[i];
+  }
+  trim_and_segment(data);
+  if (data.saturated_pressure) {
+    data.notes.push_back(table.name + ": secondary_pressure rests on its bound; left out there");
+  }
+  return data;
+}
+
+}  // namespace beltgrip::diagnose

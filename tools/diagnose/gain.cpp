@@ -1,0 +1,231 @@
+#include "tools/diagnose/gain.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace beltgrip::diagnose {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr int kDraws = 2000;
+constexpr double kBelow = 0.7, kAbout = 0.5;  // slip over slip at the peak
+
+// Parameters of the fit to all experiments but one, by one linear step from the fit to all.
+std::vector<ModelState> left_out_states(const Engine& engine, const ModelState& state,
+                                        const std::vector<int>& slots) {
+  const Campaign& campaign = engine.campaign();
+  const std::vector<int> parameters = engine.with_nuisances(slots);
+  VectorXd scales(static_cast<Index>(parameters.size()));
+  std::vector<int> columns;
+  for (Index j = 0; j < scales.size(); ++j) {
+    scales[j] = engine.scale(parameters[static_cast<std::size_t>(j)]);
+    columns.push_back(static_cast<int>(j));
+  }
+  std::vector<Summary> summaries;
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    summaries.push_back(
+        summarise(campaign, static_cast<int>(e), state, parameters, scales, engine.whitening()));
+  }
+  const Prior prior = engine.prior(parameters, state);
+  std::vector<Summary> used;
+  for (const Summary& each : summaries) {
+    if (each.samples > 0) used.push_back(each);
+  }
+  const Scatter scatter = fit_linear(used, columns, prior, default_scatter(), 10).scatter;
+  std::vector<ModelState> out;
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    std::vector<Summary> others;
+    for (std::size_t i = 0; i < summaries.size(); ++i) {
+      if (i != e && summaries[i].samples > 0) others.push_back(summaries[i]);
+    }
+    ModelState without = state;
+    if (!others.empty()) {
+      engine.move(parameters, fit_linear(others, columns, prior, scatter, 0).step, 1.0, without);
+    }
+    out.push_back(std::move(without));
+  }
+  return out;
+}
+
+double rms(const SignalErrors::Sum& sum) {
+  return sum.count > 0.0 ? std::sqrt(sum.squares / sum.count) : 0.0;
+}
+
+// Before, after and the 95 % interval of the difference, experiments drawn with replacement.
+Gain compare(const std::vector<SignalErrors>& before, const std::vector<SignalErrors>& after) {
+  Gain out;
+  std::uint64_t state = 0x9E3779B97F4A7C15ULL;
+  const auto draw = [&](std::size_t n) {
+    state ^= state << 13;
+    state ^= state >> 7;
+    state ^= state << 17;
+    return static_cast<std::size_t>(state % n);
+  };
+  std::map<std::string, std::vector<std::size_t>> holders;
+  for (std::size_t e = 0; e < before.size(); ++e) {
+    for (const auto& [name, sum] : before[e].signal) {
+      if (sum.count > 0.0) holders[name].push_back(e);
+    }
+  }
+  for (const auto& [name, runs] : holders) {
+    const auto total = [&](const std::vector<SignalErrors>& errors,
+                           const std::vector<std::size_t>& which) {
+      SignalErrors::Sum sum;
+      for (const std::size_t e : which) {
+        const auto& each = errors[e].signal.at(name);
+        sum.squares += each.squares;
+        sum.count += each.count;
+      }
+      return rms(sum);
+    };
+    BeforeAfter result{total(before, runs), total(after, runs)};
+    std::vector<double> differences;
+    for (int i = 0; i < kDraws; ++i) {
+      std::vector<std::size_t> drawn(runs.size());
+      for (std::size_t& e : drawn) e = runs[draw(runs.size())];
+      differences.push_back(total(before, drawn) - total(after, drawn));
+    }
+    std::sort(differences.begin(), differences.end());
+    result.low = differences[kDraws / 40];
+    result.high = differences[kDraws - 1 - kDraws / 40];
+    out.signals[name] = result;
+  }
+  // Friction at the peak: rms over experiments of the mean departure.
+  std::vector<std::pair<double, double>> peaks;
+  for (std::size_t e = 0; e < before.size(); ++e) {
+    if (before[e].ln_mu_count < 5.0 || after[e].ln_mu_count < 5.0) continue;
+    peaks.emplace_back(before[e].ln_mu_sum / before[e].ln_mu_count,
+                       after[e].ln_mu_sum / after[e].ln_mu_count);
+  }
+  if (peaks.size() >= 2) {
+    const auto errors = [&](const std::vector<std::pair<double, double>>& of) {
+      double b = 0.0, a = 0.0;
+      for (const auto& [x, y] : of) {
+        b += x * x;
+        a += y * y;
+      }
+      const auto n = static_cast<double>(of.size());
+      return std::pair{std::sqrt(b / n), std::sqrt(a / n)};
+    };
+    const auto [b, a] = errors(peaks);
+    std::vector<double> differences;
+    for (int i = 0; i < kDraws; ++i) {
+      std::vector<std::pair<double, double>> drawn(peaks.size());
+      for (auto& each : drawn) each = peaks[draw(peaks.size())];
+      const auto [x, y] = errors(drawn);
+      differences.push_back(x - y);
+    }
+    std::sort(differences.begin(), differences.end());
+    out.mu_max = MuMaxError{b, a, differences[kDraws / 40], differences[kDraws - 1 - kDraws / 40]};
+  }
+  return out;
+}
+
+std::string torque_name(const Campaign& campaign) {
+  for (const ExperimentData& run : campaign.runs) {
+    if (run.valid_count > 0) return run.torque_is_engine ? "engine_torque" : "primary_torque";
+  }
+  return "primary_torque";
+}
+
+}  // namespace
+
+SignalErrors signal_errors(const Campaign& campaign, int run, const ModelState& state) {
+  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+  SignalErrors out;
+  if (data.valid_count == 0) return out;
+  const Residuals at = residuals_of(campaign, run, state);
+  auto& speed = out.signal["secondary_speed"];
+  auto& torque = out.signal[torque_name(campaign)];
+  const double slip_sigma = campaign.noise.slip, torque_sigma = campaign.noise.torque_Nm;
+  for (int k = 0; k < data.size(); ++k) {
+    if (!data.valid[static_cast<std::size_t>(k)]) continue;
+    const double x = std::abs(at.foot[k]);
+    // The distance vector runs along (slope s_slip^2, -s_torque^2); its ends on the axes are the
+    // errors of one signal given the other.
+    const double distance = at.value[kFrictionResidual][k] / at.weight[k];  // Nm, at given slip
+    if (x < kBelow && at.slope[k] > 0.0 && at.slope[k] * slip_sigma > 0.2 * torque_sigma) {
+      const double slip_error = distance / at.slope[k];
+      const double omega_s_error = data.omega_s.value[k] * slip_error;
+      speed.squares += omega_s_error * omega_s_error;
+      speed.count += 1.0;
+    }
+    if (x > kAbout) {
+      torque.squares += distance * distance;
+      torque.count += 1.0;
+    }
+    if (x > 0.8 && x < 1.5) {
+      out.ln_mu_sum += distance / at.model_Nm[k];
+      out.ln_mu_count += 1.0;
+    }
+    if (campaign.has_balance && data.torque_s.present) {
+      const double ratio = data.omega_s.value[k] / data.omega_p.value[k];
+      const double error = at.value[kBalanceResidual][k] * campaign.noise.balance_Nm / ratio;
+      auto& sum = out.signal["secondary_torque"];
+      sum.squares += error * error;
+      sum.count += 1.0;
+    }
+    if (campaign.has_tracking && data.command.present) {
+      const double error = at.value[kTrackingResidual][k] * campaign.noise.tracking_Pa;
+      auto& sum = out.signal["secondary_pressure"];
+      sum.squares += error * error;
+      sum.count += 1.0;
+    }
+  }
+  return out;
+}
+
+std::map<std::string, double> noise_floors(const Campaign& campaign, const ModelState& state) {
+  std::map<std::string, double> out;
+  double omega_s = 0.0, ratio = 0.0, count = 0.0, leverage = 0.0;
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    const ExperimentData& data = campaign.runs[e];
+    if (data.valid_count == 0) continue;
+    const Residuals at = residuals_of(campaign, static_cast<int>(e), state);
+    for (int k = 0; k < data.size(); ++k) {
+      if (!data.valid[static_cast<std::size_t>(k)]) continue;
+      omega_s += data.omega_s.value[k];
+      ratio += data.omega_s.value[k] / data.omega_p.value[k];
+      leverage += 1.0 / (at.weight[k] * at.weight[k]);
+      count += 1.0;
+    }
+  }
+  if (count == 0.0) return out;
+  out["secondary_speed"] = omega_s / count * campaign.noise.slip;
+  out[torque_name(campaign)] = std::sqrt(leverage / count);
+  if (campaign.has_balance) {
+    out["secondary_torque"] = campaign.noise.balance_Nm / (ratio / count);
+  }
+  if (campaign.has_tracking) out["secondary_pressure"] = campaign.noise.tracking_Pa;
+  return out;
+}
+
+Gain left_out_gain(const Engine& engine, const ModelState& nominal, const ModelState& extended,
+                   const std::vector<int>& slots) {
+  const Campaign& campaign = engine.campaign();
+  const std::vector<ModelState> before = left_out_states(engine, nominal, {});
+  const std::vector<ModelState> after =
+      slots.empty() ? before : left_out_states(engine, extended, slots);
+  std::vector<SignalErrors> errors_before, errors_after;
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    errors_before.push_back(signal_errors(campaign, static_cast<int>(e), before[e]));
+    errors_after.push_back(signal_errors(campaign, static_cast<int>(e), after[e]));
+  }
+  return compare(errors_before, errors_after);
+}
+
+Gain held_out_gain(const Campaign& held_out, const ModelState& nominal,
+                   const ModelState& extended) {
+  std::vector<SignalErrors> before, after;
+  for (std::size_t e = 0; e < held_out.runs.size(); ++e) {
+    before.push_back(signal_errors(held_out, static_cast<int>(e), nominal));
+    after.push_back(signal_errors(held_out, static_cast<int>(e), extended));
+  }
+  return compare(before, after);
+}
+
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,43 @@
+// What the extended model is worth: errors of the predicted signals on experiments that were not
+// used for the fit, before and after.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/diagnose/diagnosis.h"
+#include "tools/diagnose/engine.h"
+
+namespace beltgrip::diagnose {
+
+// Errors of one experiment under a state: secondary_speed where the torque decides the slip (below
+// the peak), the torque where the slip decides it, secondary_torque and secondary_pressure from
+// balance and command.
+struct SignalErrors {
+  struct Sum {
+    double squares = 0.0;
+    double count = 0.0;
+  };
+  std::map<std::string, Sum> signal;
+  double ln_mu_sum = 0.0, ln_mu_count = 0.0;  // measured over modelled friction about the peak
+};
+SignalErrors signal_errors(const Campaign& campaign, int run, const ModelState& state);
+
+// Noise of the same signals, from differences of neighbouring samples.
+std::map<std::string, double> noise_floors(const Campaign& campaign, const ModelState& state);
+
+struct Gain {
+  std::map<std::string, BeforeAfter> signals;
+  std::optional<MuMaxError> mu_max;
+};
+
+// Every experiment predicted by a machine (nominal, and with the effects) that was fitted to the
+// others.
+Gain left_out_gain(const Engine& engine, const ModelState& nominal, const ModelState& extended,
+                   const std::vector<int>& slots);
+// Experiments of another campaign, predicted by the two states.
+Gain held_out_gain(const Campaign& held_out, const ModelState& nominal, const ModelState& extended);
+
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,96 @@
+// From residuals to evidence: whitening, scatter between experiments as random effects, one small
+// matrix per experiment; after that every question is algebra on these matrices.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <vector>
+
+#include "tools/diagnose/residuals.h"
+
+namespace beltgrip::diagnose {
+
+// What varies from experiment to experiment in a healthy machine: level of friction, seat of the
+// ratio, zero of the torque, slip at the peak, zero of the secondary torque, zero of the tracking.
+inline constexpr int kRandomEffects = 6;
+
+// Prediction-error filter per residual: order p from the data, lower orders for the first samples
+// of a segment. Weights: Huber, per sample, fixed for all hypotheses.
+struct Whitening {
+  static constexpr int kOrder = 8;
+  struct Filter {
+    std::vector<Eigen::VectorXd> coefficient;  // [order] -> a_1..a_order
+    std::vector<double> sigma;                 // innovation, per order
+  };
+  std::array<Filter, kResidualKinds> filter;
+  double cross = 0.0;  // correlation of the whitened friction and balance residuals
+  std::vector<std::array<Eigen::ArrayXd, kResidualKinds>> weight;  // per experiment
+};
+
+// Whitened normal equations of one experiment. Columns: parameters asked for, then the residual.
+struct Summary {
+  Eigen::MatrixXd aa;  // (n + 1) x (n + 1)
+  Eigen::MatrixXd ua;  // random effects x (n + 1)
+  Eigen::MatrixXd uu;
+  int samples = 0;
+};
+
+struct Scatter {
+  Eigen::Array<double, kRandomEffects, 1> variance;
+};
+Scatter default_scatter();
+
+// Parameters in play: their columns in the summaries, the prior (in scaled units around the
+// linearisation point).
+struct Prior {
+  Eigen::VectorXd pull;       // mean minus present value, scaled
+  Eigen::VectorXd precision;  // scaled
+};
+
+struct Fit {
+  Eigen::VectorXd step;        // scaled, from the linearisation point
+  Eigen::MatrixXd covariance;  // scaled
+  Scatter scatter;
+  double log_likelihood = 0.0;
+  double misfit = 0.0;  // whitened sum of squares, random effects taken out
+};
+
+// columns: indices into the summaries' columns. Scatter is estimated (restricted likelihood with a
+// prior worth kScatterPriorRuns experiments) unless fixed.
+Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& columns,
+               const Prior& prior, const Scatter& start, int scatter_iterations);
+
+// Information on one column given the others, with the scatter and without: its loss tells how much
+// of the evidence lies between experiments.
+struct Information {
+  double with_scatter = 0.0;
+  double without_scatter = 0.0;
+};
+Information information_on(const std::vector<Summary>& summaries, const std::vector<int>& others,
+                           const Prior& prior, int column, const Scatter& scatter);
+
+inline constexpr double kScatterPriorRuns = 3.0;
+
+Whitening identity_whitening(const Campaign& campaign);
+
+// Further columns of one experiment, behind the parameters.
+using ExtraColumns = std::function<std::vector<ResidualColumns>(int run, const Residuals& at)>;
+
+// Columns of one experiment, whitened: parameters, further columns, residual; and random effects.
+Summary summarise(const Campaign& campaign, int run, const ModelState& state,
+                  const std::vector<int>& parameters, const Eigen::VectorXd& scale,
+                  const Whitening& whitening, const ExtraColumns& extra = {});
+
+// Filters, weights and the cross correlation from the residual that is left after the best linear
+// fit of everything (parameters with the prior), so that no effect leaks into the noise.
+Whitening fit_whitening(const Campaign& campaign, const ModelState& state,
+                        const std::vector<int>& parameters, const Eigen::VectorXd& scale,
+                        const Prior& prior, const Whitening& before);
+
+// Two-sided p-value of Student's t, and the chi-square(1) value with the same p-value.
+double student_p(double t, double degrees);
+double chi2_of_student(double t, double degrees);
+// The same for an F value.
+double chi2_of_f(double f, double numerator_degrees, double denominator_degrees);
+
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,220 @@
+#include "tools/diagnose/signal_table.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <optional>
+
+#include "can_dbc/unit_text.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t\r\"";
+  const std::size_t first = text.find_first_not_of(kBlank);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+}
+
+std::string_view next_line(std::string_view& text) {
+  const std::size_t end = text.find('\n');
+  const std::string_view line = text.substr(0, end);
+  text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  return line;
+}
+
+std::string_view next_cell(std::string_view& line, char separator) {
+  const std::size_t end = line.find(separator);
+  const std::string_view cell = line.substr(0, end);
+  line = end == std::string_view::npos ? std::string_view{} : line.substr(end + 1);
+  return cell;
+}
+
+// Missing: an empty cell, NaN. Otherwise a number or nothing at all.
+enum class Cell { kNumber, kMissing, kBad };
+Cell parse_number(std::string_view text, double& value) {
+  text = trimmed(text);
+  if (text.empty()) return Cell::kMissing;
+  if (text.front() == '+') text.remove_prefix(1);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size()) return Cell::kBad;
+  return std::isfinite(value) ? Cell::kNumber : Cell::kMissing;
+}
+
+struct Column {
+  bool time = false;
+  std::optional<Role> role;  // none: not used
+  can::Unit unit;
+};
+
+std::optional<Role> role_of(std::string_view name) {
+  for (std::size_t i = 0; i < daemon::kRoleCount; ++i) {
+    if (daemon::role_name(static_cast<Role>(i)) == name) return static_cast<Role>(i);
+  }
+  return std::nullopt;
+}
+
+class CsvParser {
+ public:
+  CsvParser(std::string_view text, const std::string& name) : rest_(text), name_(name) {
+    table_.name = name;
+    if (rest_.starts_with("\xEF\xBB\xBF")) rest_.remove_prefix(3);
+  }
+
+  SignalTable parse() {
+    read_header();
+    while (!rest_.empty()) {
+      const std::string_view line = next_line(rest_);
+      ++line_;
+      if (const std::string_view bare = trimmed(line); !bare.empty() && bare.front() != '#') {
+        read_row(line);
+      }
+    }
+    if (rows_ == 0) fail("no line with numbers after the header");
+    note(bad_rows_, first_bad_row_, "lines that are not numbers, ignored");
+    note(backward_, first_backward_, "lines whose time does not increase, ignored");
+    return std::move(table_);
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw TableError{false, name_ + ":" + std::to_string(line_) + ": " + what};
+  }
+  void note(std::size_t count, std::size_t first, const std::string& what) {
+    if (count == 0) return;
+    table_.notes.push_back(name_ + ":" + std::to_string(first) + ": " + std::to_string(count) +
+                           " " + what);
+  }
+
+  void read_header() {
+    std::string_view header;
+    while (!rest_.empty() && (header.empty() || header.front() == '#')) {
+      header = trimmed(next_line(rest_));
+      ++line_;
+    }
+    separator_ = header.find(';') != std::string_view::npos    ? ';'
+                 : header.find(',') != std::string_view::npos  ? ','
+                 : header.find('\t') != std::string_view::npos ? '\t'
+                                                               : ',';
+    bool has_time = false;
+    while (!header.empty()) {
+      const std::string_view cell = trimmed(next_cell(header, separator_));
+      columns_.push_back(read_column(cell));
+      has_time |= columns_.back().time;
+    }
+    if (!has_time) fail("no column t[s]; expected a header such as t[s],primary_speed[rad/s],...");
+  }
+
+  Column read_column(std::string_view cell) {
+    const std::size_t open = cell.find('[');
+    const std::string_view name = trimmed(cell.substr(0, open));
+    Column column;
+    if (name == "t") {
+      column.time = true;
+      const std::string_view unit =
+          open == std::string_view::npos ? "s" : cell.substr(open + 1, cell.find(']') - open - 1);
+      if (unit != "s" && unit != "ms") fail("time in '" + std::string(unit) + "'; expected t[s]");
+      column.unit.factor = unit == "ms" ? 1e-3 : 1.0;
+      return column;
+    }
+    column.role = role_of(name);
+    if (!column.role) {
+      table_.notes.push_back(name_ + ":" + std::to_string(line_) + ": column '" +
+                             std::string(cell) + "' names no role, ignored");
+      return column;
+    }
+    if (!table_[*column.role].empty() || seen_[static_cast<std::size_t>(*column.role)]) {
+      fail("role '" + std::string(name) + "' stands twice");
+    }
+    seen_[static_cast<std::size_t>(*column.role)] = true;
+    const can::Dimension wanted = daemon::role_dimension(*column.role);
+    const std::string_view unit_text = open == std::string_view::npos
+                                           ? std::string_view{}
+                                           : cell.substr(open + 1, cell.rfind(']') - open - 1);
+    const std::optional<can::Unit> unit =
+        unit_text.empty() ? std::optional<can::Unit>{} : can::parse_unit(unit_text);
+    if (wanted == can::Dimension::kNone) return column;
+    if (!unit || unit->dimension != wanted) {
+      fail("column '" + std::string(cell) + "': expected a unit of " +
+           std::string(can::dimension_name(wanted)) + ", e.g. " + std::string(name) + "[" +
+           std::string(can::si_unit_text(wanted)) + "]");
+    }
+    column.unit = *unit;
+    return column;
+  }
+
+  void read_row(std::string_view line) {
+    values_.assign(columns_.size(), std::nullopt);
+    double t_s = std::nan("");
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      double value = 0.0;
+      switch (parse_number(next_cell(line, separator_), value)) {
+        case Cell::kBad:
+          count(bad_rows_, first_bad_row_);
+          return;
+        case Cell::kMissing:
+          break;
+        case Cell::kNumber:
+          if (columns_[i].time) {
+            t_s = value * columns_[i].unit.factor;
+          } else {
+            values_[i] = value * columns_[i].unit.factor + columns_[i].unit.offset;
+          }
+      }
+    }
+    if (!std::isfinite(t_s)) {
+      count(bad_rows_, first_bad_row_);
+      return;
+    }
+    if (rows_ > 0 && t_s <= last_t_s_) {
+      count(backward_, first_backward_);
+      return;
+    }
+    last_t_s_ = t_s;
+    ++rows_;
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      if (!columns_[i].role || !values_[i]) continue;
+      Channel& channel = table_[*columns_[i].role];
+      channel.t_s.push_back(t_s);
+      channel.value.push_back(*values_[i]);
+    }
+  }
+  void count(std::size_t& counter, std::size_t& first) const {
+    if (counter++ == 0) first = line_;
+  }
+
+  std::string_view rest_;
+  std::string name_;
+  SignalTable table_;
+  std::size_t line_ = 0;
+  char separator_ = ',';
+  std::vector<Column> columns_;
+  std::vector<std::optional<double>> values_;
+  std::array<bool, daemon::kRoleCount> seen_{};
+  std::size_t rows_ = 0, bad_rows_ = 0, first_bad_row_ = 0, backward_ = 0, first_backward_ = 0;
+  double last_t_s_ = 0.0;
+};
+
+}  // namespace
+
+SignalTable parse_csv(std::string_view text, const std::string& name) {
+  return CsvParser(text, name).parse();
+}
+
+SignalTable read_csv(const std::string& path) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"),
+                                                             &std::fclose);
+  if (!file) throw TableError{true, path + ": cannot be opened"};
+  std::string text;
+  std::array<char, 1 << 16> buffer;
+  while (const std::size_t got = std::fread(buffer.data(), 1, buffer.size(), file.get())) {
+    text.append(buffer.data(), got);
+  }
+  if (std::ferror(file.get())) throw TableError{true, path + ": cannot be read"};
+  return parse_csv(text, path);
+}
+
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,208 @@
+#include "tools/diagnose/variator_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "tools/diagnose/effects/effect.h"
+
+namespace beltgrip::diagnose {
+
+using Eigen::ArrayXd;
+
+// Tolerances: what differs between two healthy machines of one type (ranges of the literature for
+// pushbelt variators), so that only what lies beyond is called wrong.
+NuisanceTable default_nuisances() {
+  return {{
+      {"ln_mu_max", std::log(0.1), 0.4, 1e-3},
+      {"ln_peak_slip_overdrive", std::log(0.02), 0.5, 1e-3},
+      {"ln_peak_slip_low", std::log(0.03), 0.5, 1e-3},
+      {"shape_1_overdrive", 0.0, 0.08, 1e-3},
+      {"shape_2_overdrive", 0.0, 0.12, 1e-3},
+      {"shape_3_overdrive", 0.0, 0.12, 1e-3},
+      {"shape_4_overdrive", 0.0, 0.08, 1e-3},
+      {"shape_5_overdrive", 0.0, 0.05, 1e-3},
+      {"shape_6_overdrive", 0.0, 0.05, 1e-3},
+      {"shape_7_overdrive", 0.0, 0.1, 1e-3},
+      {"shape_8_overdrive", 0.0, 0.15, 1e-3},
+      {"shape_9_overdrive", 0.0, 0.2, 1e-3},
+      {"shape_1_low", 0.0, 0.08, 1e-3},
+      {"shape_2_low", 0.0, 0.12, 1e-3},
+      {"shape_3_low", 0.0, 0.12, 1e-3},
+      {"shape_4_low", 0.0, 0.08, 1e-3},
+      {"shape_5_low", 0.0, 0.05, 1e-3},
+      {"shape_6_low", 0.0, 0.05, 1e-3},
+      {"shape_7_low", 0.0, 0.1, 1e-3},
+      {"shape_8_low", 0.0, 0.15, 1e-3},
+      {"shape_9_low", 0.0, 0.2, 1e-3},
+      {"deformation_per_kN", 1.0e-3, 0.7e-3, 1e-5},
+      {"loss_constant_Nm", 0.5, 0.75, 1e-2},
+      {"loss_per_rad_s_Nm", 5e-3, 5e-3, 1e-4},
+      {"ln_ratio_overdrive", 0.0, 6e-4, 1e-5},
+      {"ln_ratio_low", 0.0, 6e-4, 1e-5},
+      {"secondary_inertia_kg_m2", 0.1, 0.3, 1e-3},
+      {"command_offset_Pa", 0.0, 1e5, 10.0},
+      {"command_gain", 0.0, 0.1, 1e-4},
+  }};
+}
+
+namespace {
+
+constexpr double kBend = 1.3;
+
+// Ends of the intervals of the cubic: 0, the knots below the peak, the peak, the knots beyond it.
+constexpr int kEnds = kShapeKnots + 2;
+constexpr int kPeakEnd = 6;
+constexpr std::array<double, kEnds> kEnd{0.0, 0.12, 0.25, 0.4, 0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.2};
+constexpr int end_of_knot(int knot) { return knot + 1 < kPeakEnd ? knot + 1 : knot + 2; }
+static_assert(kEnd[static_cast<std::size_t>(end_of_knot(4))] == kShapeKnot[4]);
+static_assert(kEnd[static_cast<std::size_t>(end_of_knot(kShapeKnots - 1))] ==
+              kShapeKnot[kShapeKnots - 1]);
+
+using Cubics = std::array<std::array<double, 4>, kShapeKnots + 1>;
+
+// Hermite cubics through y with the slopes of finite differences, flat at the last end.
+Cubics cubics(const std::array<double, kEnds>& y) {
+  std::array<double, kEnds> slope{};
+  for (std::size_t j = 0; j + 1 < kEnds; ++j) {
+    slope[j] = j == 0 ? (y[1] - y[0]) / (kEnd[1] - kEnd[0])
+                      : (y[j + 1] - y[j - 1]) / (kEnd[j + 1] - kEnd[j - 1]);
+  }
+  Cubics out{};
+  for (std::size_t j = 0; j + 1 < kEnds; ++j) {
+    const double h = kEnd[j + 1] - kEnd[j];
+    const double secant = (y[j + 1] - y[j]) / h;
+    out[j] = {y[j], slope[j], (3.0 * secant - 2.0 * slope[j] - slope[j + 1]) / h,
+              (slope[j] + slope[j + 1] - 2.0 * secant) / (h * h)};
+  }
+  return out;
+}
+
+std::size_t interval_of(double x) {
+  std::size_t j = 0;
+  while (j + 2 < kEnds && kEnd[j + 1] < x) ++j;
+  return j;
+}
+
+double cubic_at(const Cubics& c, double x) {
+  const std::size_t j = interval_of(x);
+  const double u = std::min(x, kEnd.back()) - kEnd[j];
+  return c[j][0] + u * (c[j][1] + u * (c[j][2] + u * c[j][3]));
+}
+
+}  // namespace
+
+double shape_function(int knot, double x) {
+  static const std::array<Cubics, kShapeKnots> kCardinal = [] {
+    std::array<Cubics, kShapeKnots> out{};
+    for (int i = 0; i < kShapeKnots; ++i) {
+      std::array<double, kEnds> y{};
+      y[static_cast<std::size_t>(end_of_knot(i))] = 1.0;
+      out[static_cast<std::size_t>(i)] = cubics(y);
+    }
+    return out;
+  }();
+  return cubic_at(kCardinal[static_cast<std::size_t>(knot)], x);
+}
+
+double fall_function(double x) {
+  const double beyond = x - 1.0;
+  return beyond <= 0.0 ? 0.0 : -beyond * beyond / (0.3 + beyond);
+}
+
+CurveShape::CurveShape(std::span<const double, kShapeKnots> departure, double fall) : fall_(fall) {
+  std::array<double, kEnds> y{};
+  for (int i = 0; i < kShapeKnots; ++i) {
+    y[static_cast<std::size_t>(end_of_knot(i))] = departure[static_cast<std::size_t>(i)];
+  }
+  cubic_ = cubics(y);
+}
+
+CurveShape::Point CurveShape::evaluate(double x) const {
+  const double size = std::abs(x);
+  static const double kStiffness = std::tan(std::numbers::pi / (2.0 * kBend));
+  const double angle = kBend * std::atan(kStiffness * size);
+  Point out{std::sin(angle),
+            std::cos(angle) * kBend * kStiffness / (1.0 + kStiffness * kStiffness * size * size)};
+  const std::size_t j = interval_of(size);
+  const double u = std::min(size, kEnd.back()) - kEnd[j];
+  const auto& c = cubic_[j];
+  out.value += c[0] + u * (c[1] + u * (c[2] + u * c[3]));
+  if (size < kEnd.back()) out.slope += c[1] + u * (2.0 * c[2] + 3.0 * u * c[3]);
+  if (fall_ != 0.0 && size > 1.0) {
+    const double beyond = size - 1.0;
+    out.value += fall_ * fall_function(size);
+    out.slope -= fall_ * (beyond * beyond + 0.6 * beyond) / ((0.3 + beyond) * (0.3 + beyond));
+  }
+  out.value *= std::copysign(1.0, x);
+  return out;
+}
+
+Quantities evaluate(const ExperimentData& run, int experiment,
+                    const estimator::VariatorParameters& variator, const Eigen::VectorXd& nuisance,
+                    const Effects& effects) {
+  const int n = run.size();
+  Context c{run,
+            variator,
+            experiment,
+            run.omega_p.value,
+            run.omega_s.value,
+            run.pressure.value,
+            run.torque.value,
+            run.command.present ? run.command.value : ArrayXd(),
+            {},
+            {},
+            {},
+            {},
+            {},
+            ArrayXd::Zero(n),
+            {nuisance[kLnPeakSlipOverdrive], nuisance[kLnPeakSlipLow]},
+            {}};
+  const auto apply = [&](Stage stage) {
+    for (std::size_t i = 0; i < effects.slots->size(); ++i) {
+      const Slot& slot = (*effects.slots)[i];
+      const double value = effects.value[static_cast<Eigen::Index>(i)];
+      if (slot.row->stage == stage && value != 0.0) slot.row->apply(c, slot, value);
+    }
+  };
+  apply(Stage::kMeasurement);
+  c.force_N = variator.secondary_piston_area_m2 * c.pressure + variator.secondary_spring_force_N +
+              variator.secondary_centrifugal_N_s2 * c.omega_s.square();
+  apply(Stage::kForce);
+  c.loss_Nm = nuisance[kLossConstant_Nm] + nuisance[kLossPerSpeed_Nms] * c.omega_p;
+  if (run.torque_is_engine) c.loss_Nm += variator.primary_inertia_kg_m2 * run.omega_p.slope;
+  apply(Stage::kDriveline);
+  c.belt_torque = c.torque - c.loss_Nm;
+  c.ln_ratio = -nuisance[kDeformationPerkN] * 1e-3 * c.force_N;
+  ArrayXd ln_ratio_0(n), radius(n);
+  for (int k = 0; k < n; ++k) {
+    const bool low = run.stop[static_cast<std::size_t>(k)] == kLowStop;
+    ln_ratio_0[k] = std::log(low ? variator.ratio_low : variator.ratio_overdrive) +
+                    nuisance[low ? kLnRatioLow : kLnRatioOverdrive];
+    radius[k] = low ? variator.primary_radius_low_m : variator.primary_radius_overdrive_m;
+  }
+  apply(Stage::kRatio);
+  const ArrayXd ratio = (ln_ratio_0 + c.ln_ratio).exp();
+  c.slip = 1.0 - c.omega_s / (c.omega_p * ratio);
+  apply(Stage::kFriction);
+
+  Quantities q;
+  q.slip = std::move(c.slip);
+  q.ratio = ratio;
+  q.capacity = (2.0 / std::cos(variator.half_wedge_angle_rad)) * radius * c.force_N.max(50.0) *
+               (nuisance[kLnMuMax] + c.ln_friction).exp();
+  if (run.torque_s.present) {
+    q.balance = c.belt_torque -
+                ratio * (run.torque_s.value + nuisance[kSecondaryInertia_kgm2] * run.omega_s.slope);
+  }
+  if (run.command.present) {
+    q.tracking =
+        run.pressure.value - (1.0 + nuisance[kCommandGain]) * c.track - nuisance[kCommandOffset_Pa];
+  }
+  q.belt_torque = std::move(c.belt_torque);
+  q.ln_peak_slip = c.ln_peak_slip;
+  q.fall = c.fall;
+  return q;
+}
+
+}  // namespace beltgrip::diagnose
