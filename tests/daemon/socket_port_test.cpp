@@ -260,14 +260,34 @@ TEST_F(SocketPortTest, AFullQueueIsSaidAtOnce) {
   EXPECT_EQ(port->bus_state(), BusState::kActive);
 }
 
-TEST_F(SocketPortTest, OnlyClassicDataFramesAreSent) {
+TEST_F(SocketPortTest, EveryKindIsSentButErrorFramesAndWhatIsTooLong) {
   const auto port = open({});
   ASSERT_NE(port, nullptr);
+  const BusSocket bus("vcan0");
   can::CanFrame frame = frame_of(0x123, {1});
+  frame.id = {0x12345678, true};
   frame.fd = true;
-  EXPECT_EQ(port->send(frame), SendResult::kFailed);
+  frame.bit_rate_switch = true;
+  frame.length = 12;
+  EXPECT_EQ(port->send(frame), SendResult::kSent);
+  auto seen = bus.receive(test::kLimit);
+  ASSERT_TRUE(seen.has_value());
+  EXPECT_TRUE(seen->fd);
+  EXPECT_EQ(seen->frame.can_id, 0x12345678U | CAN_EFF_FLAG);
+  EXPECT_EQ(seen->frame.len, 12);
+  EXPECT_NE(seen->frame.flags & CANFD_BRS, 0);
   frame = frame_of(0x123, {});
   frame.remote = true;
+  frame.length = 4;
+  EXPECT_EQ(port->send(frame), SendResult::kSent);
+  seen = bus.receive(test::kLimit);
+  ASSERT_TRUE(seen.has_value());
+  EXPECT_FALSE(seen->fd);
+  EXPECT_EQ(seen->frame.can_id, 0x123U | CAN_RTR_FLAG);
+  EXPECT_EQ(seen->frame.len, 4);
+
+  frame = frame_of(0x40, {1});
+  frame.error = true;
   EXPECT_EQ(port->send(frame), SendResult::kFailed);
   frame = frame_of(0x123, {1});
   frame.length = 9;
