@@ -12,7 +12,7 @@ namespace beltgrip::can {
 
 namespace {
 
-constexpr std::size_t kBufferSize = 1024 * 1024;
+constexpr std::size_t kBufferSize = 256 * 1024;
 constexpr std::size_t kLineMax = 65536;
 constexpr std::size_t kSampleBytes = 65536;
 constexpr std::size_t kSampleLines = 2000;
@@ -22,14 +22,14 @@ constexpr std::size_t kBadLinesKept = 10;
 class LineBuffer {
  public:
   explicit LineBuffer(std::unique_ptr<ByteSource> source)
-      : source_(std::move(source)), buffer_(kBufferSize) {}
+      : source_(std::move(source)), buffer_(std::make_unique_for_overwrite<char[]>(kBufferSize)) {}
 
   // What is there soon, at most kSampleBytes of it: whole lines.
   Sample sample() {
     constexpr int kPatience_ms = 200;
     for (bool first = true; end_ < kSampleBytes && (first || source_->ready(kPatience_ms));
          first = false) {
-      const std::size_t count = source_->read({buffer_.data() + end_, kSampleBytes - end_});
+      const std::size_t count = source_->read({buffer_.get() + end_, kSampleBytes - end_});
       if (count == 0) {
         ended_ = true;
         break;
@@ -37,7 +37,7 @@ class LineBuffer {
       end_ += count;
     }
     Sample lines;
-    std::string_view text(buffer_.data(), end_);
+    std::string_view text(buffer_.get(), end_);
     while (!text.empty() && lines.size() < kSampleLines) {
       const std::size_t length = text.find('\n');
       if (length == std::string_view::npos && !(ended_ || lines.empty())) break;
@@ -48,14 +48,14 @@ class LineBuffer {
     return lines;
   }
 
-  std::string_view peek() const { return {buffer_.data() + begin_, end_ - begin_}; }
+  std::string_view peek() const { return {buffer_.get() + begin_, end_ - begin_}; }
   void skip(std::size_t bytes) { begin_ += bytes; }
 
   // False at the end. A line that does not fit comes cut, with `whole` false.
   bool next(std::string_view& line, bool& whole) {
     whole = true;
     for (;;) {
-      const char* const start = buffer_.data() + begin_;
+      const char* const start = buffer_.get() + begin_;
       const auto* const found = static_cast<const char*>(std::memchr(start, '\n', end_ - begin_));
       if (found != nullptr) {
         const auto length = static_cast<std::size_t>(found - start);
@@ -88,16 +88,16 @@ class LineBuffer {
 
  private:
   void refill() {
-    std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
+    std::memmove(buffer_.get(), buffer_.get() + begin_, end_ - begin_);
     end_ -= begin_;
     begin_ = 0;
-    const std::size_t count = source_->read({buffer_.data() + end_, buffer_.size() - end_});
+    const std::size_t count = source_->read({buffer_.get() + end_, kBufferSize - end_});
     if (count == 0) ended_ = true;
     end_ += count;
   }
 
   std::unique_ptr<ByteSource> source_;
-  std::vector<char> buffer_;
+  std::unique_ptr<char[]> buffer_;
   std::size_t begin_ = 0;
   std::size_t end_ = 0;
   bool ended_ = false;

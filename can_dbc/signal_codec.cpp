@@ -173,6 +173,7 @@ double SignalCodec::physical(std::uint64_t raw_bits) const noexcept {
 std::uint64_t SignalCodec::raw_from_physical(double value) const noexcept {
   if (std::isnan(value) || scale_ == 0.0) return 0;
   const double wanted = (value - offset_) / scale_;
+  if (std::isnan(wanted)) return 0;  // infinite value, scale or offset
   if (is_float()) return float_bits(wanted);
 
   // The ends as integers, and as doubles that a wanted value is compared with before it is cast.
@@ -184,7 +185,6 @@ std::uint64_t SignalCodec::raw_from_physical(double value) const noexcept {
     return is_signed ? static_cast<double>(static_cast<std::int64_t>(raw_value))
                      : static_cast<double>(raw_value);
   };
-  if (std::isnan(rounded)) return 0;
   if (rounded <= as_double(lowest)) return lowest;
   if (rounded >= as_double(highest)) return highest;
   const std::uint64_t middle = is_signed

@@ -125,6 +125,21 @@ TEST(SignalCodec, SaturatesAtWhatTheBitsHold) {
   EXPECT_EQ(flat.physical(200), 3.0);
 }
 
+// Found by fuzzing: infinity minus infinity on the way to a half float.
+TEST(SignalCodec, InfiniteScaleOrOffsetGivesTheRawValueZero) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (const std::uint32_t length : {8U, 16U, 32U, 64U}) {
+    for (const ValueType type : {ValueType::kSigned, ValueType::kFloat32}) {
+      EXPECT_EQ(SignalCodec(make_signal(0, length, ByteOrder::kLittle, type, 1.0, kInfinity))
+                    .raw_from_physical(kInfinity),
+                0U);
+      EXPECT_EQ(SignalCodec(make_signal(0, length, ByteOrder::kLittle, type, kInfinity, 0.0))
+                    .raw_from_physical(-kInfinity),
+                0U);
+    }
+  }
+}
+
 TEST(SignalCodec, EncodeOfDecodeIsTheSameRawValue) {
   for (const double scale : {1.0, 0.1, 0.001, 1.0 / 3.0, -0.25, 3e7, 1e-9}) {
     for (const double offset : {0.0, -40.0, 0.3, 1e6}) {
