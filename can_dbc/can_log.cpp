@@ -143,10 +143,14 @@ struct BinaryFormat {
   std::string_view magic;
   const char* reason;
 };
-constexpr std::array<BinaryFormat, 4> kBinaryFormats{
+constexpr std::array<BinaryFormat, 6> kBinaryFormats{
     {{"LOGG", "a Vector .blf log, which is not read; export it as .asc"},
      {"MDF     ", "an MDF measurement, which is not read; export it as .asc or .csv"},
      {"UnFinMF ", "an MDF measurement, which is not read; export it as .asc or .csv"},
+     {"BZh", "packed with bzip2, which is not read; pack with gzip or zstd"},
+     {"\xFD"
+      "7zXZ",
+      "packed with xz, which is not read; pack with gzip or zstd"},
      {"\x0A\x0D\x0D\x0A", "a pcapng capture, which is not read; export it as a candump log"}}};
 
 class TextLogReader : public LogReader {

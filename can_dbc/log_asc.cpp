@@ -175,11 +175,12 @@ class AscParser : public LineParser {
     const auto flags = hexadecimal(take_word(line));
     constexpr std::uint32_t kRemote = 0x10;
     constexpr std::uint32_t kFdFormat = 0x1000;
-    const bool classic = flags && (*flags & kFdFormat) == 0 && frame.length <= 8;
+    if (!flags || *flags == 0) return LineKind::kFrame;  // not told
+    frame.remote = (*flags & kRemote) != 0;
+    const bool classic = frame.remote || ((*flags & kFdFormat) == 0 && frame.length <= 8);
     if (!classic) return LineKind::kFrame;
     // A classic frame on a CAN FD channel.
     frame.fd = frame.bit_rate_switch = frame.error_state_indicator = false;
-    frame.remote = (*flags & kRemote) != 0;
     if (frame.remote) frame.length = std::min(kFdLengths[*code], std::uint8_t{8});
     return LineKind::kFrame;
   }

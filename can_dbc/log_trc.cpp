@@ -55,7 +55,6 @@ class TrcParser : public LineParser {
     std::string_view direction = "Rx";
     std::size_t code = 0;
     bool code_is_length = false;
-    bool has_id = true;
     for (const char column : columns_) {
       if (column == 'D') break;
       std::string_view word = take_word(line);
@@ -68,21 +67,22 @@ class TrcParser : public LineParser {
           break;
         }
         case 'T':
+          // What is no frame need not have the columns of one.
+          if (word == "ER") return error_frame(frame);
+          if (!is_frame_type(word)) return LineKind::kNothing;
           type = word;
           break;
         case 'B':
           record.interface = word;
           break;
         case 'I': {
-          has_id = word != "-";
-          if (!has_id) break;
           const auto id = hexadecimal(word);
           constexpr std::size_t kStandardDigits = 4;
           frame.id.extended = word.size() > kStandardDigits;
           // Version 1 marks what is no frame by an identifier of all ones.
-          const bool no_frame = id && *id == 0xFFFF'FFFF;
+          if (id && *id == 0xFFFF'FFFF) return LineKind::kNothing;
           const std::uint32_t highest = frame.id.extended ? kExtendedIdMax : kStandardIdMax;
-          if (!id || (*id > highest && !no_frame)) return bad("unreadable identifier");
+          if (!id || *id > highest) return bad("unreadable identifier");
           frame.id.value = *id;
           break;
         }
@@ -102,19 +102,11 @@ class TrcParser : public LineParser {
       }
     }
     if (direction == "Warng") return LineKind::kNothing;
-    if (direction == "Error" || type == "ER") {
-      frame.id = {kBusError, false};
-      frame.error = true;
-      frame.length = kErrorLength;
-      return LineKind::kFrame;
-    }
+    if (direction == "Error") return error_frame(frame);
     frame.fd = type == "FD" || type == "FB" || type == "FE" || type == "BI";
     frame.bit_rate_switch = type == "FB" || type == "BI";
     frame.error_state_indicator = type == "FE" || type == "BI";
     frame.remote = type == "RR";
-    if (!frame.fd && !frame.remote && type != "DT") return LineKind::kNothing;  // status, events
-    if (!has_id || frame.id.value > kExtendedIdMax) return bad("no identifier");
-
     if (frame.fd && !code_is_length) {
       if (code > 15) return bad("unreadable length");
       code = kFdLengths[code];
@@ -132,6 +124,19 @@ class TrcParser : public LineParser {
   }
 
  private:
+  static bool is_frame_type(std::string_view type) {
+    static constexpr std::array<std::string_view, 6> kFrames{"DT", "FD", "FB", "FE", "BI", "RR"};
+    return std::find(kFrames.begin(), kFrames.end(), type) != kFrames.end();
+  }
+
+  static LineKind error_frame(CanFrame& frame) {
+    frame = CanFrame{};
+    frame.id = {kBusError, false};
+    frame.error = true;
+    frame.length = kErrorLength;
+    return LineKind::kFrame;
+  }
+
   void header(std::string_view line) {
     constexpr std::string_view kFileVersion = ";$FILEVERSION=";
     constexpr std::string_view kColumns = ";$COLUMNS=";

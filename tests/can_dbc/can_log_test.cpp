@@ -270,9 +270,13 @@ TEST(AscLog, CanFd) {
       "05 06 07 08 09 0a 0b 0c  102203  133   303000 e0006659\n"
       "  30.300981 CANFD   3 Tx     50005x                                0 0 5 0 140000 73 "
       "200050\n"
-      "  30.806898 CANFD   5 Tx ErrorFrame Not Acknowledge error, dominant error flag fffe c7\n");
+      "  30.806898 CANFD   5 Tx ErrorFrame Not Acknowledge error, dominant error flag fffe c7\n"
+      "  31.000000 CANFD   4 Rx        4EE   1 0 2 2 01 02  102203  133 0 46500250\n"
+      "  31.100000 CANFD   4 Rx        4EE   0 0 2 2 01 02  102203  133 200040 46500250\n");
   EXPECT_EQ(log.stats.lines_bad, 0U);
-  ASSERT_EQ(log.frames.size(), 4U);
+  ASSERT_EQ(log.frames.size(), 6U);
+  EXPECT_EQ(log.frames[4].text(), "4 4EE##10102");
+  EXPECT_EQ(log.frames[5].text(), "4 4EE#0102");
   EXPECT_EQ(log.frames[0].text(), "1 300##111C2030405060708");
   EXPECT_EQ(log.frames[1].text(), "3 30A##20102030405060708090A0B0C");
   EXPECT_EQ(log.frames[2].text(), "3 00050005#R5");
@@ -299,7 +303,8 @@ TEST(TrcLog, Versions1) {
       ";   Start time: 12.06.2003 14:02:04.321.0\n"
       "     1)      1841  0001  8  00 11 22 33 44 55 66 77\n"
       "     2)      1842  00000123  2  AA BB\n"
-      "     3)      1843  0123  4  RTR\n");
+      "     3)      1843  0123  4  RTR\n"
+      "     4)     17540  FFFFFFFF  4  00 00 00 08 -- -- -- -- BUSHEAVY\n");
   EXPECT_EQ(v10.stats.lines_bad, 0U);
   ASSERT_EQ(v10.frames.size(), 3U);
   EXPECT_EQ(v10.frames[0].t_ns, 1'841'000'000);
@@ -337,12 +342,15 @@ TEST(TrcLog, Versions2) {
       "      2      1283.231 FB     0700 Rx 12 00 01 02 03 04 05 06 07 08 09 0A 0B\n"
       "      3      1298.945 BI     0701 Rx 1  00\n"
       "      4      1323.201 ER          Rx 5  04 00 02 00 00\n"
+      "      4      1324.000 ST          Rx    00 00 00 08\n"
       "      5      1334.222 RR     0100 Rx 3\n");
-  ASSERT_EQ(v20.frames.size(), 4U);
+  EXPECT_EQ(v20.stats.lines_bad, 0U);
+  ASSERT_EQ(v20.frames.size(), 5U);
   EXPECT_EQ(v20.frames[0].text(), "1 300#0001");
   EXPECT_EQ(v20.frames[1].text(), "1 700##1000102030405060708090A0B");
   EXPECT_EQ(v20.frames[2].text(), "1 701##300");
-  EXPECT_EQ(v20.frames[3].text(), "1 100#R3");
+  EXPECT_TRUE(v20.frames[3].frame.error);
+  EXPECT_EQ(v20.frames[4].text(), "1 100#R3");
   const Log v21 = read(
       ";$FILEVERSION=2.1\n"
       ";$COLUMNS=N,O,T,B,I,d,R,L,D\n"
