@@ -51,6 +51,7 @@ int stop_descriptor() {
 
 std::vector<can::CanId> wanted_identifiers(const Config& config) {
   std::vector<can::CanId> identifiers;
+  identifiers.reserve(config.roles.size() + kOwnMessageCount);
   for (const RoleBinding& role : config.roles) identifiers.push_back(role.id);
   // Our own: an echo says that a frame has left, another node's is a fault.
   for (std::size_t i = 0; i < kOwnMessageCount; ++i) {

@@ -328,6 +328,7 @@ std::optional<RoleBinding> SignalCatalogue::bind(Role role, const TomlNode& node
   const can::SignalDef* signal = message.find_signal(signal_name);
   if (signal == nullptr) {
     std::vector<std::string> names;
+    names.reserve(message.signals.size());
     for (const can::SignalDef& each : message.signals) names.push_back(each.name);
     errors.add(text->signal_line, key,
                "signal " + in_quotes(signal_name) + " that " + message.name + " does not have",

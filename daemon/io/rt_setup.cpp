@@ -12,7 +12,7 @@ namespace beltgrip::daemon {
 namespace {
 
 // More than the loop and what it calls use.
-constexpr std::size_t kStack = 256 * 1024;
+constexpr std::size_t kStack = std::size_t{256} << 10;
 
 void touch_stack() {
   std::array<volatile char, kStack> stack;
