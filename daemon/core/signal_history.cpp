@@ -4,6 +4,13 @@
 
 namespace beltgrip::daemon {
 
+namespace {
+// How far ahead a line may be followed, in units of the time that its values span: the whole reach
+// from two regular values on. Values that came in one burst after a pause span next to nothing;
+// further ahead their noise would be taken for a steep slope.
+constexpr double kAheadMaximum = 2.0;
+}  // namespace
+
 void SignalHistory::add(MonoTime t, double value) noexcept {
   if (size_ != 0 && t <= newest()) {
     points_[newest_].value = value;
@@ -51,7 +58,7 @@ bool SignalHistory::value_at(MonoTime t, Duration reach, double& value) const no
     xy += x * (at(age).value - mean_y);
   }
   const double ahead = static_cast<double>(std::min(t - last.t, reach)) / span;
-  value = last.value + xy / xx * ahead;
+  value = last.value + xy / xx * std::min(ahead, kAheadMaximum);
   return true;
 }
 

@@ -121,8 +121,8 @@ TEST(Experiment, ForbiddenPairsAreUnreachable) {
     never(from, State::kSettling);
     never(from, State::kIdle);
   }
-  for (const State to : {State::kInhibited, State::kReleasing, State::kEvaluating,
-                         State::kCooldown}) {
+  for (const State to :
+       {State::kInhibited, State::kReleasing, State::kEvaluating, State::kCooldown}) {
     never(State::kFault, to);
   }
   never(State::kRamping, State::kInhibited);
@@ -146,8 +146,7 @@ TEST(Experiment, EveryStateIsReachedAndRampingOnlyWithEveryGuardOfTheStart) {
   for_all([](State state, const Guards& g, const Transition& got) {
     if (got.next != State::kRamping || state == State::kRamping) return;
     ASSERT_EQ(got.action, Action::kStart);
-    ASSERT_TRUE(g.inputs_usable && g.bus_up && g.triggered && g.settled && g.cleared &&
-                !g.faulted);
+    ASSERT_TRUE(g.inputs_usable && g.bus_up && g.triggered && g.settled && g.cleared && !g.faulted);
   });
 }
 

@@ -200,6 +200,19 @@ TEST(Sampler, WithoutAPrimarySpeedThereIsNoSample) {
   EXPECT_EQ(sample_all(standing).usable, 0U);
 }
 
+TEST(SignalHistory, ABurstAfterAPauseIsNoSlope) {
+  SignalHistory history;
+  MonoTime t = 0;
+  for (int i = 0; i < 20; ++i) history.add(t += 5 * kMillisecond, 100.0);
+  t += 40 * kMillisecond;
+  for (const double value : {100.5, 99.5, 99.5, 100.5, 101.0}) {
+    history.add(t += kMillisecond / 20, value);
+    double ahead = 0.0;
+    ASSERT_TRUE(history.value_at(t + 5 * kMillisecond, 10 * kMillisecond, ahead));
+    EXPECT_NEAR(ahead, 100.0, 5.0);
+  }
+}
+
 TEST(SignalHistory, KeepsItsOrder) {
   SignalHistory history;
   double value = 0.0;
