@@ -18,6 +18,7 @@
 #include "daemon/core/pipeline.h"
 #include "daemon/io/housekeeper.h"
 #include "daemon/io/inproc_bus.h"
+#include "daemon/io/link_health.h"
 #include "daemon/io/log_sink.h"
 #include "daemon/io/rt_setup.h"
 #include "daemon/io/socket_port.h"
@@ -102,6 +103,7 @@ int run(const Arguments& arguments) {
   EventSink sink(events);
   LogSink log(arguments.log_level);
   log.info("version " BELTGRIP_VERSION ", " + arguments.config + ", bus " + config.interface);
+  if (bus.inproc == nullptr) log.info(link_health(config.interface));
   std::function<void()> on_stop;
   if (bus.inproc != nullptr) on_stop = [&] { bus.inproc->close(); };
   log.info(prepare_real_time());
