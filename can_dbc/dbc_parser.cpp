@@ -59,6 +59,7 @@ class StatementReader {
   bool senders();
   bool verbatim();
 
+  void check_order(std::string_view word);
   void unknown_statement();
   void signal_tail(SignalDef& signal);
   bool value_list(ValueTable& table);
@@ -85,6 +86,11 @@ class StatementReader {
   enum class Within : std::uint8_t { kNothing, kMessage, kRefusedMessage };
   Within within_ = Within::kNothing;  // what SG_ lines belong to
   bool closed_ = true;                // the last quoted text had an end
+  bool seen_bit_timing_ = false;
+  bool seen_nodes_ = false;
+  std::size_t last_rank_ = 0;  // see check_order
+  std::string_view last_section_;
+  std::array<bool, 7> late_reported_{};
 };
 
 const std::array<StatementReader::Row, 32> StatementReader::kRows{{
@@ -281,12 +287,19 @@ void StatementReader::run() {
       unknown_statement();
       continue;
     }
+    check_order(word);
     scan_.seek(start_ + word.size());
     if (!(this->*row->handler)()) {
       const bool one_line = word == "SG_" || word == "BO_" || word == "BU_";
       scan_.seek(one_line ? scan_.line_end_from(start_) : scan_.statement_end_from(start_));
       draft_.keep(start_, scan_.position());
     }
+  }
+  if (!seen_bit_timing_ || !seen_nodes_) {
+    draft_.problems.warn(0, "header-missing",
+                         std::string("no ") + (seen_bit_timing_ ? "" : "BS_:") +
+                             (seen_bit_timing_ || seen_nodes_ ? "" : " and no ") +
+                             (seen_nodes_ ? "" : "BU_:") + " in the file");
   }
   LineCounter lines(draft_.text);
   for (const SourceComment& source : scan_.comments()) {
@@ -297,6 +310,26 @@ void StatementReader::run() {
                              ? "comment in the source, which the format does not have; kept"
                              : "\"/*\" without \"*/\"; its line is taken as the comment");
   }
+}
+
+// The format's order, as far as it says what comes before what refers to it: header, messages, all
+// the rest. A kind of section that comes late is said once.
+void StatementReader::check_order(std::string_view word) {
+  seen_bit_timing_ |= word == "BS_";
+  seen_nodes_ |= word == "BU_";
+  static constexpr std::array<std::string_view, 6> kOrder{"VERSION", "NS_",        "BS_",
+                                                          "BU_",     "VAL_TABLE_", "BO_"};
+  if (word == "SG_") return;
+  const auto place = std::find(kOrder.begin(), kOrder.end(), word);
+  const auto rank = static_cast<std::size_t>(place - kOrder.begin());
+  if (rank < last_rank_ && !late_reported_[rank]) {
+    late_reported_[rank] = true;
+    draft_.problems.warn(
+        start_, "section-order",
+        std::string(word) + " behind " + std::string(last_section_) + ", expected before it");
+  }
+  last_rank_ = rank;
+  last_section_ = word;
 }
 
 void StatementReader::unknown_statement() {
@@ -354,7 +387,8 @@ bool StatementReader::bit_timing() {
   scan_.accept(':');
   scan_.skip_spaces();
   const std::size_t begin = scan_.position();
-  while (!scan_.at_line_end() && !scan_.at_comment() && scan_.peek() != ';') {
+  while (!scan_.at_line_end() && !scan_.at_comment() && scan_.peek() != ';' &&
+         !scan_.keyword_at(scan_.position())) {
     scan_.seek(scan_.position() + 1);
   }
   std::string_view timing = scan_.slice(begin, scan_.position());
@@ -466,16 +500,16 @@ bool StatementReader::message() {
   message.id.extended = without_flag != source.raw_id;
   message.id.value = without_flag & kExtendedIdMax;
   if (!independent) {
-    if (without_flag > kExtendedIdMax) {
-      draft_.problems.warn(id_offset, "id-range",
-                           "identifier " + std::to_string(source.raw_id) +
-                               " has more than 29 bits; the lower 29 are used");
-    }
-    if (!message.id.extended && without_flag > kStandardIdMax) {
-      message.id.extended = true;
-      draft_.problems.warn(id_offset, "id-extended",
-                           "identifier " + std::to_string(source.raw_id) +
-                               " is above 0x7FF without bit 31; read as 29 bits");
+    const bool flag_missing = !message.id.extended && without_flag > kStandardIdMax;
+    const bool too_large = without_flag > kExtendedIdMax;
+    message.id.extended |= flag_missing;
+    if (flag_missing || too_large) {
+      draft_.problems.warn(
+          id_offset, flag_missing ? "id-extended" : "id-range",
+          "identifier " + std::to_string(source.raw_id) +
+              (flag_missing ? " is above 0x7FF without bit 31" : "") +
+              (flag_missing && too_large ? " and" : "") +
+              (too_large ? " has more than 29 bits; the lower 29 are used" : "; read as 29 bits"));
     }
   }
   within_ = Within::kMessage;
@@ -998,6 +1032,12 @@ DbcParseResult parse_dbc(std::string_view text) {
     draft.problems.warn(0, "utf-16", "the file is UTF-16, expected UTF-8 or Windows-1252");
   }
   draft.text_is_utf8 = is_ascii(draft.text) || is_utf8(draft.text);
+  if (!draft.text_is_utf8) {
+    const auto first = std::find_if(draft.text.begin(), draft.text.end(),
+                                    [](char c) { return static_cast<unsigned char>(c) >= 0x80; });
+    draft.problems.warn(static_cast<std::size_t>(first - draft.text.begin()), "encoding",
+                        "text that is not UTF-8; read as Windows-1252");
+  }
   dbc::StatementReader(draft).run();
   dbc::resolve(draft);
   dbc::lint(draft);

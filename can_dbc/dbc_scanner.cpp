@@ -107,7 +107,12 @@ std::vector<Problem> ProblemList::finish(std::string_view text) {
   std::vector<Problem> problems;
   problems.reserve(items_.size());
   LineCounter lines(text);
-  for (Item& item : items_) {
+  for (std::size_t i = 0; i < items_.size(); ++i) {
+    Item& item = items_[i];
+    // Messages of one identifier share what refers to it; the problem is one.
+    const bool again = i > 0 && item.offset == items_[i - 1].offset &&
+                       std::strcmp(item.code, items_[i - 1].code) == 0;
+    if (again) continue;
     const LineCounter::Place place = lines.at(item.offset);
     problems.push_back({item.severity, place.line, place.column, item.code, std::move(item.text)});
   }
@@ -169,7 +174,7 @@ std::optional<NumberToken> Scanner::number() {
   const char* const end = text_.data() + text_.size();
   const char* at = text_.data() + at_;
   if (at != end && (*at == '+' || *at == '-')) token.negative = *at++ == '-';
-  if (at == end) return std::nullopt;
+  if (at == end || !(is_digit(*at) || *at == '.')) return std::nullopt;
 
   if (end - at > 2 && at[0] == '0' && (at[1] == 'x' || at[1] == 'X')) {
     std::uint64_t bits = 0;

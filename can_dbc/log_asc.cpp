@@ -181,7 +181,10 @@ class AscParser : public LineParser {
     if (!classic) return LineKind::kFrame;
     // A classic frame on a CAN FD channel.
     frame.fd = frame.bit_rate_switch = frame.error_state_indicator = false;
-    if (frame.remote) frame.length = std::min(kFdLengths[*code], std::uint8_t{8});
+    if (frame.remote) {
+      frame.length = std::min(kFdLengths[*code], std::uint8_t{8});
+      frame.data.fill(0);
+    }
     return LineKind::kFrame;
   }
 

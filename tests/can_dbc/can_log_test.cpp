@@ -283,6 +283,19 @@ TEST(AscLog, CanFd) {
   EXPECT_TRUE(log.frames[3].frame.error);
 }
 
+// Found by fuzzing: flags that say remote behind data bytes.
+TEST(AscLog, RemoteFrameOnACanFdChannelHasNoData) {
+  const Log log = read(
+      "base hex  timestamps absolute\n"
+      "  31.1 CANFD   4 Rx        4EE   0 0 2 2 01 02  102203  133 10 46500250\n");
+  ASSERT_EQ(log.frames.size(), 1U);
+  CanFrame wanted;
+  wanted.id.value = 0x4EE;
+  wanted.remote = true;
+  wanted.length = 2;
+  EXPECT_EQ(log.frames[0].frame, wanted);
+}
+
 TEST(AscLog, BrokenLinesAreCounted) {
   const Log log = read(
       "base hex  timestamps absolute\n"

@@ -16,7 +16,12 @@ constexpr const char* kMessage =
     " SG_ t : 8|8@1+ (1,0) [0|255] \"\" A\n";
 const std::string kNodes = "BU_: A B\n";
 
-DbcParseResult parse(const std::string& text) { return parse_dbc(text); }
+// Most texts here have no header; that it is missing has a test of its own.
+DbcParseResult parse(const std::string& text) {
+  DbcParseResult result = parse_dbc(text);
+  std::erase_if(result.problems, [](const Problem& p) { return p.code == "header-missing"; });
+  return result;
+}
 
 std::string codes(const DbcParseResult& result) {
   std::string all;
@@ -162,7 +167,7 @@ SG_MUL_VAL_ 291 Torque Mode 3-3, 5-10;
   EXPECT_TRUE(db.other_statements.empty());
 }
 
-TEST(DbcParser, SectionsInAnyOrderAndWithoutHeader) {
+TEST(DbcParser, SectionsInAnyOrder) {
   const DbcParseResult result = parse(
       "VAL_ 291 s 1 \"one\" ;\n"
       "BA_ \"GenMsgCycleTime\" BO_ 291 50;\n"
@@ -172,12 +177,23 @@ TEST(DbcParser, SectionsInAnyOrderAndWithoutHeader) {
       "BO_ 291 M: 8 A\n"
       " SG_ s : 0|8@1+ (1,0) [0|255] \"\" A\n"
       " SG_ f : 32|32@1- (1,0) [0|0] \"\" A\n"
+      "CM_ BO_ 291 \"between\";\n"
+      "BO_ 292 N: 8 A\n"
       "BU_: A\n");
-  EXPECT_EQ(codes(result), "");
+  EXPECT_EQ(places(result), "6:1 section-order, 11:1 section-order");
   EXPECT_EQ(signal(result, "s").values.at(1), "one");
   EXPECT_EQ(signal(result, "s").comment, "before its message");
   EXPECT_EQ(signal(result, "f").type, ValueType::kFloat32);
-  EXPECT_EQ(only_message(result).cycle_ms, 50.0);
+  EXPECT_EQ(result.database.messages[0].cycle_ms, 50.0);
+}
+
+TEST(DbcParser, HeaderMissing) {
+  const std::string message = "BO_ 1 M: 8 Vector__XXX\n";
+  EXPECT_EQ(places(parse_dbc("BS_:\nBU_:\n" + message)), "");
+  EXPECT_EQ(places(parse_dbc(message)), "1:1 header-missing");
+  EXPECT_EQ(parse_dbc(message).problems[0].text, "no BS_: and no BU_: in the file");
+  EXPECT_EQ(parse_dbc("BS_:\n" + message).problems[0].text, "no BU_: in the file");
+  EXPECT_EQ(parse_dbc("BU_:\n" + message).problems[0].text, "no BS_: in the file");
 }
 
 TEST(DbcParser, OddSpacing) {
@@ -219,13 +235,13 @@ TEST(DbcParser, EmptyAndMissingHeaderParts) {
   // The list of new symbols on one line, then a statement that is also in the list.
   const DbcParseResult result =
       parse("NS_ : CM_ BA_DEF_ VAL_\nCM_ \"c\";\nBO_ 1 M: 8 Vector__XXX\n");
-  EXPECT_EQ(codes(result), "");
+  EXPECT_EQ(places(result), "3:1 section-order");
   EXPECT_EQ(result.database.new_symbols.size(), 3U);
   EXPECT_EQ(result.database.comment, "c");
   // No BS_ or BU_ behind the list.
   const DbcParseResult direct = parse(
       "NS_ :\n\tNS_DESC_\n\tCM_\n\tBO_TX_BU_\nBO_ 1 M: 8 Vector__XXX\nVAL_TABLE_ t 0 \"x\";\n");
-  EXPECT_EQ(codes(direct), "");
+  EXPECT_EQ(places(direct), "6:1 section-order");
   EXPECT_EQ(direct.database.messages.size(), 1U);
   EXPECT_EQ(direct.database.value_tables.size(), 1U);
 }
@@ -250,9 +266,9 @@ TEST(DbcParser, Identifiers) {
         Case{"419360254", {419360254, true}, "id-extended"}, Case{"2147483648", {0, true}, ""},
         Case{"2684354559", {0x1FFFFFFF, true}, ""},
         Case{"4294967295", {0x1FFFFFFF, true}, "id-range"},
-        Case{"1073741824", {0, true}, "id-range id-extended"},
-        Case{"0x123", {0x123, false}, "hex-id"}, Case{"0X9FFFFFFF", {0x1FFFFFFF, true}, "hex-id"},
-        Case{"1A3", {0x1A3, false}, "hex-id"}, Case{"-2147483647", {1, true}, "negative-id"}}) {
+        Case{"1073741824", {0, true}, "id-extended"}, Case{"0x123", {0x123, false}, "hex-id"},
+        Case{"0X9FFFFFFF", {0x1FFFFFFF, true}, "hex-id"}, Case{"1A3", {0x1A3, false}, "hex-id"},
+        Case{"-2147483647", {1, true}, "negative-id"}}) {
     const DbcParseResult result = parse("BO_ " + std::string(c.id) + " M: 8 Vector__XXX\n");
     EXPECT_EQ(codes(result), c.code) << c.id;
     EXPECT_EQ(only_message(result).id, c.wanted) << c.id;
@@ -367,6 +383,12 @@ TEST(DbcParser, EncodingsGiveUtf8) {
   EXPECT_EQ(unit_of(head + "\x80\x85\"" + rest), "€…");
   EXPECT_EQ(unit_of("\xEF\xBB\xBF" + head + "°C\"" + rest), "°C");
   // One piece in each: each is what it can only be.
+  EXPECT_EQ(places(parse(head +
+                         "\xB0"
+                         "C\"" +
+                         rest)),
+            "3:30 encoding");
+  EXPECT_EQ(places(parse(head + "°C\"" + rest)), "");
   const DbcParseResult mixed = parse(head + "°C\" A\n SG_ t : 8|8@1+ (1,0) [0|1] \"\xB5m\"" + rest);
   EXPECT_EQ(signal(mixed, "s").unit, "°C");
   EXPECT_EQ(signal(mixed, "t").unit, "µm");
@@ -465,7 +487,7 @@ TEST(DbcParser, SourceCommentsAreKept) {
       "BO_ 5 N: 8 A\n");
   EXPECT_EQ(places(result),
             "1:1 source-comment, 3:8 source-comment, 4:16 source-comment, 5:1 source-comment, "
-            "6:38 source-comment, 7:9 source-comment, 8:1 unclosed-comment");
+            "6:38 source-comment, 7:9 source-comment, 8:1 unclosed-comment, 9:1 section-order");
   EXPECT_EQ(result.database.messages.size(), 2U);
   EXPECT_EQ(signal(result, "s").unit, "u//v");
   EXPECT_EQ(result.database.messages[0].comment, "/* text */");
@@ -497,6 +519,16 @@ TEST(DbcParser, NumbersOfEveryKind) {
   EXPECT_EQ(signal(result, "s").values.at(31), "hex");
   EXPECT_EQ(codes(parse(kNodes + kMessage + "VAL_ 291 s 1.5 \"half\" 2 \"two\" ;\n")),
             "value-number");
+}
+
+// Found by fuzzing: a second sign, and words that std::from_chars takes for numbers.
+TEST(DbcParser, TwoSignsOrWordsAreNoNumber) {
+  for (const char* number : {"--1", "+-1", "-inf", "nan", "-"}) {
+    const DbcParseResult result =
+        parse(kNodes + kMessage + "VAL_ 291 s " + number + " \"text\" ;\n");
+    EXPECT_TRUE(signal(result, "s").values.empty()) << number;
+    EXPECT_EQ(result.database.other_statements.size(), 1U) << number;
+  }
 }
 
 TEST(DbcParser, KeysOfUnsigned64BitSignalsAreShownUnsigned) {
@@ -686,9 +718,9 @@ TEST(DbcParser, RepeatedStatements) {
 }
 
 TEST(DbcParser, ValuesByTheNameOfATable) {
-  const DbcParseResult result =
-      parse(kNodes + kMessage + "VAL_ 291 s T ;\nVAL_TABLE_ T 0 \"a\" 1 \"b\" ;\n");
-  EXPECT_EQ(codes(result), "");
+  const DbcParseResult result = parse("VAL_TABLE_ T 0 \"a\" 1 \"b\" ;\n" + std::string(kMessage) +
+                                      "VAL_ 291 s T ;\n" + kNodes);
+  EXPECT_EQ(places(result), "6:1 section-order");
   EXPECT_EQ(signal(result, "s").values.at(1), "b");
 }
 

@@ -12,7 +12,7 @@ namespace {
 using nlohmann::json;
 
 constexpr const char* kDbc = R"(VERSION "1"
-BU_: A
+BS_: BU_: A
 BO_ 291 Engine: 8 A
  SG_ Speed : 0|16@1+ (0.1,-3) [0|8031] "rpm" A
  SG_ Gear : 23|4@0- (1,0) [-8|7] "" A
@@ -112,7 +112,7 @@ TEST_F(Dbc, DecodeMatchesParameterGroupsAndCountsTheRest) {
 TEST_F(Dbc, DecodeWithTwoFilesUsesTheFirstAndSaysSo) {
   place_.write(
       "b.dbc",
-      "BU_: A\nBO_ 291 Other: 8 A\nBO_ 512 More: 8 A\n SG_ s : 0|8@1+ (1,0) [0|1] \"\" A\n");
+      "BS_: BU_: A\nBO_ 291 Other: 8 A\nBO_ 512 More: 8 A\n SG_ s : 0|8@1+ (1,0) [0|1] \"\" A\n");
   const RunResult result =
       decode("(1.0) can0 123#00\n(2.0) can0 200#07\n", {"--dbc", path("b.dbc")});
   EXPECT_EQ(result.status, 0);
@@ -212,7 +212,7 @@ TEST_F(Dbc, CheckPrintsEachProblemWithItsPlace) {
       beltgrip({"dbc", "check", path("a.dbc")}).out,
       path("a.dbc") + ":7:6: warning: signal \"Long\" shares bits with \"Speed\" [overlap]\n");
   place_.write("odd.dbc",
-               "BU_: A\nBO_ 2048 M: 1 A\n SG_ s : 0|9@1+ (1,0) [0|1] \"\" A\n SG_ t 0|8@1+\n");
+               "BS_: BU_: A\nBO_ 2048 M: 1 A\n SG_ s : 0|9@1+ (1,0) [0|1] \"\" A\n SG_ t 0|8@1+\n");
   const RunResult odd = beltgrip({"dbc", "check", path("odd.dbc")});
   EXPECT_EQ(odd.status, 65);
   std::istringstream stream(odd.out);
@@ -228,10 +228,10 @@ TEST_F(Dbc, CheckPrintsEachProblemWithItsPlace) {
 }
 
 TEST_F(Dbc, CheckStrictRefusesWarnings) {
-  place_.write("odd.dbc", "BU_: A\nBO_ 2048 M: 1 A\n");
+  place_.write("odd.dbc", "BS_: BU_: A\nBO_ 2048 M: 1 A\n");
   EXPECT_EQ(beltgrip({"dbc", "check", path("odd.dbc")}).status, 0);
   EXPECT_EQ(beltgrip({"dbc", "check", path("odd.dbc"), "--strict"}).status, 65);
-  place_.write("good.dbc", "BU_: A\nBO_ 1 M: 1 A\n");
+  place_.write("good.dbc", "BS_: BU_: A\nBO_ 1 M: 1 A\n");
   const RunResult good = beltgrip({"dbc", "check", "--strict", path("good.dbc")});
   EXPECT_EQ(good.status, 0);
   EXPECT_EQ(good.out, "");
