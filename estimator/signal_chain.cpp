@@ -7,9 +7,18 @@
 namespace beltgrip::estimator {
 namespace {
 
-bool finite(const VariatorSample& sample) {
-  return std::isfinite(sample.omega_p_rad_s) && std::isfinite(sample.omega_s_rad_s) &&
-         std::isfinite(sample.secondary_pressure_Pa) && std::isfinite(sample.torque_Nm);
+// Beyond these no variator runs: such a value is no measurement, and its square is none either.
+constexpr double kSlowest_rad_s = 1.0;
+constexpr double kFastest_rad_s = 1e4;
+constexpr double kHighest_Pa = 1e9;
+constexpr double kStrongest_Nm = 1e5;
+
+// False for what is not a number, too.
+bool possible(const VariatorSample& sample) {
+  return sample.omega_p_rad_s >= kSlowest_rad_s && sample.omega_p_rad_s <= kFastest_rad_s &&
+         std::abs(sample.omega_s_rad_s) <= kFastest_rad_s &&
+         std::abs(sample.secondary_pressure_Pa) <= kHighest_Pa &&
+         std::abs(sample.torque_Nm) <= kStrongest_Nm;
 }
 
 }  // namespace
@@ -55,7 +64,7 @@ void SignalChain::acquire(double ratio) noexcept {
 }
 
 const Measurement& SignalChain::step(const VariatorSample& sample) noexcept {
-  if (!sample.usable || !finite(sample) || (started_ && sample.t_ns <= last_t_ns_)) {
+  if (!sample.usable || !possible(sample) || (started_ && sample.t_ns <= last_t_ns_)) {
     out_.usable = false;
     return out_;
   }

@@ -39,7 +39,8 @@ class SignalChain {
   SignalChain(const EstimatorSettings& settings, const VariatorParameters& variator,
               double lowpass_hz);
   void reset() noexcept;
-  // A sample that is unusable, not finite or not later than the one before changes nothing.
+  // A sample that is unusable, impossible (no number, standstill, beyond what any variator does) or
+  // not later than the one before changes nothing.
   const Measurement& step(const VariatorSample& sample) noexcept;
   const OperatingPoint& point() const noexcept { return point_; }
 

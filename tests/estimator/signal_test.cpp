@@ -174,6 +174,30 @@ TEST(SignalChain, SaysNothingWithoutTorqueOrForce) {
   EXPECT_FALSE(settled({.pressure_Pa = -44300.0}, {}, kVariator).usable);
 }
 
+TEST(SignalChain, RefusesWhatNoVariatorDoes) {
+  for (const double value : {0.0, 0.9, -105.0, 1.1e4, 1e300, kNaN}) {
+    SignalChain chain({}, kVariator, 5.0);
+    VariatorSample sample = {.t_ns = 0,
+                             .omega_p_rad_s = 105.0,
+                             .omega_s_rad_s = 232.0,
+                             .secondary_pressure_Pa = 219469.0,
+                             .torque_Nm = 50.0,
+                             .usable = true};
+    for (int i = 0; i < 100; ++i) {
+      sample.t_ns += 5'000'000;
+      chain.step(sample);
+    }
+    const double before = chain.step(sample).mu_star;
+    ASSERT_GT(before, 0.1);
+    sample.t_ns += 5'000'000;
+    sample.omega_p_rad_s = value;
+    const Measurement& refused = chain.step(sample);
+    EXPECT_FALSE(refused.usable) << value;
+    EXPECT_EQ(refused.mu_star, before) << value;
+    EXPECT_EQ(refused.stop, StopReason::kNone) << value;
+  }
+}
+
 TEST(SensorError, IsTheRootOfTheSumOfSquares) {
   // torque 1 % and 0.5 %, pressure bias 29.8 N of 2980 N, gain 1 % of 2480 N of 2980 N
   SensorAccuracies accuracies;
