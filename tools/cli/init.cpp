@@ -86,6 +86,7 @@ void append_role(std::string& text, daemon::Role role, bool required,
 
 void run(const Options& options) {
   std::vector<can::Database> databases;
+  databases.reserve(options.dbc.size());
   for (const std::string& path : options.dbc) databases.push_back(read_database(path));
 
   std::string text =

@@ -30,6 +30,7 @@ void run(const Options& options) {
   if (!options.truth.empty()) truth = read_truth(options.truth);
   const daemon::FrameIdentifiers own;
   std::vector<can::CanId> identifiers;
+  identifiers.reserve(daemon::kOwnMessageCount);
   for (std::size_t i = 0; i < daemon::kOwnMessageCount; ++i) {
     identifiers.push_back({daemon::own_identifier(own, static_cast<daemon::OwnMessage>(i)), false});
   }

@@ -46,7 +46,7 @@ daemon::Config rig_config(const sim::Scenario& scenario, const std::string& meth
   }
   const std::filesystem::path directory = pattern;
   try {
-    write_file((directory / "vehicle.dbc").string(), *sim::resource("paper-rig.dbc"));
+    write_file((directory / "vehicle.dbc").string(), sim::shipped("paper-rig.dbc"));
     write_file((directory / "beltgrip.toml").string(),
                sim::rig_configuration(scenario, kBus, "vehicle.dbc"));
     daemon::Config config = load_configuration((directory / "beltgrip.toml").string(), method);

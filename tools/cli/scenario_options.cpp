@@ -20,7 +20,7 @@ constexpr std::string_view kSuffix = ".toml";
 std::string shipped_names() {
   std::string names;
   for (const std::string_view name : sim::resource_names()) {
-    if (!name.ends_with(kSuffix) || sim::is_vehicle_scenario(*sim::resource(name))) continue;
+    if (!name.ends_with(kSuffix) || sim::is_vehicle_scenario(sim::shipped(name))) continue;
     names +=
         (names.empty() ? "" : ", ") + std::string(name.substr(0, name.size() - kSuffix.size()));
   }
@@ -60,7 +60,7 @@ void ScenarioOptions::add_to(CLI::App& command) {
 }
 
 sim::Scenario ScenarioOptions::load() const {
-  std::vector<sim::ScenarioLayer> layers{{kBase, std::string(*sim::resource(kBase))}};
+  std::vector<sim::ScenarioLayer> layers{{kBase, std::string(sim::shipped(kBase))}};
   layers.push_back(layer_of(scenario));
   if (sim::is_vehicle_scenario(layers.back().text)) {
     throw Failure{kConfiguration,

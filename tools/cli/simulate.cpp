@@ -77,7 +77,7 @@ void run(const Options& options) {
     throw Failure{kCannotCreate, options.out_dir + ": cannot be created: " + error.message()};
   }
   const std::int64_t first_ns = write_log(source, (directory / "trace.log").string());
-  write_file((directory / "vehicle.dbc").string(), *sim::resource("paper-rig.dbc"));
+  write_file((directory / "vehicle.dbc").string(), sim::shipped("paper-rig.dbc"));
   write_file((directory / "beltgrip.toml").string(),
              sim::rig_configuration(scenario, kInterface, "vehicle.dbc"));
   write_file(

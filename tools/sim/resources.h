@@ -9,6 +9,8 @@
 namespace beltgrip::sim {
 
 std::optional<std::string_view> resource(std::string_view name);
+// The same for a file that is known to be shipped: std::logic_error when it is not.
+std::string_view shipped(std::string_view name);
 std::vector<std::string_view> resource_names();
 
 }  // namespace beltgrip::sim

@@ -36,7 +36,7 @@ bool RigSource::next(can::StampedFrame& frame) {
 }
 
 const can::Database& rig_database() {
-  static const can::Database database = can::parse_dbc(*resource("paper-rig.dbc")).database;
+  static const can::Database database = can::parse_dbc(shipped("paper-rig.dbc")).database;
   return database;
 }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <sstream>
+#include <variant>
 
 #include "estimator/variator_geometry.h"
 
@@ -16,67 +17,74 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
+// A number that belongs to the scenario itself or to its variator.
 struct NumberKey {
   const char* name;
-  double& (*field)(Scenario&);
+  std::variant<double Scenario::*, double VariatorModel::*> field;
   double minimum, maximum;
   const char* reason;
   double factor = 1.0;  // value in the file -> SI
+
+  double& in(Scenario& scenario) const {
+    if (const auto* own = std::get_if<double Scenario::*>(&field)) return scenario.**own;
+    return scenario.variator.*std::get<double VariatorModel::*>(field);
+  }
 };
 
-#define FIELD(member) [](Scenario& s) -> double& { return s.member; }
 constexpr const char* kPositiveInertia = "a rotating mass has a positive inertia";
 constexpr const char* kNoise = "a standard deviation is not negative";
 const NumberKey kNumbers[] = {
-    {"variator.belt_length_m", FIELD(variator.belt_length_m), 0.1, 3.0, "a pushbelt's length"},
-    {"variator.centre_distance_m", FIELD(variator.centre_distance_m), 0.03, 1.0,
+    {"variator.belt_length_m", &VariatorModel::belt_length_m, 0.1, 3.0, "a pushbelt's length"},
+    {"variator.centre_distance_m", &VariatorModel::centre_distance_m, 0.03, 1.0,
      "the distance of the shafts"},
-    {"variator.half_wedge_angle_deg", FIELD(variator.half_wedge_angle_rad), 5.0, 30.0,
+    {"variator.half_wedge_angle_deg", &VariatorModel::half_wedge_angle_rad, 5.0, 30.0,
      "a wedge that neither locks nor slides", kDegree},
-    {"variator.ratio", FIELD(variator.ratio), 0.2, 5.0, "secondary speed over primary speed"},
-    {"variator.deformation_per_N", FIELD(variator.deformation_per_N), -2e-5, 2e-5,
+    {"variator.ratio", &VariatorModel::ratio, 0.2, 5.0, "secondary speed over primary speed"},
+    {"variator.deformation_per_N", &VariatorModel::deformation_per_N, -2e-5, 2e-5,
      "pulleys yield by a few percent at most"},
-    {"variator.secondary_piston_area_m2", FIELD(secondary_piston_area_m2), 1e-4, 0.1,
+    {"variator.secondary_piston_area_m2", &Scenario::secondary_piston_area_m2, 1e-4, 0.1,
      "pressure makes force on an area"},
-    {"variator.secondary_spring_force_N", FIELD(secondary_spring_force_N), 0.0, 1e4,
+    {"variator.secondary_spring_force_N", &Scenario::secondary_spring_force_N, 0.0, 1e4,
      "the spring clamps"},
-    {"driveline.primary_speed_rad_s", FIELD(primary_speed_rad_s), 10.0, 1000.0,
+    {"driveline.primary_speed_rad_s", &Scenario::primary_speed_rad_s, 10.0, 1000.0,
      "the machine drives forward"},
-    {"driveline.primary_torque_Nm", FIELD(primary_torque_Nm), -500.0, 500.0,
+    {"driveline.primary_torque_Nm", &Scenario::primary_torque_Nm, -500.0, 500.0,
      "what a pushbelt carries"},
-    {"driveline.primary_inertia_kg_m2", FIELD(variator.primary_inertia_kg_m2), 1e-4, 100.0,
+    {"driveline.primary_inertia_kg_m2", &VariatorModel::primary_inertia_kg_m2, 1e-4, 100.0,
      kPositiveInertia},
-    {"driveline.secondary_inertia_kg_m2", FIELD(variator.secondary_inertia_kg_m2), 1e-4, 100.0,
+    {"driveline.secondary_inertia_kg_m2", &VariatorModel::secondary_inertia_kg_m2, 1e-4, 100.0,
      kPositiveInertia},
-    {"driveline.secondary_drag_Nm", FIELD(variator.secondary_drag_Nm), 0.0, 100.0, "drag brakes"},
-    {"driveline.secondary_drag_Nm_s", FIELD(variator.secondary_drag_Nm_s), 0.0, 10.0,
+    {"driveline.secondary_drag_Nm", &VariatorModel::secondary_drag_Nm, 0.0, 100.0, "drag brakes"},
+    {"driveline.secondary_drag_Nm_s", &VariatorModel::secondary_drag_Nm_s, 0.0, 10.0,
      "drag brakes"},
-    {"driveline.speed_controller_Nm_s", FIELD(speed_controller_Nm_s), 0.1, 1e4,
+    {"driveline.speed_controller_Nm_s", &Scenario::speed_controller_Nm_s, 0.1, 1e4,
      "the controller acts against the error"},
-    {"driveline.speed_controller_Nm", FIELD(speed_controller_Nm), 0.0, 1e5,
+    {"driveline.speed_controller_Nm", &Scenario::speed_controller_Nm, 0.0, 1e5,
      "the controller acts against the error"},
-    {"clamp.start_force_N", FIELD(start_force_N), 100.0, 1e5, "the belt must be clamped"},
-    {"clamp.hold_s", FIELD(hold_s), 0.0, 1e4, "a duration"},
-    {"clamp.ramp_N_per_s", FIELD(ramp_N_per_s), 1.0, 1e5, "the force falls at this rate"},
-    {"clamp.actuator_lag_s", FIELD(actuator_lag_s), 0.0, 10.0, "oil follows, it does not lead"},
-    {"operator.slip_percent", FIELD(operator_slip_percent), 0.1, 100.0, "slip that is noticed"},
-    {"operator.reaction_s", FIELD(reaction_s), 0.0, 60.0, "a duration"},
-    {"operator.restore_N_per_s", FIELD(restore_N_per_s), 1.0, 1e6,
+    {"clamp.start_force_N", &Scenario::start_force_N, 100.0, 1e5, "the belt must be clamped"},
+    {"clamp.hold_s", &Scenario::hold_s, 0.0, 1e4, "a duration"},
+    {"clamp.ramp_N_per_s", &Scenario::ramp_N_per_s, 1.0, 1e5, "the force falls at this rate"},
+    {"clamp.actuator_lag_s", &Scenario::actuator_lag_s, 0.0, 10.0, "oil follows, it does not lead"},
+    {"operator.slip_percent", &Scenario::operator_slip_percent, 0.1, 100.0, "slip that is noticed"},
+    {"operator.reaction_s", &Scenario::reaction_s, 0.0, 60.0, "a duration"},
+    {"operator.restore_N_per_s", &Scenario::restore_N_per_s, 1.0, 1e6,
      "the force returns at this rate"},
-    {"operator.rest_s", FIELD(rest_s), 0.0, 1e4, "a duration"},
-    {"run.duration_s", FIELD(duration_s), 0.1, 1e6, "a duration"},
-    {"run.step_s", FIELD(step_s), 1e-5, 1e-3, "at least 1 kHz"},
-    {"run.cycles", FIELD(cycles), 1.0, 1e6, "a number of experiments"},
-    {"sensors.primary_speed_noise_rad_s", FIELD(primary_speed_noise_rad_s), 0.0, 100.0, kNoise},
-    {"sensors.secondary_speed_noise_rad_s", FIELD(secondary_speed_noise_rad_s), 0.0, 100.0, kNoise},
-    {"sensors.torque_noise_Nm", FIELD(torque_noise_Nm), 0.0, 100.0, kNoise},
-    {"sensors.torque_bias_Nm", FIELD(torque_bias_Nm), -100.0, 100.0, "an error, not a fault"},
-    {"sensors.pressure_noise_Pa", FIELD(pressure_noise_Pa), 0.0, 1e6, kNoise},
-    {"sensors.pressure_bias_Pa", FIELD(pressure_bias_Pa), -1e6, 1e6, "an error, not a fault"},
-    {"sensors.frame_delay_s", FIELD(frame_delay_s), 0.0, 1.0, "a frame follows its measurement"},
-    {"sensors.frame_jitter_s", FIELD(frame_jitter_s), 0.0, 1.0, "a frame follows its measurement"},
+    {"operator.rest_s", &Scenario::rest_s, 0.0, 1e4, "a duration"},
+    {"run.duration_s", &Scenario::duration_s, 0.1, 1e6, "a duration"},
+    {"run.step_s", &Scenario::step_s, 1e-5, 1e-3, "at least 1 kHz"},
+    {"run.cycles", &Scenario::cycles, 1.0, 1e6, "a number of experiments"},
+    {"sensors.primary_speed_noise_rad_s", &Scenario::primary_speed_noise_rad_s, 0.0, 100.0, kNoise},
+    {"sensors.secondary_speed_noise_rad_s", &Scenario::secondary_speed_noise_rad_s, 0.0, 100.0,
+     kNoise},
+    {"sensors.torque_noise_Nm", &Scenario::torque_noise_Nm, 0.0, 100.0, kNoise},
+    {"sensors.torque_bias_Nm", &Scenario::torque_bias_Nm, -100.0, 100.0, "an error, not a fault"},
+    {"sensors.pressure_noise_Pa", &Scenario::pressure_noise_Pa, 0.0, 1e6, kNoise},
+    {"sensors.pressure_bias_Pa", &Scenario::pressure_bias_Pa, -1e6, 1e6, "an error, not a fault"},
+    {"sensors.frame_delay_s", &Scenario::frame_delay_s, 0.0, 1.0,
+     "a frame follows its measurement"},
+    {"sensors.frame_jitter_s", &Scenario::frame_jitter_s, 0.0, 1.0,
+     "a frame follows its measurement"},
 };
-#undef FIELD
 
 struct BeltKey {
   const char* name;
@@ -154,7 +162,7 @@ class Parser {
     for (const NumberKey& key : kNumbers) {
       if (name == key.name) {
         take_number(name, node, key.minimum, key.maximum, key.reason, key.factor,
-                    key.field(result_.scenario));
+                    key.in(result_.scenario));
         return true;
       }
     }
