@@ -19,7 +19,7 @@ namespace beltgrip::can {
 
 namespace {
 
-constexpr std::size_t kBlock = 64 * 1024;
+constexpr std::size_t kBlock = std::size_t{64} * 1024;
 
 class PlainSource : public ByteSource {
  public:

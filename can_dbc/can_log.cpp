@@ -12,7 +12,7 @@ namespace beltgrip::can {
 
 namespace {
 
-constexpr std::size_t kBufferSize = 256 * 1024;
+constexpr std::size_t kBufferSize = std::size_t{256} * 1024;
 constexpr std::size_t kLineMax = 65536;
 constexpr std::size_t kSampleBytes = 65536;
 constexpr std::size_t kSampleLines = 2000;

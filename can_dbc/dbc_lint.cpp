@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::uint32_t kClassicLengthMax = 8;
 constexpr std::uint32_t kFdLengthMax = 64;
+constexpr std::size_t kFdBits = 512;
 constexpr std::uint32_t kJ1939LengthMax = 1785;  // transport protocol
 
 // The bits of a signal, counted so that they are consecutive in either byte order: bit b of byte B
@@ -82,17 +83,20 @@ bool OverlapCheck::collect_groups() {
   std::size_t ranges = 0;
   for (std::size_t i = 0; i < signals.size(); ++i) {
     by_name.emplace(signals[i].name, i);
-    if (signals[i].multiplexed_by) ranges += signals[i].multiplexed_by->ranges.size();
+    const std::optional<MuxRule>& rule = signals[i].multiplexed_by;
+    if (rule) ranges += rule->ranges.size();
   }
   if (ranges > kRangesMax) return false;
   std::map<std::pair<std::size_t, Ranges>, std::size_t> known;
   for (const SignalDef& signal : signals) {
     Group group;
     const SignalDef* at = &signal;
-    while (at->multiplexed_by && group.size() < kDepthMax) {
-      const auto selector = by_name.find(at->multiplexed_by->selector);
+    while (group.size() < kDepthMax) {
+      const std::optional<MuxRule>& rule = at->multiplexed_by;
+      if (!rule) break;
+      const auto selector = by_name.find(rule->selector);
       if (selector == by_name.end()) break;
-      group.push_back({selector->second, &at->multiplexed_by->ranges});
+      group.push_back({selector->second, &rule->ranges});
       at = &signals[selector->second];
     }
     if (group.empty()) {
@@ -135,7 +139,7 @@ void OverlapCheck::run() {
   };
   std::uint64_t dense = 0;  // bits below have their number as their place
   std::vector<std::uint64_t> places;
-  constexpr std::uint64_t kDenseMax = kFdLengthMax * 8;
+  constexpr std::uint64_t kDenseMax = kFdBits;
   for (const SignalDef& signal : message_.signals) {
     bits_of(signal, [&](std::uint64_t bit) {
       if (bit >= kDenseMax) {
@@ -208,9 +212,11 @@ void check_circles(const MessageDef& message, const MessageSource& source, Probl
   std::vector<std::size_t> visited(message.signals.size(), 0);
   for (std::size_t i = 0; i < message.signals.size(); ++i) {
     std::size_t at = i;
-    while (visited[at] == 0 && message.signals[at].multiplexed_by) {
+    while (visited[at] == 0) {
       visited[at] = i + 1;
-      const auto above = by_name.find(message.signals[at].multiplexed_by->selector);
+      const std::optional<MuxRule>& rule = message.signals[at].multiplexed_by;
+      if (!rule) break;
+      const auto above = by_name.find(rule->selector);
       if (above == by_name.end()) break;
       at = above->second;
       if (visited[at] == i + 1) {
@@ -225,7 +231,7 @@ void check_circles(const MessageDef& message, const MessageSource& source, Probl
 // Quick look before the thorough one: without multiplexing, every bit of a frame-sized payload has
 // one owner.
 bool bits_taken_twice(const MessageDef& message) {
-  std::bitset<kFdLengthMax * 8> taken;
+  std::bitset<kFdBits> taken;
   for (const SignalDef& signal : message.signals) {
     const std::uint64_t first = first_bit(signal);
     const bool little = signal.byte_order == ByteOrder::kLittle;

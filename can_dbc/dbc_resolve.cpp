@@ -414,7 +414,6 @@ void Resolver::multiplex_message(std::uint32_t message,
   MessageSource& source = draft_.messages[message];
   std::vector<SignalDef>& signals = definition.signals;
 
-  std::vector<bool> ruled(signals.size(), false);
   for (const MultiplexRef* rule : rules) {
     const Indices targets = find_signals(message, draft_.utf8(rule->name));
     const Indices selectors = find_signals(message, draft_.utf8(rule->selector));
@@ -431,19 +430,18 @@ void Resolver::multiplex_message(std::uint32_t message,
                                "\" selects others but is not marked as a multiplexer with M");
     }
     for (const std::uint32_t target : targets) {
-      if (ruled[target]) {
-        if (signals[target].multiplexed_by->selector != selector.name) {
+      std::optional<MuxRule>& known = signals[target].multiplexed_by;
+      if (known) {
+        if (known->selector != selector.name) {
           unresolved(*rule, "mux-two-selectors",
                      "signal \"" + clip(signals[target].name) +
                          "\" has a second multiplexer; the first one is used");
           continue;
         }
-        auto& ranges = signals[target].multiplexed_by->ranges;
-        ranges.insert(ranges.end(), rule->ranges.begin(), rule->ranges.end());
+        known->ranges.insert(known->ranges.end(), rule->ranges.begin(), rule->ranges.end());
         continue;
       }
-      ruled[target] = true;
-      signals[target].multiplexed_by = MuxRule{selector.name, rule->ranges};
+      known = MuxRule{selector.name, rule->ranges};
     }
   }
 
@@ -455,7 +453,7 @@ void Resolver::multiplex_message(std::uint32_t message,
     only = i;
   }
   for (std::size_t i = 0; i < signals.size(); ++i) {
-    if (!source.signals[i].multiplexed || ruled[i]) continue;
+    if (!source.signals[i].multiplexed || signals[i].multiplexed_by) continue;
     if (multiplexers == 1 && only != i) {
       const std::uint64_t value = source.signals[i].selector_value;
       signals[i].multiplexed_by = MuxRule{signals[only].name, {{value, value}}};

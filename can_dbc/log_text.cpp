@@ -8,8 +8,9 @@ namespace {
 
 std::optional<std::uint32_t> whole_number(std::string_view word, int base) {
   std::uint32_t value = 0;
-  const char* const end = word.data() + word.size();
-  const auto [rest, status] = std::from_chars(word.data(), end, value, base);
+  const char* const begin = word.data();
+  const char* const end = begin + word.size();
+  const auto [rest, status] = std::from_chars(begin, end, value, base);
   if (status != std::errc{} || rest != end) return std::nullopt;
   return value;
 }

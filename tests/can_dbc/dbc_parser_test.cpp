@@ -5,7 +5,7 @@
 #include <cmath>
 #include <ctime>
 
-#include "can_dbc/message_codec.h"
+#include "can_dbc/message_index.h"
 
 namespace beltgrip::can {
 namespace {
@@ -920,6 +920,25 @@ INSTANTIATE_TEST_SUITE_P(
                   "VAL_ 1 s T ;\n"},
         std::pair{"BO_ 1 M: 8 A\n", "SG_MUL_VAL_ 1 s x 0-1, 2-3;\n"},
         std::pair{"BO_ 1 M: 8 A\nSG_ s : 0|8@1+ (1,0) [0|1] \"\" A\nSG_MUL_VAL_ 1 s s ", "0-1, "}));
+
+TEST(DbcParser, AHundredThousandMessages) {
+  constexpr std::uint32_t kMessages = 100'000;
+  std::string text = "BS_:\n" + kNodes;
+  for (std::uint32_t i = 0; i < kMessages; ++i) {
+    const std::string number = std::to_string(i);
+    text += "BO_ " + std::to_string(0x8000'0000U + i) + " M" + number +
+            ": 8 A\n SG_ s : 0|8@1+ (1,0) [0|1] \"\" A\n";
+  }
+  const DbcParseResult result = parse(text);
+  EXPECT_EQ(codes(result), "");
+  ASSERT_EQ(result.database.messages.size(), kMessages);
+  const Database* database = &result.database;
+  const MessageIndex index(std::span<const Database* const>(&database, 1));
+  for (std::uint32_t i = 0; i < kMessages; ++i) {
+    const MessageIndex::Place* place = index.lookup({i, true});
+    ASSERT_TRUE(place != nullptr && place->message == i);
+  }
+}
 
 TEST(DbcParser, ATableUsedByNameTooOftenIsRefused) {
   std::string text = kNodes + "VAL_TABLE_ T 0 \"" + std::string(100'000, 'a') + "\" ;\n";

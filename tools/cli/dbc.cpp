@@ -29,11 +29,15 @@ std::string read_file(const std::string& path) {
                                                              &std::fclose);
   const auto fail = [&] { throw Failure{kNoInput, path + ": " + std::strerror(errno)}; };
   if (!file) fail();
+  constexpr std::size_t kLargest = std::size_t{256} * 1024 * 1024;
   std::string text;
   std::array<char, 65536> block;
   std::size_t count = 0;
   while ((count = std::fread(block.data(), 1, block.size(), file.get())) > 0) {
     text.append(block.data(), count);
+    if (text.size() > kLargest) {
+      throw Failure{kBadInput, path + ": larger than 256 MiB, expected a DBC file"};
+    }
   }
   if (std::ferror(file.get()) != 0) fail();
   return text;
@@ -185,11 +189,18 @@ class Decoder {
       databases_.push_back(&result.database);
     }
     index_ = can::MessageIndex(databases_);
-    for (const can::MessageIndex::Conflict& conflict : index_.conflicts()) {
+    constexpr std::size_t kConflictsShown = 10;
+    const auto& conflicts = index_.conflicts();
+    for (std::size_t i = 0; i < std::min(conflicts.size(), kConflictsShown); ++i) {
+      const can::MessageIndex::Conflict& conflict = conflicts[i];
       std::fprintf(stderr, "%s: message %s has the identifier of %s in %s, which is used\n",
                    paths[conflict.ignored.database].c_str(),
                    message_at(conflict.ignored).name.c_str(),
                    message_at(conflict.used).name.c_str(), paths[conflict.used.database].c_str());
+    }
+    if (conflicts.size() > kConflictsShown) {
+      std::fprintf(stderr, "and %zu more messages with an identifier used before\n",
+                   conflicts.size() - kConflictsShown);
     }
     std::size_t longest = 0;
     for (const can::Database* database : databases_) {
@@ -324,7 +335,7 @@ void decode(const std::vector<std::string>& dbc_paths, const std::string& log_pa
   can::LogRecord record;
   std::string lines;
   std::uint64_t decoded = 0;
-  constexpr std::size_t kBlock = 64 * 1024;
+  constexpr std::size_t kBlock = std::size_t{64} * 1024;
   const bool live = log_path == "-";
   while (log->next(record)) {
     if (decoder.append(record, lines)) ++decoded;
