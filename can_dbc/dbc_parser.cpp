@@ -460,7 +460,7 @@ bool StatementReader::message() {
     if (!on_line && !is_digit(scan_.peek())) return fail("\":\" after the message name");
     if (on_line) {
       name = line.substr(0, colon);
-      while (name.back() <= ' ') name.remove_suffix(1);
+      while (static_cast<unsigned char>(name.back()) <= ' ') name.remove_suffix(1);
       scan_.seek(name_offset + colon);
     } else {
       draft_.problems.warn(scan_.position(), "colon", "expected \":\" after the message name");

@@ -330,6 +330,16 @@ TEST(DbcParser, NamesThatAreNoIdentifiers) {
   EXPECT_EQ(result.database.messages[1].name, "Two words");
 }
 
+// Found by fuzzing: letters beyond ASCII at the end of a name with a blank before its colon.
+TEST(DbcParser, NamesBeyondAscii) {
+  const DbcParseResult result = parse(
+      "BO_ 1 Lüfter größe : 8 Vector__XXX\n SG_ Öltemperaturµ : 0|8@1+ (1,0) [0|1] \"\" "
+      "Vector__XXX\nCM_ SG_ 1 Öltemperaturµ \"text\";\nBO_ 2 \xFC \xFC : 8 Vector__XXX\n");
+  EXPECT_EQ(result.database.messages.at(0).name, "Lüfter größe");
+  EXPECT_EQ(signal(result, "Öltemperaturµ").comment, "text");
+  EXPECT_EQ(result.database.messages.at(1).name, "ü ü");
+}
+
 TEST(DbcParser, LongNamesReplaceShortOnesEverywhere) {
   const DbcParseResult result = parse(
       "BU_: N\n"
