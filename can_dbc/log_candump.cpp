@@ -191,24 +191,31 @@ class CandumpParser : public LineParser {
 
 }  // namespace
 
-// Console stamps of -t z and -t d look alike, but those of -t d, differences, fall as often as they
-// rise. Both start at zero.
+// Console stamps of -t z and -t d look alike: both start at zero. But those of -t d, differences,
+// fall as often as they rise, and do not grow; those of -t z grow to three times the mean from the
+// first half to the second, even where frames are out of order.
 std::unique_ptr<LineParser> make_candump_parser(const Sample& sample) {
   CandumpParser probe(false);
   LogRecord record;
-  std::size_t stamps = 0;
-  std::size_t falls = 0;
-  std::int64_t previous_ns = 0;
+  std::vector<std::int64_t> stamps_ns;
   for (const std::string_view line : sample) {
     if (line.find('[') == std::string_view::npos) continue;
     if (probe.parse(line, record) != LineKind::kFrame) continue;
-    if (stamps == 0 && record.t_ns != 0) break;
-    ++stamps;
-    if (record.t_ns < previous_ns) ++falls;
-    previous_ns = record.t_ns;
+    stamps_ns.push_back(record.t_ns);
+  }
+  if (stamps_ns.empty() || stamps_ns[0] != 0) return std::make_unique<CandumpParser>(false);
+  std::size_t falls = 0;
+  double first_half = 0.0;
+  double second_half = 0.0;
+  for (std::size_t i = 0; i < stamps_ns.size(); ++i) {
+    if (i > 0 && stamps_ns[i] < stamps_ns[i - 1]) ++falls;
+    (i < stamps_ns.size() / 2 ? first_half : second_half) += static_cast<double>(stamps_ns[i]);
   }
   constexpr std::size_t kFallsPerTen = 1;
-  return std::make_unique<CandumpParser>(falls * 10 > stamps * kFallsPerTen);
+  constexpr double kGrowth = 2.5;
+  const bool delta =
+      falls * 10 > stamps_ns.size() * kFallsPerTen && second_half < kGrowth * first_half;
+  return std::make_unique<CandumpParser>(delta);
 }
 
 }  // namespace beltgrip::can

@@ -199,6 +199,17 @@ TEST(CandumpLog, ConsoleFormatWithZeroBasedTimesAndWithDifferences) {
       " (000.010100)  vcan0  123   [1]  00\n");
   ASSERT_EQ(delta.frames.size(), 4U);
   EXPECT_EQ(delta.frames[3].t_ns, 30'000'000);
+  // Zero-based, every second frame a little before the one above it.
+  std::string swapped = " (000.000000)  vcan0  123   [1]  00\n";
+  for (int i = 1; i < 200; ++i) {
+    char line[64];
+    std::snprintf(line, sizeof line, " (000.%06d)  vcan%d  123   [1]  00\n",
+                  i * 1000 + (i % 2) * 1500, i % 2);
+    swapped += line;
+  }
+  const Log out_of_order = read(swapped);
+  ASSERT_EQ(out_of_order.frames.size(), 200U);
+  EXPECT_EQ(out_of_order.frames[199].t_ns, 200'500'000);
 }
 
 TEST(CandumpLog, ConsoleFormatWithoutTimesHasNoFrame) {

@@ -14,6 +14,7 @@
 #include <map>
 #include <sstream>
 
+#include "can_dbc/can_log.h"
 #include "can_dbc/dbc_parser.h"
 #include "can_dbc/message_codec.h"
 
@@ -315,6 +316,34 @@ TEST(Corpus, EveryFileLoadsWholeAndEveryValueIsEqual) {
             << counts.values << " values\n";
   for (const auto& [code, count] : warnings) std::cout << "  " << code << ' ' << count << '\n';
   EXPECT_GT(counts.values, 0U);
+}
+
+TEST(Corpus, EveryLogIsReadWithoutABadLine) {
+  const char* folder = std::getenv("BELTGRIP_CORPUS");
+  if (folder == nullptr) GTEST_SKIP() << "BELTGRIP_CORPUS is not set: no log was checked";
+  std::size_t logs = 0;
+  std::uint64_t frames = 0;
+  for (const auto& entry : fs::directory_iterator(fs::path(folder) / "logs")) {
+    SCOPED_TRACE(entry.path().filename().string());
+    const auto reader = LogReader::open(entry.path().string());
+    LogRecord record;
+    while (reader->next(record)) {
+    }
+    const LogStats& stats = reader->stats();
+    const std::string kind = entry.path().extension().string();
+    if (kind == ".blf" || kind == ".mf4") {  // named, not read
+      EXPECT_EQ(stats.frames, 0U);
+      ASSERT_EQ(stats.lines_bad, 1U);
+      EXPECT_NE(stats.first_bad[0].reason.find("not read"), std::string::npos);
+      continue;
+    }
+    EXPECT_GT(stats.frames, 0U);
+    EXPECT_EQ(stats.lines_bad, 0U);
+    ++logs;
+    frames += stats.frames;
+  }
+  std::cout << logs << " logs, " << frames << " frames\n";
+  EXPECT_GT(logs, 0U);
 }
 
 }  // namespace

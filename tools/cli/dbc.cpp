@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <cinttypes>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <memory>
@@ -61,12 +63,19 @@ Tally tally(const std::vector<can::Problem>& problems) {
   return count;
 }
 
+std::string text_of(const Tally& count) {
+  const auto number = [](std::size_t n, const char* what) {
+    return std::to_string(n) + ' ' + what + (n == 1 ? "" : "s");
+  };
+  return number(count.errors, "error") + ", " + number(count.warnings, "warning");
+}
+
 // One line on standard error if there is anything to know about the file.
 void mention_problems(const std::string& path, const std::vector<can::Problem>& problems) {
   const Tally count = tally(problems);
   if (count.warnings + count.errors == 0) return;
-  std::fprintf(stderr, "%s: %zu errors, %zu warnings (beltgrip dbc check lists them)\n",
-               path.c_str(), count.errors, count.warnings);
+  std::fprintf(stderr, "%s: %s (beltgrip dbc check lists them)\n", path.c_str(),
+               text_of(count).c_str());
 }
 
 // --- check ---------------------------------------------------------------------------------------
@@ -80,8 +89,7 @@ void check(const std::string& path, bool strict) {
   }
   const Tally count = tally(result.problems);
   if (result.database.messages.empty()) fail_without_message(path);
-  const std::string summary = path + ": " + std::to_string(count.errors) + " errors, " +
-                              std::to_string(count.warnings) + " warnings";
+  const std::string summary = path + ": " + text_of(count);
   if (count.errors > 0 || (strict && count.warnings > 0)) throw Failure{kBadInput, summary};
   std::fprintf(stderr, "%s\n", summary.c_str());
 }
@@ -94,6 +102,11 @@ std::string id_text(can::CanId id) {
   return text;
 }
 
+std::string number_text(double value) {
+  std::array<char, 32> text;
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
+}
+
 void print_readably(const can::Database& database) {
   for (const can::MessageDef& message : database.messages) {
     std::printf("%s %s, %" PRIu32 " bytes%s", id_text(message.id).c_str(), message.name.c_str(),
@@ -102,10 +115,10 @@ void print_readably(const can::Database& database) {
     if (message.cycle_ms) std::printf(", every %g ms", *message.cycle_ms);
     std::printf("\n");
     for (const can::SignalDef& signal : message.signals) {
-      std::printf("  %s: bit %" PRIu32 ", %" PRIu32 " bits, %s endian, factor %.17g, offset %.17g",
+      std::printf("  %s: bit %" PRIu32 ", %" PRIu32 " bits, %s endian, factor %s, offset %s",
                   signal.name.c_str(), signal.start_bit, signal.length,
-                  signal.byte_order == can::ByteOrder::kLittle ? "little" : "big", signal.scale,
-                  signal.offset);
+                  signal.byte_order == can::ByteOrder::kLittle ? "little" : "big",
+                  number_text(signal.scale).c_str(), number_text(signal.offset).c_str());
       if (!signal.unit.empty()) std::printf(" %s", signal.unit.c_str());
       if (signal.is_multiplexer) std::printf(", multiplexer");
       if (signal.multiplexed_by) {
