@@ -1,7 +1,7 @@
-// Method "robust": the slope of the friction curve over the last stretch of slip, by least squares
-// that minds the noise in slip; a stop once the curve has turned down beyond doubt, with backups by
-// slip and slip rate; the peak by a local fit. Slip in percent. Real-time thread; allocates in the
-// constructor only.
+// Method "robust": the slope of the friction curve over windows of many lengths, with the noise of
+// each channel learned from its own scatter; a stop once the curve has levelled off or turned down
+// beyond doubt, with backups by slip and slip rate; mu_max as the average over many forms of the
+// curve near its peak. Slip in percent. Real-time thread; allocates in the constructor only.
 #pragma once
 
 #include <memory>

@@ -85,6 +85,10 @@ TEST_P(Peak, IsFoundAndStoppedAfter) {
 INSTANTIATE_TEST_SUITE_P(
     Rig, Peak,
     testing::Values(
+        PeakCase{"drive_overdrive_corner", {}, 0.105, 2.5},
+        PeakCase{"corner_fast_ramp", {.ramp_N_per_s = 150.0}, 0.105, 2.5},
+        PeakCase{"corner_rounded_speeds", {.speed_quantum_rad_s = kRpm}, 0.105, 2.5},
+        PeakCase{"corner_without_noise", {.noise = 0.0}, 0.105, 2.5},
         PeakCase{"drive_overdrive_round", {.friction = test::round_peak(0.100, 2.5)}, 0.100, 2.5},
         PeakCase{"overrun_overdrive",
                  {.friction = test::round_peak(0.095, 2.0), .torque_Nm = -30.0, .mu_begin = 0.07},
