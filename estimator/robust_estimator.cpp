@@ -42,7 +42,7 @@ constexpr double kShortestSlip_percent = 0.5;
 constexpr double kConfirm_percent = 0.35, kAhead_s = 0.1;
 
 constexpr double kBackupSlip_percent = 8.0;  // above the smallest slip
-constexpr double kBackupRate_percent_s = 15.0, kBackupRateDeviations = 6.0;
+constexpr double kBackupRate_percent_s = 30.0, kBackupRateDeviations = 6.0;
 constexpr std::size_t kBackupRateCells = 20;
 
 // Points for the fit.
@@ -51,7 +51,8 @@ constexpr double kShortestPoint_s = 0.035, kLongestPoint_s = 1.0, kPointStep_per
 constexpr double kFitFrom = 0.9;  // of the largest mu*
 constexpr std::size_t kFewestCells = 30;
 constexpr double kBoundDeviations = 2.5;  // a lower bound is right in 99 %
-constexpr double kFallenDeviations = 3.0;
+constexpr double kMovedDeviations = 3.0;
+constexpr double kSure = 0.95;
 // What no form of the fit has in it, relative: mu_max of curves outside the family comes out 0.1 %
 // low without noise (accuracy_test).
 constexpr double kFormDeviation = 1e-3;
@@ -286,15 +287,13 @@ class RobustEstimator final : public SlipCurveEstimator {
   // lower bound.
   void judge(const PeakFit& fit) noexcept {
     const std::span<const CurvePoint> points = stretch();
-    double duration_s = 0.0, after = 0.0, after_weight = 0.0, torque = 0.0, force = 0.0;
+    double duration_s = 0.0, torque = 0.0, force = 0.0;
     double moved = 0.0, slip_variance = 0.0;
     for (const CurvePoint& point : points) {
       duration_s += point.duration_s;
       torque += point.torque_Nm * point.duration_s;
       force += point.force_N * point.duration_s;
       if (point.slip_percent <= fit.slip_percent) continue;
-      after += mu_weight(point) * mu_of(point);
-      after_weight += mu_weight(point);
       if (point.slip_percent - fit.slip_percent > moved) {
         moved = point.slip_percent - fit.slip_percent;
         slip_variance = slip_trend_.density(kSlipNoise_s) / point.duration_s;
@@ -303,22 +302,25 @@ class RobustEstimator final : public SlipCurveEstimator {
     const double sensors = relative_sensor_deviation(variator_, accuracies_, torque / duration_s,
                                                      force / duration_s, omega_s_rad_s_);
     peak_.samples = std::llround(duration_s * settings_.sample_rate_hz);
-    if (fit.mu <= 0.0) {
+    double lines = force_line_.variance_at(end_s_) / square(force_line_.at(end_s_));
+    if (inertia_ > 0.0) lines += torque_line_.variance_at(end_s_) / square(torque_line_.at(end_s_));
+    if (!(fit.mu > 0.0) || !std::isfinite(fit.mu + fit.variance + fit.slip_percent + lines)) {
       bound_by_last(sensors);
       return;
     }
-    double lines = force_line_.variance_at(end_s_) / square(force_line_.at(end_s_));
-    if (inertia_ > 0.0) lines += torque_line_.variance_at(end_s_) / square(torque_line_.at(end_s_));
     const double deviation =
         std::max(kSmallestStd,
                  std::sqrt(fit.variance +
                            fit.mu * fit.mu * (lines + sensors * sensors + square(kFormDeviation))));
     peak_.sigma_peak_percent = fit.slip_percent;
-    const bool slipped = moved > kFallenDeviations * std::sqrt(slip_variance);
-    const bool fallen =
-        after_weight > 0.0 && fit.mu - after / after_weight >
-                                  kFallenDeviations * std::sqrt(1.0 / after_weight + fit.variance);
-    if (fit.inside > 0.5 && slipped && (out_.stop == StopReason::kSlope || fallen)) {
+    // After another stop than the slope's the fit alone must be sure, on slip that has really
+    // moved.
+    const double slip_noise = std::sqrt(slip_variance);
+    const bool turned = out_.stop == StopReason::kSlope
+                            ? fit.inside > 0.5 && moved > kMovedDeviations * slip_noise
+                            : fit.inside > kSure &&
+                                  moved > std::max(kGained_percent, kGainedDeviations * slip_noise);
+    if (turned) {
       peak_.kind = PeakKind::kValue;
       peak_.mu_max = fit.mu;
       peak_.mu_max_std = deviation;
@@ -339,6 +341,7 @@ class RobustEstimator final : public SlipCurveEstimator {
       n += mu_weight(points_[i]);
     }
     const double reached = sum / n;
+    if (!std::isfinite(reached) || reached <= 0.0) return;
     peak_.kind = PeakKind::kLowerBound;
     peak_.sigma_peak_percent = points_[point_count_ - 1].slip_percent;
     peak_.mu_max =
@@ -509,6 +512,7 @@ class RobustEstimator final : public SlipCurveEstimator {
       const double unit = scale / std::max(rel, kShortestSlip_percent);
       const double limit = kLevel * unit;
       const double sd = std::sqrt(var_k);
+      if (!std::isfinite(k) || !std::isfinite(sd)) continue;
       if (first) show(k, sd);
       first = false;
       const double kf_up = std::max(limit, kf + 2.0 * std::sqrt(var_kf));

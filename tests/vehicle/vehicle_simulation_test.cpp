@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include <cmath>
 #include <map>
 
@@ -309,7 +311,8 @@ TEST(VehicleBus, FaultsActOnTheirSignalAndTimeOnly) {
 
 TEST(VehicleSimulation, AStateThatIsNoNumberIsNoticed) {
   VehicleScenario s = scenario("coast-overdrive");
-  s.faults.push_back({FaultKind::kTorqueStep, "", 2.0, false, 1.0, INFINITY});
+  s.faults.push_back(
+      {FaultKind::kTorqueStep, "", 2.0, false, 1.0, std::numeric_limits<double>::infinity()});
   VehiclePort port(s, 1);
   EXPECT_TRUE(port.finite());
   while (port.wait_until(port.now() + 5'000'000) != daemon::Wake::kClosed) {
