@@ -14,10 +14,25 @@ namespace beltgrip::can {
 
 // The parameter group number of a 29-bit identifier: below PDU format 240 the next byte is the
 // destination address and does not count (SAE J1939-21).
-constexpr std::uint32_t parameter_group(std::uint32_t id) noexcept {
+constexpr bool has_destination(std::uint32_t id) noexcept {
   constexpr std::uint32_t kFirstBroadcastFormat = 240;
-  const std::uint32_t group = (id >> 8) & 0x3FFFFU;
-  return ((group >> 8) & 0xFFU) < kFirstBroadcastFormat ? group & 0x3FF00U : group;
+  return ((id >> 16) & 0xFFU) < kFirstBroadcastFormat;
+}
+constexpr std::uint32_t parameter_group(std::uint32_t id) noexcept {
+  return (id >> 8) & (has_destination(id) ? 0x3FF00U : 0x3FFFFU);
+}
+
+// The bits of a received identifier of the same kind (11 or 29 bits) that must equal those of the
+// message's: all of them, or those of the parameter group. Also the mask of a kernel filter.
+constexpr std::uint32_t identifier_mask(CanId id, bool j1939) noexcept {
+  if (!id.extended) return kStandardIdMax;
+  if (!j1939) return kExtendedIdMax;
+  return has_destination(id.value) ? 0x03FF'0000U : 0x03FF'FF00U;
+}
+
+constexpr bool is_of_message(CanId received, CanId message, bool j1939) noexcept {
+  return received.extended == message.extended &&
+         ((received.value ^ message.value) & identifier_mask(message, j1939)) == 0;
 }
 
 class MessageIndex {

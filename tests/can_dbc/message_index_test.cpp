@@ -29,6 +29,25 @@ TEST(ParameterGroup, LeavesOutTheDestinationOfPdu1) {
   EXPECT_EQ(parameter_group(0x1DEFFF09), 0x1EF00U);
 }
 
+TEST(ParameterGroup, MaskAndComparisonSayTheSameAsTheNumber) {
+  std::mt19937_64 random(6);
+  for (int i = 0; i < 100'000; ++i) {
+    const auto message = static_cast<std::uint32_t>(random() & kExtendedIdMax);
+    auto received = static_cast<std::uint32_t>(random() & kExtendedIdMax);
+    if (i % 2 == 0) {  // the same group more often than chance has it
+      received = (received & ~0x03FF'FF00U) | (message & 0x03FF'FF00U);
+      if (i % 4 == 0) received ^= 0xFF00U & static_cast<std::uint32_t>(random());
+    }
+    ASSERT_EQ(is_of_message({received, true}, {message, true}, true),
+              parameter_group(received) == parameter_group(message));
+    ASSERT_EQ(is_of_message({received, true}, {message, true}, false), received == message);
+    ASSERT_FALSE(is_of_message({message, false}, {message, true}, true));
+  }
+  EXPECT_TRUE(is_of_message({0x123, false}, {0x123, false}, false));
+  EXPECT_FALSE(is_of_message({0x123, false}, {0x124, false}, false));
+  EXPECT_EQ(identifier_mask({0x123, false}, true), 0x7FFU);
+}
+
 TEST(MessageIndex, StandardAndExtendedIdentifiersOfOneNumberDiffer) {
   Database db;
   db.messages = {message("standard", 0x123, false), message("extended", 0x123, true)};
