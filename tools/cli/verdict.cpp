@@ -94,7 +94,7 @@ void Verdict::on_frame(std::int64_t t_ns, const OwnFrameView& view) {
     const bool stop = view.value("MacroSlipStop") > 0.5;
     if (stop && !stop_flag_ && !stop_s_) {
       stop_s_ = static_cast<double>(t_ns) * 1e-9;
-      stop_slip_percent_ = view.value("SigmaStar");
+      if (view.label("SigmaStar") != "NotAvailable") stop_slip_percent_ = view.value("SigmaStar");
     }
     stop_flag_ = stop;
   } else if (view.message->name == "BeltGripEstimate") {
@@ -128,7 +128,8 @@ void Verdict::print(std::FILE* out, const Truth& truth) const {
     true_text += format(", %.1f %% when the operator let go at %.2f s",
                         experiment->sigma_star_max_percent, *experiment->let_go_s);
   }
-  line(out, "slip at stop", stop_s_ ? format("%.2f %%", stop_slip_percent_) : "-", true_text);
+  line(out, "slip at stop", stop_slip_percent_ ? format("%.2f %%", *stop_slip_percent_) : "-",
+       true_text);
 }
 
 }  // namespace beltgrip::cli

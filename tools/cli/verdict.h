@@ -36,7 +36,7 @@ class Verdict {
  private:
   bool stop_flag_ = false;
   std::optional<double> stop_s_;
-  double stop_slip_percent_ = 0.0;
+  std::optional<double> stop_slip_percent_;  // where the stop came with a slip
   std::optional<double> mu_max_;
   double mu_max_std_ = 0.0;
   std::string kind_;

@@ -69,6 +69,11 @@ struct ScenarioReader::Impl {
     }
   }
 
+  std::string wrong(const toml::node& node, const std::string& shown,
+                    const std::string& expected) const {
+    return place(node) + ": " + shown + ": found " + found_text(node) + ", expected " + expected;
+  }
+
   void apply_table(const toml::table& table, const std::string& prefix,
                    const std::string& shown_prefix, std::vector<std::string>& errors) {
     for (const auto& [key, node] : table) {
@@ -79,17 +84,13 @@ struct ScenarioReader::Impl {
       } else if (const auto value = keys.find(name); value != keys.end()) {
         positions[name] = place(node);
         const std::string expected = value->second(node);
-        if (!expected.empty()) {
-          errors.push_back(place(node) + ": " + shown + ": found " + found_text(node) +
-                           ", expected " + expected);
-        }
+        if (!expected.empty()) errors.push_back(wrong(node, shown, expected));
       } else if (!is_section(name)) {
         errors.push_back(place(node) + ": " + shown + ": is not a key of a vehicle scenario");
       } else if (const toml::table* section = node.as_table()) {
         apply_table(*section, name + ".", shown + ".", errors);
       } else {
-        errors.push_back(place(node) + ": " + shown + ": found " + found_text(node) +
-                         ", expected a section [" + shown + "]");
+        errors.push_back(wrong(node, shown, "a section [" + shown + "]"));
       }
     }
   }

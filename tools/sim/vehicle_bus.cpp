@@ -193,7 +193,7 @@ void VehicleBus::sample(const VehicleSimulation& vehicle, std::vector<can::Stamp
 }
 
 const can::Database& vehicle_database() {
-  static const can::Database database = can::parse_dbc(*resource("vehicle.dbc")).database;
+  static const can::Database database = can::parse_dbc(shipped("vehicle.dbc")).database;
   return database;
 }
 
