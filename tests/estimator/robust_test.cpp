@@ -65,7 +65,7 @@ class Peak : public testing::TestWithParam<PeakCase> {};
 
 TEST_P(Peak, IsFoundAndStoppedAfter) {
   const PeakCase& expected = GetParam();
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
     Rig rig = expected.rig;
     rig.seed = seed;
     const Outcome out = run(rig);
@@ -125,7 +125,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(Robust, ARisingCurveGivesALowerBound) {
   // Rises for ever: at 4 % slip it carries 0.096 with a fifth of the slope of its secant.
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Outcome out = run({.friction = test::saturating(0.12, 1.0),
                              .mu_begin = 0.06,
                              .end_slip_percent = 4.0,
@@ -141,7 +141,7 @@ TEST(Robust, ARisingCurveGivesALowerBound) {
 TEST(Robust, TheDeformationBranchIsNotThePeak) {
   // 3 % of the ratio at the begin: sigma* falls by one percent while mu* rises, until the belt's
   // own slip takes over. The ramp ends before the peak.
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Rig rig = {.friction = test::tent(0.105, 1.0, 2e-3),
                      .mu_begin = 0.06,
                      .end_s = 70.0,
@@ -156,7 +156,7 @@ TEST(Robust, TheDeformationBranchIsNotThePeak) {
 }
 
 TEST(Robust, DoesNotStopAtConstantClampForce) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
     for (const double quantum : {0.0, kRpm}) {
       for (const double torque : {50.0, -20.0}) {
         const Outcome out = run({.torque_Nm = torque,
