@@ -35,6 +35,7 @@ class PeakFitter {
  private:
   static constexpr int kHinges = 24;
   static constexpr int kLambdas = 10;
+  static constexpr std::size_t kForms = std::size_t{kLambdas} * (kHinges + 1);
   struct Candidate {
     double chi2 = 0.0, mu = 0.0, variance = 0.0, slip_percent = 0.0, prior = 0.0;
     bool inside = false;
@@ -46,7 +47,7 @@ class PeakFitter {
   double c_ = 0.0;
   double slip_low_ = 0.0, slip_high_ = 0.0, span_ = 0.0, mu_scale_ = 0.0;
   double best_chi2_ = 0.0;
-  std::array<Candidate, kLambdas*(kHinges + 1)> candidates_{};
+  std::array<Candidate, kForms> candidates_{};
   std::size_t count_ = 0;
 };
 

@@ -37,6 +37,7 @@ class Run {
   Answer run() {
     answer_.extended = request_.model;
     std::vector<ExperimentData> runs;
+    runs.reserve(request_.experiments.size());
     for (const SignalTable& table : request_.experiments) {
       runs.push_back(prepare(table, request_.model.variator));
     }
@@ -120,8 +121,10 @@ class Run {
         if (largest > high) high = largest, high_name = run.name;
       }
       if (high > 1.03 * low && std::isfinite(low)) {
-        out().notes.push_back(low_name + " and " + high_name + ": end-stop ratios " + text_of(low) +
-                              " and " + text_of(high) + " cannot be of one machine");
+        std::string note = low_name;
+        note.append(" and ").append(high_name).append(": end-stop ratios ").append(text_of(low));
+        note.append(" and ").append(text_of(high)).append(" cannot be of one machine");
+        out().notes.push_back(std::move(note));
         different_machines_ = true;
       }
     }
@@ -141,12 +144,14 @@ class Run {
       return;
     }
     std::vector<int> slots;
+    slots.reserve(naming.accepted.size());
     for (const Accepted& each : naming.accepted) slots.push_back(each.slot);
     Gain gain;
     if (request_.held_out.empty()) {
       if (campaign.runs.size() >= 3) gain = left_out_gain(engine, naming.nominal, extended, slots);
     } else {
       std::vector<ExperimentData> runs;
+      runs.reserve(request_.held_out.size());
       for (const SignalTable& table : request_.held_out) {
         runs.push_back(prepare(table, request_.model.variator));
       }

@@ -26,6 +26,7 @@ std::vector<ModelState> left_out_states(const Engine& engine, const ModelState& 
     columns.push_back(static_cast<int>(j));
   }
   std::vector<Summary> summaries;
+  summaries.reserve(campaign.runs.size());
   for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
     summaries.push_back(
         summarise(campaign, static_cast<int>(e), state, parameters, scales, engine.whitening()));

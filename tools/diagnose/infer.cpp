@@ -285,6 +285,7 @@ Whitening fit_whitening(const Campaign& campaign, const ModelState& state,
   Whitening plain = identity_whitening(campaign);
   plain.weight = before.weight;
   const auto runs = campaign.runs.size();
+  summaries.reserve(runs);
   for (std::size_t e = 0; e < runs; ++e) {
     summaries.push_back(summarise(campaign, static_cast<int>(e), state, parameters, scale, before));
   }
@@ -397,7 +398,8 @@ double incomplete_beta(double a, double b, double x) {
                        a;
   double f = 1.0, c = 1.0, d = 0.0;
   for (int i = 0; i <= 300; ++i) {
-    const double m = i / 2;
+    const int half = i / 2;
+    const double m = half;
     double numerator = 1.0;
     if (i > 0) {
       numerator = i % 2 == 0 ? m * (b - m) * x / ((a + 2.0 * m - 1.0) * (a + 2.0 * m))

@@ -55,7 +55,7 @@ double ln_sum(const std::vector<double>& ln_values) {
 
 // Every accepted slot against every other slot in its place.
 void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& stop) {
-  const std::vector<int> set = engine.accepted();
+  const std::vector<int>& set = engine.accepted();
   naming.accepted.clear();
   naming.hypothesis = engine.refine(set);
   const Hypothesis whole = naming.hypothesis;

@@ -225,8 +225,8 @@ NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& st
       if (y.size() == 0) return;
       // Second differences over two samples: neighbours share samples of the local fit.
       for (int k = 4; k + 4 < data.size(); k += 2) {
-        if (!data.valid[static_cast<std::size_t>(k - 4)] ||
-            !data.valid[static_cast<std::size_t>(k + 4)]) {
+        const auto at = static_cast<std::size_t>(k);
+        if (!data.valid[at - 4] || !data.valid[at + 4]) {
           continue;
         }
         into.push_back((y[k - 4] - 2.0 * y[k] + y[k + 4]) / std::sqrt(6.0));

@@ -176,10 +176,12 @@ class CsvParser {
     last_t_s_ = t_s;
     ++rows_;
     for (std::size_t i = 0; i < columns_.size(); ++i) {
-      if (!columns_[i].role || !values_[i]) continue;
-      Channel& channel = table_[*columns_[i].role];
+      const auto& role = columns_[i].role;
+      const auto& value = values_[i];
+      if (!role || !value) continue;
+      Channel& channel = table_[*role];
       channel.t_s.push_back(t_s);
-      channel.value.push_back(*values_[i]);
+      channel.value.push_back(*value);
     }
   }
   void count(std::size_t& counter, std::size_t& first) const {

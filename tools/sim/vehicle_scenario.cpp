@@ -268,8 +268,7 @@ VehicleScenarioResult parse_vehicle_scenario(const std::vector<ScenarioLayer>& l
   name_driver(reader, s.driver);
   name_sensors(reader, s.sensors);
   name_faults(reader, s.faults);
-  reader.apply(
-      {std::string(kBase) + ".toml", std::string(shipped(std::string(kBase) + ".toml"))});
+  reader.apply({std::string(kBase) + ".toml", std::string(shipped(std::string(kBase) + ".toml"))});
   for (const ScenarioLayer& layer : layers) reader.apply(layer);
   if (reader.errors().empty()) check_whole(reader, s);
   result.errors = reader.errors();
