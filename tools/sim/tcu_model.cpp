@@ -24,7 +24,7 @@ constexpr double kPermitSettle_s = 0.5;
 constexpr double kPermitEngine_rad_s = 85.0;
 
 std::uint32_t microseconds(double t_s) {
-  return static_cast<std::uint32_t>(static_cast<std::uint64_t>(t_s * 1e6));
+  return static_cast<std::uint32_t>(static_cast<std::int64_t>(t_s * 1e6));
 }
 
 }  // namespace
