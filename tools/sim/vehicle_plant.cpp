@@ -68,6 +68,7 @@ VehiclePlant::VehiclePlant(const VehicleScenario& scenario)
 }
 
 double VehiclePlant::primary_radius_m(double ratio) const {
+  if (!std::isfinite(ratio)) return ratio;  // what is no number stays none; the run ends on it
   const double span = std::log(variator_.ratio_overdrive / variator_.ratio_low);
   const double place = std::clamp(std::log(ratio / variator_.ratio_low) / span, 0.0, 1.0) *
                        static_cast<double>(kRadii - 1);
