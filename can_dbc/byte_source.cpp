@@ -125,8 +125,16 @@ class GzipSource : public PackedSource {
         break;
       }
       if (!inside_member_) {
-        // Further members follow each other; anything else behind one is padding.
-        if (static_cast<unsigned char>(packed_[begin_]) != 0x1F) break;
+        // Further members follow each other; zeros behind one are padding.
+        constexpr char kMagic = 0x1F;
+        if (packed_[begin_] == '\0') {
+          ++begin_;
+          continue;
+        }
+        if (packed_[begin_] != kMagic) {
+          fault_ = "gzip data with something else behind them";
+          break;
+        }
         inflateReset(&stream_);
         inside_member_ = true;
       }

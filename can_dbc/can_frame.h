@@ -41,6 +41,7 @@ struct CanFrame {
 struct StampedFrame {
   std::int64_t t_ns = 0;
   CanFrame frame;
+  std::uint8_t bus = 0;  // where there are several, in whatever order their owner has them
 };
 
 }  // namespace beltgrip::can

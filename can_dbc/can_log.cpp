@@ -70,6 +70,8 @@ class LineBuffer {
       if (ended_) {
         line = {start, end_ - begin_};
         begin_ = end_;
+        // What a damaged source breaks off in is not a line: its frame would have lost its end.
+        if (!source_->fault().empty()) return false;
         return !line.empty() && !skipping_;
       }
       if (end_ - begin_ > kLineMax) {
@@ -139,6 +141,12 @@ std::unique_ptr<LineParser> find_format(const Sample& sample) {
   return make(best);
 }
 
+// Those at the end belong to it. Any other would hide the frames behind it.
+bool holds_carriage_return(std::string_view line) {
+  while (line.ends_with('\r')) line.remove_suffix(1);
+  return line.find('\r') != std::string_view::npos;
+}
+
 struct BinaryFormat {
   std::string_view magic;
   const char* reason;
@@ -155,7 +163,8 @@ constexpr std::array<BinaryFormat, 6> kBinaryFormats{
 
 class TextLogReader : public LogReader {
  public:
-  explicit TextLogReader(std::unique_ptr<ByteSource> source) : lines_(std::move(source)) {
+  TextLogReader(std::unique_ptr<ByteSource> source, bool notes)
+      : lines_(std::move(source)), notes_(notes) {
     const Sample sample = lines_.sample();
     for (const BinaryFormat& format : kBinaryFormats) {
       if (!lines_.peek().starts_with(format.magic)) continue;
@@ -178,8 +187,18 @@ class TextLogReader : public LogReader {
         report("longer than 65536 bytes");
         continue;
       }
+      if (holds_carriage_return(line)) {
+        report("carriage return inside a line, expected lines that end with LF or CR LF");
+        continue;
+      }
+      constexpr std::string_view kNote = "# ";
+      if (notes_ && line.starts_with(kNote)) {
+        record.note = line.substr(kNote.size());
+        return true;
+      }
       switch (parser_->parse(line, record)) {
         case LineKind::kFrame:
+          record.note = {};
           ++stats_.frames;
           return true;
         case LineKind::kNothing:
@@ -208,6 +227,7 @@ class TextLogReader : public LogReader {
   }
 
   LineBuffer lines_;
+  bool notes_;
   std::unique_ptr<LineParser> parser_;
   LogStats stats_;
 };
@@ -246,8 +266,8 @@ void append_frame(std::string& text, const CanFrame& frame) {
 
 }  // namespace
 
-std::unique_ptr<LogReader> LogReader::open(const std::string& path) {
-  return std::make_unique<TextLogReader>(ByteSource::open(path));
+std::unique_ptr<LogReader> LogReader::open(const std::string& path, bool notes) {
+  return std::make_unique<TextLogReader>(ByteSource::open(path), notes);
 }
 
 std::string frame_text(const CanFrame& frame) {

@@ -17,6 +17,8 @@ struct LogRecord {
   std::int64_t t_ns = 0;  // as in the log: exact decimal, 9 digits
   CanFrame frame;
   std::string_view interface;  // valid until the next call of next()
+  bool sent = false;           // candump: marked "T", sent by the one who recorded
+  std::string_view note;       // where notes are asked for; then there is no frame
 };
 
 struct BadLine {
@@ -39,7 +41,8 @@ class LogReader {
 
   // path "-" is standard input. .gz and .zst are unpacked by content, the format is found from the
   // content. Throws LogOpenError when the file is missing or unreadable.
-  static std::unique_ptr<LogReader> open(const std::string& path);
+  // notes: lines that begin with "# " come as records with a note, without that beginning.
+  static std::unique_ptr<LogReader> open(const std::string& path, bool notes = false);
 };
 
 struct LogOpenError {

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "can_dbc/dbc_draft.h"
 #include "can_dbc/text_encoding.h"
@@ -91,6 +92,7 @@ class StatementReader {
   std::size_t last_rank_ = 0;  // see check_order
   std::string_view last_section_;
   std::array<bool, 7> late_reported_{};
+  std::set<std::pair<std::string, std::string>> defined_;  // attributes: name, object
 };
 
 const std::array<StatementReader::Row, 32> StatementReader::kRows{{
@@ -206,7 +208,11 @@ bool StatementReader::expect_id(std::uint32_t& raw_id) {
 bool StatementReader::expect_name(std::string_view& name, const char* what) {
   scan_.skip_blank();
   const std::size_t offset = scan_.position();
-  if (scan_.keyword_at(offset)) return fail(what);
+  // A keyword on a new line starts a statement; on the same line it is a name.
+  std::size_t before = offset;
+  while (before > start_ && static_cast<unsigned char>(draft_.text[before - 1]) <= ' ') --before;
+  const bool new_line = scan_.line_rest(before, offset - before).size() < offset - before;
+  if (new_line && scan_.keyword_at(offset)) return fail(what);
   name = scan_.name();
   if (name.empty()) return fail(what);
   if (name.size() > kNameLengthMax) return fail_at(offset, "a name of at most 1024 characters");
@@ -263,6 +269,8 @@ void StatementReader::check_name(std::string_view name, std::size_t offset) {
                          "name \"" + clip(name) + "\", expected letters, digits and underscores");
   } else if (is_digit(name.front())) {
     draft_.problems.warn(offset, "name-digit", "name \"" + clip(name) + "\" starts with a digit");
+  } else if (is_statement_keyword(name)) {
+    draft_.problems.warn(offset, "name-keyword", "name \"" + clip(name) + "\" is a keyword");
   }
 }
 
@@ -278,6 +286,8 @@ void StatementReader::run() {
     closed_ = true;
     if (scan_.accept(';')) {
       draft_.problems.warn(start_, "stray-semicolon", "\";\" without a statement");
+      while (scan_.accept(';')) {
+      }
       continue;
     }
     const std::string_view word = scan_.peek_word();
@@ -430,6 +440,17 @@ bool StatementReader::nodes() {
     if (name.empty() || name.size() > kNameLengthMax || keyword) {
       // Not a line of names.
       const bool first_line = scan_.slice(start_, start_ + 3) == "BU_";
+      if (first_line && name.empty()) {
+        // A stray quote or bracket costs no node.
+        const std::size_t behind = draft_.text.find_first_not_of("\"()[]|@:", at);
+        const std::size_t end = std::min(behind, draft_.text.size());
+        draft_.problems.warn(at, "node-list",
+                             "found \"" + clip(scan_.slice(at, end)) +
+                                 "\" among the nodes, expected names; kept as text");
+        draft_.keep(at, end);
+        scan_.seek(end);
+        continue;
+      }
       if (first_line) return fail_at(at, "node names");
       scan_.seek(start_);
       return true;
@@ -654,6 +675,9 @@ void StatementReader::signal_tail(SignalDef& signal) {
     if (scan_.at_line_end() || scan_.at_comment() || scan_.keyword_at(scan_.position())) break;
     const std::size_t at = scan_.position();
     comma = scan_.peek() == ',';
+    if (scan_.peek() == ';') {
+      draft_.problems.warn(at, "stray-semicolon", "\";\" behind a signal");
+    }
     if (comma || scan_.peek() == ';') {
       scan_.seek(at + 1);
       continue;
@@ -679,7 +703,7 @@ bool StatementReader::environment_variable() {
       !expect_unsigned(variable.type, kAny, "the variable's type") || !expect('[', "\"[\"") ||
       !expect_number(minimum, "the minimum") || !expect('|', "\"|\"") ||
       !expect_number(maximum, "the maximum") || !expect(']', "\"]\"") ||
-      !expect_string(variable.unit, StringContext::kUnit, "the unit in quotes") ||
+      !expect_string(variable.unit, StringContext::kName, "the unit in quotes") ||
       !expect_number(initial, "the initial value") ||
       !expect_unsigned(variable.id, kAny, "the variable's number") ||
       !expect_name(access, "the access type")) {
@@ -778,6 +802,11 @@ bool StatementReader::attribute_definition() {
     if (const auto maximum = scan_.number()) definition.maximum = maximum->value;
   }
   expect_semicolon();
+  if (!defined_.emplace(definition.name, definition.object).second) {
+    draft_.problems.warn(
+        start_, "duplicate-definition",
+        "attribute \"" + clip(definition.name) + "\" is defined again; this definition is used");
+  }
   draft_.database.attribute_definitions.push_back(std::move(definition));
   return true;
 }
@@ -986,11 +1015,18 @@ bool StatementReader::multiplex_values() {
     scan_.skip_blank();
     if (scan_.accept(',')) continue;
     if (!is_digit(scan_.peek())) break;
+    const std::size_t at = scan_.position();
     std::uint64_t low = 0;
     constexpr std::uint64_t kAny = ~std::uint64_t{0};
     if (!expect_unsigned(low, kAny, "a range like 3-5")) return false;
     std::uint64_t high = low;
     if (scan_.accept('-') && !expect_unsigned(high, kAny, "the end of the range")) return false;
+    if (high < low) {
+      draft_.problems.warn(at, "mux-range",
+                           "range " + std::to_string(low) + "-" + std::to_string(high) +
+                               " ends before it starts; read the other way round");
+      std::swap(low, high);
+    }
     reference.ranges.emplace_back(low, high);
   }
   if (reference.ranges.empty()) return fail("a range like 3-5");
@@ -1037,6 +1073,9 @@ DbcParseResult parse_dbc(std::string_view text) {
                                     [](char c) { return static_cast<unsigned char>(c) >= 0x80; });
     draft.problems.warn(static_cast<std::size_t>(first - draft.text.begin()), "encoding",
                         "text that is not UTF-8; read as Windows-1252");
+  }
+  if (const std::size_t nul = draft.text.find('\0'); nul != std::string_view::npos) {
+    draft.problems.warn(nul, "nul-byte", "a byte of value 0 in the text; read as a blank");
   }
   dbc::StatementReader(draft).run();
   dbc::resolve(draft);

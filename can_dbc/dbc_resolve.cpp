@@ -238,11 +238,36 @@ std::string Resolver::attribute_text(const AttributeRef& reference) {
                          "attribute \"" + clip(reference.attribute) + "\" is not defined");
     return reference.value;
   }
-  if (definition->type != "ENUM") return reference.value;
+  const char* const begin = reference.value.data();
+  const char* const end = begin + reference.value.size();
+  if (definition->type != "ENUM") {
+    double value = 0.0;
+    const bool is_number = std::from_chars(begin, end, value).ec == std::errc{};
+    const bool has_range =
+        definition->minimum && definition->maximum && *definition->minimum < *definition->maximum;
+    if (is_number && has_range &&
+        !(value >= *definition->minimum && value <= *definition->maximum)) {
+      draft_.problems.warn(reference.offset, "attribute-range",
+                           "value " + clip(reference.value) + " of attribute \"" +
+                               clip(reference.attribute) + "\" is outside its range");
+    }
+    return reference.value;
+  }
   std::size_t index = 0;
-  const char* const end = reference.value.data() + reference.value.size();
-  const auto [rest, status] = std::from_chars(reference.value.data(), end, index);
-  if (status != std::errc{} || rest != end) return reference.value;
+  const auto [rest, status] = std::from_chars(begin, end, index);
+  if (status != std::errc{} || rest != end) {
+    const auto& choices = definition->choices;
+    constexpr std::size_t kChoicesLookedAt = 256;
+    const auto last =
+        choices.begin() + static_cast<std::ptrdiff_t>(std::min(choices.size(), kChoicesLookedAt));
+    const bool known = std::find(choices.begin(), last, reference.value) != last;
+    if (!known && choices.size() <= kChoicesLookedAt && !reference.value.empty()) {
+      draft_.problems.warn(reference.offset, "enum-text",
+                           "\"" + clip(reference.value) + "\" is no choice of attribute \"" +
+                               clip(reference.attribute) + "\"");
+    }
+    return reference.value;
+  }
   if (index >= definition->choices.size()) {
     if (!definition->choices.empty()) {
       draft_.problems.warn(reference.offset, "enum-range",
@@ -330,6 +355,7 @@ void Resolver::relations() {
 void Resolver::values() {
   // A table used by name is copied; so much copying that the file cannot have meant it is refused.
   std::size_t budget = 16 * (draft_.text.size() + 4096);
+  std::map<std::string_view, std::size_t> costs;  // of the tables used so far
   for (ValuesRef& reference : draft_.values) {
     if (!reference.table.empty()) {
       const auto table = db_.value_tables.find(draft_.utf8(reference.table));
@@ -338,8 +364,11 @@ void Resolver::values() {
                    "no value table is named \"" + clip(reference.table) + "\"");
         continue;
       }
-      std::size_t cost = 0;
-      for (const auto& [key, text] : table->second) cost += 16 + text.size();
+      const auto [place, is_new] = costs.try_emplace(table->first, 0);
+      std::size_t& cost = place->second;
+      if (is_new) {
+        for (const auto& [key, text] : table->second) cost += 16 + text.size();
+      }
       if (cost > budget) {
         unresolved(reference, "tables-too-large", "the value tables used by name are too large");
         budget = 0;
@@ -401,8 +430,16 @@ void Resolver::senders() {
 
 void Resolver::groups() {
   for (GroupRef& reference : draft_.groups) {
-    for_messages(reference,
-                 [&](MessageDef& message) { message.groups.push_back(reference.group); });
+    for_messages(reference, [&](MessageDef& message) {
+      for (const std::string& name : reference.group.signals) {
+        const auto index = static_cast<std::uint32_t>(&message - db_.messages.data());
+        if (!find_signals(index, name).empty()) continue;
+        draft_.problems.warn(reference.offset, "unknown-signal",
+                             "message \"" + clip(message.name) + "\" has no signal \"" +
+                                 clip(name) + "\", which a group names");
+      }
+      message.groups.push_back(reference.group);
+    });
   }
 }
 

@@ -133,9 +133,8 @@ void Scanner::skip_blank() {
     if (text_[at_ + 1] == '/') {
       at_ = line_end_from(at_);
     } else {
-      // Once none is left, none is looked for again.
-      const std::size_t end = block_ends_left_ ? text_.find("*/", at_ + 2) : std::string_view::npos;
-      comment.closed = block_ends_left_ = end != std::string_view::npos;
+      const std::size_t end = block_end_from(at_ + 2);
+      comment.closed = end != std::string_view::npos;
       // One that nothing ends must not swallow the file: it ends with its line.
       at_ = comment.closed ? end + 2 : line_end_from(at_);
     }
@@ -231,9 +230,21 @@ bool Scanner::keyword_at(std::size_t position) const noexcept {
   return position == 0;
 }
 
+// The last answer is kept: a statement that is given up is read again from its start, and many of
+// them may stand on one long line.
 std::size_t Scanner::line_end_from(std::size_t position) const noexcept {
-  const std::size_t end = text_.find_first_of("\r\n", position);
-  return end == std::string_view::npos ? text_.size() : end;
+  if (position < line_.begin || position > line_.end) {
+    const std::size_t end = text_.find_first_of("\r\n", position);
+    line_ = {position, end == std::string_view::npos ? text_.size() : end};
+  }
+  return line_.end;
+}
+
+std::size_t Scanner::block_end_from(std::size_t position) noexcept {
+  if (position < block_.begin || position > block_.end) {
+    block_ = {position, text_.find("*/", position)};
+  }
+  return block_.end;
 }
 
 // A ";" after which the line ends, a comment begins or the next statement stands; or after which
@@ -251,12 +262,23 @@ bool Scanner::ends_statement(std::size_t semicolon) const noexcept {
   return true;
 }
 
+// `"" XX";`: behind the unit a receiver with a quote too many. After a quote inside a unit, as in
+// `"12" pipe" X`, receivers follow the last one.
+bool Scanner::stray_quote(std::size_t after, std::size_t next_quote) const noexcept {
+  std::size_t at = after;
+  while (at < next_quote && is_blank(text_[at])) ++at;
+  if (at == after || at == next_quote || !is_word_char(text_[at])) return false;
+  at = next_quote + 1;
+  while (at < text_.size() && (text_[at] == ' ' || text_[at] == '\t' || text_[at] == ';')) ++at;
+  return at >= text_.size() || is_line_break(text_[at]);
+}
+
 bool Scanner::closes(std::size_t after, StringContext context, bool escaped) const noexcept {
   if (context == StringContext::kName) return !escaped;
   if (context == StringContext::kUnit) {
     if (escaped) return false;
     for (std::size_t at = after; at < text_.size() && !is_line_break(text_[at]); ++at) {
-      if (text_[at] == '"') return false;
+      if (text_[at] == '"') return stray_quote(after, at);
       if (text_[at] == '/' && at + 1 < text_.size() && text_[at + 1] == '/') return true;
       const bool starts_word = is_word_char(text_[at]) && is_blank(text_[at - 1]);
       if (starts_word && keyword_at(at)) return true;

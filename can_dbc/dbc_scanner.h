@@ -143,13 +143,21 @@ class Scanner {
 
  private:
   bool closes(std::size_t after, StringContext context, bool escaped) const noexcept;
+  bool stray_quote(std::size_t after, std::size_t next_quote) const noexcept;
   bool ends_statement(std::size_t semicolon) const noexcept;
+  std::size_t block_end_from(std::size_t position) noexcept;
 
   std::string_view text_;
   std::size_t at_ = 0;
   std::vector<SourceComment> comments_;
   std::size_t comments_end_ = 0;  // comments before this offset are already listed
-  bool block_ends_left_ = true;   // a "*/" may still come
+  // From anywhere in it, `end` comes next: a line break, or "*/" (npos: none).
+  struct Stretch {
+    std::size_t begin = 1;
+    std::size_t end = 0;
+  };
+  mutable Stretch line_;
+  Stretch block_;
 };
 
 }  // namespace beltgrip::can::dbc

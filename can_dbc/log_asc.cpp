@@ -40,8 +40,13 @@ class AscParser : public LineParser {
 
     const auto stamp_ns = time_ns(take_word(line));
     if (!stamp_ns) return bad("unreadable time stamp");
-    sum_ns_ += *stamp_ns;  // relative stamps count from the event before, whatever it was
-    record.t_ns = relative_ ? sum_ns_ : *stamp_ns;
+    // Relative stamps count from the event before, whatever it was.
+    std::int64_t sum_ns = 0;
+    if (__builtin_add_overflow(relative_ ? last_ns_ : 0, *stamp_ns, &sum_ns)) {
+      return bad("time stamp beyond the range");
+    }
+    last_ns_ = sum_ns;
+    record.t_ns = sum_ns;
     record.frame = CanFrame{};
     const std::string_view first = take_word(line);
     if (first == "CANFD") {
@@ -60,8 +65,10 @@ class AscParser : public LineParser {
     if (starts_with_word(line, "base")) {
       std::string_view rest = line;
       take_word(rest);
-      base_ = take_word(rest) == "dec" ? 10 : 16;
-      relative_ = rest.find("relative") != std::string_view::npos;
+      base_ = starts_with_word(take_word(rest), "dec") ? 10 : 16;
+      take_word(rest);  // "timestamps"
+      skip_blanks(rest);
+      relative_ = starts_with_word(rest, "relative");
       return LineKind::kNothing;
     }
     static constexpr std::array<std::string_view, 9> kHeaders{"date",
@@ -151,6 +158,7 @@ class AscParser : public LineParser {
   // code, length, data, duration, bits, flags.
   LineKind fd_event(std::string_view line, CanFrame& frame) {
     std::string_view word = take_word(line);
+    if (starts_with_word(word, "errorframe")) return error_frame(frame);
     if (!starts_with_word(word, "rx") && !starts_with_word(word, "tx")) return LineKind::kNothing;
     word = take_word(line);
     if (starts_with_word(word, "errorframe")) return error_frame(frame);
@@ -190,7 +198,7 @@ class AscParser : public LineParser {
 
   int base_ = 16;
   bool relative_ = false;
-  std::int64_t sum_ns_ = 0;
+  std::int64_t last_ns_ = 0;
 };
 
 }  // namespace

@@ -75,6 +75,7 @@ class CandumpParser : public LineParser {
     after_error_ = record.frame.error;
     record.t_ns = delta_&& hash == std::string_view::npos ? sum_ns_ += *t_ns : *t_ns;
     record.interface = interface;
+    record.sent = hash != std::string_view::npos && take_word(line) == "T";
     return LineKind::kFrame;
   }
 
@@ -135,6 +136,9 @@ class CandumpParser : public LineParser {
     }
     if (!read_id(word, frame)) return bad("unreadable identifier");
     word = take_word(line);
+    if (word.size() == 3 && word.front() == '{' && word.back() == '}' && hex_value(word[1]) > 8) {
+      word = "[8]";  // -8 shows the raw length code of a classic frame of eight bytes
+    }
     if (word.size() < 3 || word.front() != '[' || word.back() != ']') {
       return bad("no length in brackets");
     }

@@ -12,6 +12,7 @@ namespace beltgrip::can {
 
 namespace {
 
+using log_text::clock_ns;
 using log_text::date_ns;
 using log_text::decimal;
 using log_text::hexadecimal;
@@ -47,7 +48,7 @@ struct ColumnName {
   std::string_view name;  // letters and digits only, lower case
   Column column;
 };
-constexpr std::array<ColumnName, 66> kColumnNames{{{"time", Column::kTime},
+constexpr std::array<ColumnName, 69> kColumnNames{{{"time", Column::kTime},
                                                    {"timestamp", Column::kTime},
                                                    {"t", Column::kTime},
                                                    {"ts", Column::kTime},
@@ -58,6 +59,7 @@ constexpr std::array<ColumnName, 66> kColumnNames{{{"time", Column::kTime},
                                                    {"timestamps", Column::kTime},
                                                    {"timestampepoch", Column::kTime},
                                                    {"abstime", Column::kTime},
+                                                   {"abstimesec", Column::kTime},
                                                    {"datetime", Column::kTime},
                                                    {"timems", Column::kTime_ms},
                                                    {"timestampms", Column::kTime_ms},
@@ -86,6 +88,7 @@ constexpr std::array<ColumnName, 66> kColumnNames{{{"time", Column::kTime},
                                                    {"ext", Column::kExtended},
                                                    {"ide", Column::kExtended},
                                                    {"eff", Column::kExtended},
+                                                   {"xtd", Column::kExtended},
                                                    {"dlc", Column::kOther},
                                                    {"len", Column::kLength},
                                                    {"length", Column::kLength},
@@ -99,6 +102,7 @@ constexpr std::array<ColumnName, 66> kColumnNames{{{"time", Column::kTime},
                                                    {"channel", Column::kBus},
                                                    {"buschannel", Column::kBus},
                                                    {"interface", Column::kBus},
+                                                   {"network", Column::kBus},
                                                    {"iface", Column::kBus},
                                                    {"remote", Column::kRemote},
                                                    {"isremote", Column::kRemote},
@@ -183,7 +187,7 @@ std::optional<std::size_t> read_base64(std::string_view text, CanFrame& frame) {
 // "11 22 33", "112233", "0x112233", "11-22-33", "0x11 0x22", "1 2 3".
 std::optional<std::size_t> read_hex(std::string_view text, CanFrame& frame) {
   const auto separates = [](char c) {
-    return is_blank(c) || c == '-' || c == ':' || c == '.' || c == '_';
+    return is_blank(c) || c == '-' || c == ':' || c == '.' || c == '_' || c == ',' || c == ';';
   };
   std::size_t length = 0;
   while (!text.empty()) {
@@ -300,8 +304,7 @@ class CsvParser : public LineParser {
       if (line.empty() || line[0] == '#') continue;
       if (!has_header_) {
         read_header(line);
-        if (has_header_) continue;
-        return;
+        continue;  // the header may stand behind a preamble
       }
       split(line);
       for (std::size_t i = 0; i < std::min(field_count_, column_count_); ++i) {
@@ -310,6 +313,11 @@ class CsvParser : public LineParser {
           const bool letters = !decimal(field);
           const bool padded = field.size() > 1 && field[0] == '0';
           hex_ids_ |= letters || padded;
+        }
+        // Three digits are no hexadecimal byte.
+        constexpr std::size_t kHexDigitsMax = 2;
+        if (columns_[i] == Column::kDataByte && field.size() > kHexDigitsMax && decimal(field)) {
+          byte_base_ = 10;
         }
         if (columns_[i] == Column::kTime && plain_unit_ns_ == 0) {
           plain_unit_ns_ = unit_of(field);
@@ -354,6 +362,7 @@ class CsvParser : public LineParser {
           if (unit_ns == 0) unit_ns = plain_unit_ns_ == 0 ? 1'000'000'000 : plain_unit_ns_;
           auto t_ns = time_ns(field, unit_ns);
           if (!t_ns) t_ns = date_ns(field);
+          if (!t_ns) t_ns = clock_ns(field);
           if (!t_ns) return bad("unreadable time");
           record.t_ns = *t_ns;
           break;
@@ -379,7 +388,7 @@ class CsvParser : public LineParser {
           break;
         case Column::kDataByte: {
           if (field.empty()) break;
-          const auto byte = with_prefix_or(field, 16);
+          const auto byte = with_prefix_or(field, byte_base_);
           if (!byte || *byte > 0xFF || length == kMaxPayload) {
             bytes_read = false;
             break;
@@ -455,6 +464,7 @@ class CsvParser : public LineParser {
   bool savvycan_ = false;
   bool hex_ids_ = false;
   int id_base_ = 0;
+  int byte_base_ = 16;  // of data bytes in columns of their own
   std::int64_t plain_unit_ns_ = 0;
   std::size_t column_count_ = 0;
   std::size_t columns_needed_ = 0;

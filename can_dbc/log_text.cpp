@@ -1,10 +1,15 @@
 #include "can_dbc/log_text.h"
 
+#include <algorithm>
 #include <charconv>
+#include <string>
 
 namespace beltgrip::can::log_text {
 
 namespace {
+
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::size_t kStampLengthMax = 32;
 
 std::optional<std::uint32_t> whole_number(std::string_view word, int base) {
   std::uint32_t value = 0;
@@ -81,19 +86,29 @@ std::optional<std::int64_t> date_ns(std::string_view text) {
   if (!month || !separator("-/")) return std::nullopt;
   const auto day = take_digits(text, 2);
   if (!day || !separator(" T")) return std::nullopt;
-  const auto hour = take_digits(text, 2);
-  if (!hour || !separator(":")) return std::nullopt;
-  const auto minute = take_digits(text, 2);
-  if (!minute || !separator(":")) return std::nullopt;
   if (text.ends_with('Z')) text.remove_suffix(1);
-  const auto second_ns = time_ns(text);
-  constexpr std::int64_t kSecond = 1'000'000'000;
-  if (!second_ns || *second_ns < 0 || *second_ns > 61 * kSecond || *month < 1 || *month > 12 ||
-      *day < 1 || *day > 31 || *hour > 24 || *minute > 59 || *year < 1700 || *year > 2200) {
+  const auto since_midnight_ns = clock_ns(text);
+  if (!since_midnight_ns || *month < 1 || *month > 12 || *day < 1 || *day > 31 || *year < 1700 ||
+      *year > 2200) {
     return std::nullopt;
   }
-  const std::int64_t minutes = (days_since_1970(*year, *month, *day) * 24 + *hour) * 60 + *minute;
-  return minutes * 60 * kSecond + *second_ns;
+  return days_since_1970(*year, *month, *day) * 24 * 3600 * kSecond_ns + *since_midnight_ns;
+}
+
+std::optional<std::int64_t> clock_ns(std::string_view text) {
+  const auto hour = take_digits(text, 2);
+  if (!hour || !text.starts_with(':')) return std::nullopt;
+  text.remove_prefix(1);
+  const auto minute = take_digits(text, 2);
+  if (!minute || !text.starts_with(':')) return std::nullopt;
+  text.remove_prefix(1);
+  std::string seconds(text.substr(0, kStampLengthMax));
+  std::replace(seconds.begin(), seconds.end(), ':', '.');
+  const auto second_ns = time_ns(seconds);
+  if (!second_ns || *second_ns < 0 || *second_ns > 61 * kSecond_ns || *hour > 24 || *minute > 59) {
+    return std::nullopt;
+  }
+  return (std::int64_t{*hour} * 60 + *minute) * 60 * kSecond_ns + *second_ns;
 }
 
 }  // namespace beltgrip::can::log_text

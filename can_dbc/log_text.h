@@ -62,6 +62,9 @@ std::optional<std::int64_t> time_ns(std::string_view word, std::int64_t unit_ns 
 // "2020-09-12 10:20:30.123456" with a blank or T, read as universal time.
 std::optional<std::int64_t> date_ns(std::string_view text);
 
+// "10:20:30.5" or "10:20:30:5000": the time since midnight.
+std::optional<std::int64_t> clock_ns(std::string_view text);
+
 // The number of payload bytes that a CAN FD data length code 0..15 stands for.
 inline constexpr std::array<std::uint8_t, 16> kFdLengths{0, 1,  2,  3,  4,  5,  6,  7,
                                                          8, 12, 16, 20, 24, 32, 48, 64};
