@@ -7,7 +7,9 @@ namespace beltgrip::estimator {
 
 History::History(double sample_rate_hz, double finest_cell_s)
     : per_cell_(static_cast<int>(std::max(1L, std::lround(sample_rate_hz * finest_cell_s)))),
-      cell_s_(per_cell_ / sample_rate_hz) {}
+      cell_s_(per_cell_ / sample_rate_hz) {
+  for (Level& level : levels_) level.ring = std::vector<Cell>(kCells);
+}
 
 void History::reset() noexcept {
   for (Level& level : levels_) {
@@ -37,15 +39,6 @@ bool History::step(const Cell& sample) noexcept {
     level.filled = 0;
   }
   return true;
-}
-
-std::size_t History::size(std::size_t level) const noexcept {
-  return std::min(levels_[level].count, kCells);
-}
-
-const Cell& History::cell(std::size_t level, std::size_t age) const noexcept {
-  const Level& l = levels_[level];
-  return l.ring[(l.count - 1 - age) % kCells];
 }
 
 }  // namespace beltgrip::estimator

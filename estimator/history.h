@@ -1,11 +1,13 @@
 // What an experiment has measured so far, in bounded memory: means over cells whose length grows
-// with their age. Level 0 keeps the newest and shortest cells, each next level twice as long ones;
-// so every look back is resolved to some hundredth of its own length. Real-time thread, fixed
-// memory.
+// with their age. Level 0 keeps the last cells of kFinestCell_s, each next level twice as long
+// ones; so every look back is resolved to some hundredth of its own length. Real-time thread; all
+// memory is taken by the constructor.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <vector>
 
 namespace beltgrip::estimator {
 
@@ -19,7 +21,7 @@ struct Cell {  // means
 
 class History {
  public:
-  static constexpr std::size_t kLevels = 16;
+  static constexpr std::size_t kLevels = 16;  // 5 min at 10 ms and more
   static constexpr std::size_t kCells = 128;  // per level
   History(double sample_rate_hz, double finest_cell_s);
   void reset() noexcept;
@@ -28,13 +30,18 @@ class History {
   double cell_s(std::size_t level) const noexcept {
     return cell_s_ * static_cast<double>(std::size_t{1} << level);
   }
-  std::size_t size(std::size_t level) const noexcept;
+  std::size_t size(std::size_t level) const noexcept {
+    return std::min(levels_[level].count, kCells);
+  }
   // age 0: the newest full cell of the level.
-  const Cell& cell(std::size_t level, std::size_t age) const noexcept;
+  const Cell& cell(std::size_t level, std::size_t age) const noexcept {
+    const Level& l = levels_[level];
+    return l.ring[(l.count - 1 - age) % kCells];
+  }
 
  private:
   struct Level {
-    std::array<Cell, kCells> ring{};
+    std::vector<Cell> ring;
     std::size_t count = 0;
     Cell sum;
     int filled = 0;

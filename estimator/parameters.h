@@ -46,6 +46,8 @@ struct EstimatorSettings {
   bool torque_is_engine = true;  // role engine_torque (inertia compensated) or primary_torque
   double sample_rate_hz = 200.0;
   double ramp_rate_max_N_per_s = 300.0;
+  // kConfidence: the 95 % interval of mu_max, as a share of it, at which the experiment ends.
+  double confidence_width = 0.15;
   // method "paper" only
   double lowpass_hz = 5.0;
   double window_s = 1.0;               // T

@@ -1,5 +1,6 @@
 #include "estimator/signal_chain.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "estimator/clamp_force.h"
@@ -35,8 +36,8 @@ SignalChain::SignalChain(const EstimatorSettings& settings, const VariatorParame
       torque_(lowpass_hz, settings.sample_rate_hz) {}
 
 void SignalChain::reset() noexcept {
-  started_ = false;
-  acquired_ = 0;
+  started_ = measured_ = false;
+  acquired_ = dead_samples_ = wrong_samples_ = 0;
   ratio_sum_ = 0.0;
   out_ = {};
 }
@@ -92,10 +93,24 @@ const Measurement& SignalChain::step(const VariatorSample& sample) noexcept {
   out_.mu_star = traction_coefficient(variator_, point_, out_.torque_p_Nm, out_.clamp_force_N);
   if (point_.sign * out_.torque_p_Nm < -kTorqueDeadBand_Nm) {
     out_.stop = StopReason::kTorque;
-  } else if (out_.slip_percent < -kRatioTolerance_percent) {
-    out_.stop = StopReason::kRatio;
   } else {
+    StopReason wrong = StopReason::kNone;
+    if (out_.slip_percent < -kRatioTolerance_percent ||
+        (measured_ && out_.slip_percent < first_slip_percent_ - kSlipBelowFirst_percent)) {
+      wrong = StopReason::kRatio;
+    } else if (out_.mu_star > kMuImpossible) {
+      wrong = StopReason::kInputs;
+    }
+    // Noise at low speed or in a small clamp force does that too, for a moment.
+    wrong_samples_ = wrong != StopReason::kNone ? wrong_samples_ + 1 : 0;
+    if (wrong_samples_ >= acquire_samples_) out_.stop = wrong;
     out_.usable = point_.sign * out_.torque_p_Nm > kTorqueDeadBand_Nm;
+    dead_samples_ = std::max<std::int64_t>(0, dead_samples_ + (out_.usable ? -1 : 1));
+    if (out_.usable && !measured_) {
+      measured_ = true;
+      first_slip_percent_ = out_.slip_percent;
+    }
+    if (dead_samples_ >= acquire_samples_) out_.stop = StopReason::kTorque;
   }
   return out_;
 }

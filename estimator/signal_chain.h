@@ -4,8 +4,9 @@
 //
 // The operating point (direction, end stop) is taken from the mean of the first kAcquire_s in which
 // the filtered torque stands outside its dead band, and then kept. What contradicts it later is a
-// reason to stop, not a number: torque that has changed its sign (kTorque), a ratio that is no
-// end stop's, or slip against the torque (kRatio).
+// reason to stop, not a number: torque that has changed its sign or stays near zero (kTorque), a
+// ratio that is no end stop's, or slip against the torque (kRatio), mu* that stays beyond any
+// belt's (kInputs).
 #pragma once
 
 #include <cstdint>
@@ -22,6 +23,11 @@ inline constexpr double kAcquire_s = 0.25;
 // Deformation, calibration of the end stop and slip that is there already stay below this; the
 // next gear of a continuously variable transmission does not.
 inline constexpr double kRatioTolerance_percent = 8.0;
+// sigma* falls below its first value by deformation only; by more than this with a torque or a
+// speed of the wrong sign or place.
+inline constexpr double kSlipBelowFirst_percent = 4.0;
+// No belt carries more; a pressure or torque in the wrong unit does.
+inline constexpr double kMuImpossible = 0.4;
 
 struct Measurement {  // filtered
   double omega_p_rad_s = 0.0;
@@ -31,7 +37,7 @@ struct Measurement {  // filtered
   double slip_percent = 0.0;  // sigma*, in the direction of the torque
   double mu_star = 0.0;
   bool usable = false;
-  StopReason stop = StopReason::kNone;  // kTorque or kRatio
+  StopReason stop = StopReason::kNone;  // kTorque, kRatio or kInputs
 };
 
 class SignalChain {
@@ -55,9 +61,12 @@ class SignalChain {
   OperatingPoint point_;
   Measurement out_;
   std::int64_t last_t_ns_ = 0;
-  std::int64_t acquired_ = 0;  // samples outside the dead band in a row, at the start
+  std::int64_t acquired_ = 0;       // samples outside the dead band in a row, at the start
+  std::int64_t dead_samples_ = 0;   // inside it in a row, later
+  std::int64_t wrong_samples_ = 0;  // slip or mu* that cannot be, in a row
   double ratio_sum_ = 0.0;
-  bool started_ = false;
+  double first_slip_percent_ = 0.0;
+  bool started_ = false, measured_ = false;
 };
 
 }  // namespace beltgrip::estimator

@@ -45,6 +45,10 @@ struct CurveEstimate {
   double clamp_force_N = 0.0;       // F_s
   double torque_p_Nm = 0.0;         // T_p on the belt, inertia compensated, signed
   double slip_energy_J = 0.0;       // dissipated since the start
+  // mu_max to be expected from the curve so far, with its 95 % interval; 0: not known yet.
+  double mu_max_expected = 0.0;
+  double mu_max_low = 0.0;
+  double mu_max_high = 0.0;
   Phase phase = Phase::kQuiet;
   Direction direction = Direction::kDrive;
   EndStop end_stop = EndStop::kOverdrive;
@@ -63,6 +67,9 @@ struct PeakEstimate {
   double sigma_peak_percent =
       0.0;                   // slip magnitude at the peak; with kLowerBound: where it was reached
   std::int64_t samples = 0;  // samples that carried the estimate
+  // The experiment's own residuals say that its points lie on no one friction curve: there is no
+  // value, and no bound.
+  bool contradictory = false;
 };
 
 class SlipCurveEstimator {

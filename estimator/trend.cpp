@@ -6,30 +6,41 @@
 namespace beltgrip::estimator {
 namespace {
 
-constexpr double kContradiction = 3.0;  // deviations by which a part may leave the line
-constexpr double kNoiseScale_s = 0.4;   // longer means scatter by what is not noise
-constexpr std::size_t kShortest = 4;    // cells in the first line
+constexpr double kCell_s = 0.05;
+constexpr double kContradiction = 3.0;      // deviations by which a part may leave the line
+constexpr double kLineNoiseScale_s = 0.4;   // longer means scatter by what is not noise
+constexpr double kQuietSlip_percent = 0.2;  // slip that moves less does not move the value
+constexpr std::size_t kShortest = 4;        // cells in the first line
+constexpr double kEnough = 6.0;             // squares before a scale is believed
+constexpr double kLargestSquare = 9.0;      // of their mean
 
 }  // namespace
 
-Trend::Trend(std::size_t cells) : sums_(cells + 1) {}
+Trend::Trend(double sample_rate_hz, std::size_t cells)
+    : sums_(cells + 1),
+      per_cell_(static_cast<int>(std::max(1.0, std::ceil(kCell_s * sample_rate_hz - 1e-6)))),
+      cell_s_(per_cell_ / sample_rate_hz) {}
 
 void Trend::reset() noexcept {
   cells_ = 0;
-  weight_ = sum_t_ = sum_y_ = 0.0;
-  for (Scale& scale : scales_) scale = {};
+  filled_ = 0;
+  sum_t_ = sum_y_ = sum_slip_ = 0.0;
+  scales_ = {};
 }
 
-void Trend::step(double t_s, double value, double duration_s) noexcept {
-  sum_t_ += t_s * duration_s;
-  sum_y_ += value * duration_s;
-  weight_ += duration_s;
-  if (weight_ < kCell_s - 1e-9) return;
-  add(sum_t_ / weight_, sum_y_ / weight_);
-  weight_ = sum_t_ = sum_y_ = 0.0;
+bool Trend::step(double t_s, double value, double slip_percent) noexcept {
+  sum_t_ += t_s;
+  sum_y_ += value;
+  sum_slip_ += slip_percent;
+  if (++filled_ < per_cell_) return false;
+  const double share = 1.0 / per_cell_;
+  add(sum_t_ * share, sum_y_ * share, sum_slip_ * share);
+  filled_ = 0;
+  sum_t_ = sum_y_ = sum_slip_ = 0.0;
+  return true;
 }
 
-void Trend::add(double t_s, double value) noexcept {
+void Trend::add(double t_s, double value, double slip_percent) noexcept {
   if (cells_ == 0) {
     origin_t_ = t_s;
     origin_y_ = value;
@@ -38,39 +49,44 @@ void Trend::add(double t_s, double value) noexcept {
   const double t = t_s - origin_t_;
   const double y = value - origin_y_;
   const Sums& before = sums(cells_);
-  Sums& after = sums_[(cells_ + 1) % sums_.size()];
-  after = {before.t + t, before.y + y, before.tt + t * t, before.ty + t * y, before.yy + y * y};
+  sums_[(cells_ + 1) % sums_.size()] = {before.t + t, before.y + y, before.tt + t * t,
+                                        before.ty + t * y};
   ++cells_;
   for (int i = 0; i < kScales; ++i) {
-    Scale& scale = scales_[i];
+    Scale& scale = scales_[static_cast<std::size_t>(i)];
     scale.sum += y;
+    scale.slip_sum += slip_percent;
     if (++scale.filled < (1 << i)) continue;
-    scale.means[0] = scale.means[1];
-    scale.means[1] = scale.means[2];
-    scale.means[2] = scale.sum / scale.filled;
-    scale.sum = 0.0;
+    scale.means = {scale.means[1], scale.means[2], scale.sum / scale.filled};
+    scale.slips = {scale.slips[1], scale.slips[2], scale.slip_sum / scale.filled};
+    scale.sum = scale.slip_sum = 0.0;
     scale.filled = 0;
-    if (++scale.count < 3) continue;
+    const bool quiet = std::abs(scale.slips[2] - scale.slips[0]) < kQuietSlip_percent;
+    if (++scale.count < 3 || (scale.squares_count > kEnough && !quiet)) continue;
+    // Of white noise the second difference has six times the variance of a mean.
     const double second = scale.means[0] - 2.0 * scale.means[1] + scale.means[2];
-    scale.squares += second * second / 6.0;
-    scale.degrees += 0.5;  // neighbours share means: about half as many independent ones
+    double square = second * second / 6.0;
+    // A corner of the course (a ramp begins or ends) is no noise.
+    if (scale.squares_count > kEnough) {
+      square = std::min(square, kLargestSquare * scale.squares / scale.squares_count);
+    }
+    scale.squares += square;
+    scale.squares_count += 1.0;
   }
 }
 
 double Trend::density(double over_s) const noexcept {
   double largest = 0.0;
   for (int i = 0; i < kScales; ++i) {
-    const Scale& scale = scales_[i];
-    const double length_s = kCell_s * (1 << i);
-    if (i > 0 && (scale.degrees < 3.0 || length_s > over_s)) break;
-    if (scale.degrees > 0.0) {
-      largest = std::max(largest, scale.squares / (2.0 * scale.degrees) * length_s);
-    }
+    const Scale& scale = scales_[static_cast<std::size_t>(i)];
+    const double length_s = cell_s_ * (1 << i);
+    if (scale.squares_count < (i == 0 ? 1.0 : kEnough) || (i > 0 && length_s > over_s)) break;
+    largest = std::max(largest, scale.squares / scale.squares_count * length_s);
   }
   return largest;
 }
 
-Line Trend::through(std::size_t begin, std::size_t end) const noexcept {
+Line Trend::through(std::size_t begin, std::size_t end, double cell_variance) const noexcept {
   const Sums& a = sums(begin);
   const Sums& b = sums(end);
   const double n = static_cast<double>(end - begin);
@@ -78,15 +94,13 @@ Line Trend::through(std::size_t begin, std::size_t end) const noexcept {
   const double y = (b.y - a.y) / n;
   const double tt = std::max(1e-12, (b.tt - a.tt) - n * t * t);
   const double ty = (b.ty - a.ty) - n * t * y;
-  const double variance = density(kNoiseScale_s) / kCell_s;
-  Line line;
-  line.t_s = origin_t_ + t;
-  line.value = origin_y_ + y;
-  line.slope = ty / tt;
-  line.value_variance = variance / n;
-  line.slope_variance = variance / tt;
-  line.valid = true;
-  return line;
+  return {.t_s = origin_t_ + t,
+          .value = origin_y_ + y,
+          .slope = ty / tt,
+          .value_variance = cell_variance / n,
+          .slope_variance = cell_variance / tt,
+          .begin_s = origin_t_ + sums(begin + 1).t - a.t - 0.5 * cell_s_,
+          .valid = true};
 }
 
 double Trend::mean_deviation(const Line& line, std::size_t begin, std::size_t end) const noexcept {
@@ -96,46 +110,32 @@ double Trend::mean_deviation(const Line& line, std::size_t begin, std::size_t en
   return origin_y_ + (b.y - a.y) / n - line.at(origin_t_ + (b.t - a.t) / n);
 }
 
-Line Trend::line(double t_s) const noexcept {
+bool Trend::fits(const Line& line, std::size_t begin, std::size_t end,
+                 double cell_variance) const noexcept {
+  const std::size_t length = end - begin;
+  const auto within = [&](std::size_t from, std::size_t to) {
+    const double bound = kContradiction * std::sqrt(cell_variance / static_cast<double>(to - from));
+    return std::abs(mean_deviation(line, from, to)) <= bound + 1e-12;
+  };
+  for (std::size_t part = kShortest; part < length; part *= 2) {
+    if (!within(end - part, end) || !within(begin, begin + part)) return false;
+  }
+  const std::size_t third = length / 3;
+  return third == 0 || within(end - 2 * third, end - third);
+}
+
+Line Trend::line() const noexcept {
   const std::size_t oldest = cells_ >= sums_.size() ? cells_ - sums_.size() + 1 : 0;
-  std::size_t end = cells_;
-  // Cells are about kCell_s apart; the estimate is corrected cell by cell.
-  while (end > oldest + kShortest) {
-    const double last_t = origin_t_ + sums(end).t - sums(end - 1).t;
-    if (last_t + 0.5 * kCell_s <= t_s + 1e-9) break;
-    const double ahead = (last_t + 0.5 * kCell_s - t_s) / kCell_s;
-    const auto jump = static_cast<std::size_t>(std::max(1.0, std::floor(0.8 * ahead)));
-    end = end - std::min(jump, end - oldest - kShortest);
-  }
-  Line best;
-  if (end < oldest + kShortest) return best;
-  const double variance = density(kNoiseScale_s) / kCell_s;
+  if (cells_ < oldest + kShortest) return {};
+  const double cell_variance = density(kLineNoiseScale_s) / cell_s_;
   std::size_t length = kShortest;
-  best = through(end - length, end);
-  std::size_t accepted = length;
-  while (end - length > oldest) {
-    length = std::min(end - oldest, length + std::max<std::size_t>(2, length / 2));
-    const Line candidate = through(end - length, end);
-    bool fits = true;
-    // Parts at both ends and of every size: 4, 8, 16, ... cells, and what is new.
-    for (std::size_t part = kShortest; part < length && fits; part *= 2) {
-      const double bound = kContradiction * std::sqrt(variance / static_cast<double>(part)) + 1e-12;
-      fits = std::abs(mean_deviation(candidate, end - part, end)) < bound &&
-             std::abs(mean_deviation(candidate, end - length, end - length + part)) < bound;
-    }
-    if (fits) {
-      const std::size_t middle = length / 3;
-      const double bound =
-          kContradiction *
-          std::sqrt(variance / static_cast<double>(std::max<std::size_t>(1, middle)));
-      fits = std::abs(mean_deviation(candidate, end - 2 * middle, end - middle)) < bound + 1e-12;
-    }
-    if (!fits) break;
+  Line best = through(cells_ - length, cells_, cell_variance);
+  while (length < cells_ - oldest) {
+    length = std::min(cells_ - oldest, length + std::max<std::size_t>(2, length / 2));
+    const Line candidate = through(cells_ - length, cells_, cell_variance);
+    if (!fits(candidate, cells_ - length, cells_, cell_variance)) break;
     best = candidate;
-    accepted = length;
   }
-  best.begin_s = origin_t_ + sums(end - accepted + 1).t - sums(end - accepted).t;
-  best.end_s = origin_t_ + sums(end).t - sums(end - 1).t;
   return best;
 }
 

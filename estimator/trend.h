@@ -1,19 +1,22 @@
-// The slow course of one channel: a straight line through the longest stretch of the past that the
-// data let pass as one, given the noise that they show themselves. No threshold to tune: how long
-// the line may be follows from noise and curvature. Real-time thread; all memory is taken by the
+// The slow course of one channel and its noise. Real-time thread; all memory is taken by the
 // constructor.
 //
-// Values come in cells of kCell_s. Running sums make the line through any stretch of cells a matter
-// of a few operations; the stretch is grown by half its length as long as none of its parts leaves
-// the line by more than its noise allows.
+// The course is a straight line through the longest stretch of the past, up to now, that the data
+// let pass as one, given the noise that they show themselves. There is no threshold to tune: how
+// long the line may be follows from noise and curvature. Values come in cells of 50 ms. Running
+// sums make the line through any stretch of cells a matter of a few operations; the stretch is
+// grown by half its length as long as none of its parts leaves the line by more than its noise
+// allows.
+//
+// The noise is read off second differences of neighbouring means, which a straight line does not
+// reach, for means of 1, 2, 4, ... cells.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
 namespace beltgrip::estimator {
-
-inline constexpr double kCell_s = 0.05;
 
 struct Line {  // y = value + slope (t - t_s)
   double t_s = 0.0;
@@ -21,52 +24,58 @@ struct Line {  // y = value + slope (t - t_s)
   double slope = 0.0;
   double value_variance = 0.0;  // at t_s, the middle of the stretch: independent of the slope's
   double slope_variance = 0.0;
-  double begin_s = 0.0, end_s = 0.0;
+  double begin_s = 0.0;
   bool valid = false;
-  double at(double t) const { return value + slope * (t - t_s); }
-  double variance_at(double t) const {
+  double at(double t) const noexcept { return value + slope * (t - t_s); }
+  double variance_at(double t) const noexcept {
     return value_variance + slope_variance * (t - t_s) * (t - t_s);
   }
 };
 
 class Trend {
  public:
-  // cells: how many are kept.
-  explicit Trend(std::size_t cells);
+  Trend(double sample_rate_hz, std::size_t cells);  // cells: how many are kept
   void reset() noexcept;
-  // One sample; duration_s: what it stands for.
-  void step(double t_s, double value, double duration_s) noexcept;
-  // How far means over this time scatter about a straight line, times that time: the density of
-  // white noise that would scatter as much. The largest that any shorter time shows, so that noise
-  // that is correlated from sample to sample (frames slower than samples, rounding) and true
-  // variation count for what they are.
+  // One sample. Where slip moves, the value may follow it: such stretches teach nothing about
+  // noise. True when a cell was completed.
+  bool step(double t_s, double value, double slip_percent) noexcept;
+  // How far means over this time scatter about a straight line, times that time: the density of the
+  // white noise that would scatter as much. The largest that any shorter time shows too, so that
+  // noise that is correlated from sample to sample (frames slower than samples, rounding) counts
+  // for what it is.
   double density(double over_s) const noexcept;
-  // The longest line that ends at the last full cell before t_s.
-  Line line(double t_s) const noexcept;
+  // The longest line that ends now. Not valid before a few cells have come.
+  Line line() const noexcept;
 
  private:
   struct Sums {  // of all cells before this one, relative to the first
-    double t = 0.0, y = 0.0, tt = 0.0, ty = 0.0, yy = 0.0;
+    double t = 0.0, y = 0.0, tt = 0.0, ty = 0.0;
   };
-  static constexpr int kScales = 9;  // 1, 2, 4, ... 256 cells
-  struct Scale {
-    double sum = 0.0;
+  struct Scale {  // second differences of means over 2^i cells
+    double sum = 0.0, slip_sum = 0.0;
     int filled = 0;
-    double means[3] = {};
     int count = 0;
+    std::array<double, 3> means{};
+    std::array<double, 3> slips{};
     double squares = 0.0;
-    double degrees = 0.0;  // half the number of independent squares
+    double squares_count = 0.0;
   };
-  void add(double t_s, double value) noexcept;
+  static constexpr int kScales = 9;  // up to 256 cells
+  void add(double t_s, double value, double slip_percent) noexcept;
   const Sums& sums(std::size_t cell) const noexcept { return sums_[cell % sums_.size()]; }
-  Line through(std::size_t begin, std::size_t end) const noexcept;
+  Line through(std::size_t begin, std::size_t end, double cell_variance) const noexcept;
+  bool fits(const Line& line, std::size_t begin, std::size_t end,
+            double cell_variance) const noexcept;
   double mean_deviation(const Line& line, std::size_t begin, std::size_t end) const noexcept;
 
   std::vector<Sums> sums_;
   std::size_t cells_ = 0;  // so far
   double origin_t_ = 0.0, origin_y_ = 0.0;
-  double sum_t_ = 0.0, sum_y_ = 0.0, weight_ = 0.0;
-  Scale scales_[kScales];
+  int per_cell_;
+  double cell_s_;
+  int filled_ = 0;
+  double sum_t_ = 0.0, sum_y_ = 0.0, sum_slip_ = 0.0;
+  std::array<Scale, kScales> scales_;
 };
 
 }  // namespace beltgrip::estimator

@@ -1,0 +1,54 @@
+#include "estimator/experiment_record.h"
+
+namespace beltgrip::estimator {
+namespace {
+
+constexpr double kFinestCell_s = 0.01;
+constexpr std::size_t kTrendCells = 4096;  // 205 s
+constexpr double kLowered = 0.97;          // of the first clamp force
+
+}  // namespace
+
+ExperimentRecord::ExperimentRecord(double sample_rate_hz)
+    : history_(sample_rate_hz, kFinestCell_s),
+      force_(sample_rate_hz, kTrendCells),
+      torque_(sample_rate_hz, kTrendCells),
+      omega_p_(sample_rate_hz, kTrendCells),
+      slip_speed_(sample_rate_hz, kTrendCells),
+      torque_watch_(sample_rate_hz) {}
+
+void ExperimentRecord::reset() noexcept {
+  history_.reset();
+  force_.reset();
+  torque_.reset();
+  omega_p_.reset();
+  slip_speed_.reset();
+  force_line_ = torque_line_ = {};
+  torque_watch_.reset();
+  first_force_N_ = 0.0;
+  torque_stepped_ = false;
+  last_t_s_ = 0.0;
+  last_omega_rad_s_ = 1.0;
+}
+
+bool ExperimentRecord::step(const Cell& sample) noexcept {
+  last_t_s_ = sample.t_s;
+  const double slip = sample.slip_percent;
+  if (force_.step(sample.t_s, sample.clamp_force_N, 0.0)) force_line_ = force_.line();
+  if (torque_.step(sample.t_s, sample.torque_Nm, slip)) torque_line_ = torque_.line();
+  // Before the force falls, the load is being taken up.
+  if (force_line_.valid) {
+    const double force_N = force_line_.at(sample.t_s);
+    if (first_force_N_ <= 0.0) first_force_N_ = force_N;
+    if (force_N < kLowered * first_force_N_ &&
+        torque_watch_.step(sample.torque_Nm, slip, force_N, torque_noise())) {
+      torque_stepped_ = true;
+    }
+  }
+  omega_p_.step(sample.t_s, sample.omega_p_rad_s, 0.0);
+  slip_speed_.step(sample.t_s, slip * sample.omega_p_rad_s, 0.0);
+  last_omega_rad_s_ = sample.omega_p_rad_s;
+  return history_.step(sample);
+}
+
+}  // namespace beltgrip::estimator

@@ -1,0 +1,57 @@
+// Everything that the robust method remembers of one experiment, in bounded memory: means over
+// cells that grow with age, and the slow course and noise of each channel. Real-time thread; all
+// memory is taken by the constructor.
+#pragma once
+
+#include "estimator/history.h"
+#include "estimator/step_watch.h"
+#include "estimator/trend.h"
+
+namespace beltgrip::estimator {
+
+class ExperimentRecord {
+ public:
+  explicit ExperimentRecord(double sample_rate_hz);
+  void reset() noexcept;
+  // One sample, t_s since the first. True when a cell of the finest level was completed.
+  bool step(const Cell& sample) noexcept;
+
+  const History& history() const noexcept { return history_; }
+  const Trend& force() const noexcept { return force_; }
+  const Trend& torque() const noexcept { return torque_; }
+  // The straight lines that end now.
+  const Line& force_line() const noexcept { return force_line_; }
+  const Line& torque_line() const noexcept { return torque_line_; }
+  // Noise of the channels, as densities (variance of the mean over one second), without what is
+  // true variation.
+  double torque_noise() const noexcept { return torque_.density(kNoiseScale_s); }
+  // A shaft's speed is read with the same error at any speed; slip, which divides by it, is not.
+  double slip_noise() const noexcept {
+    return slip_speed_.density(kNoiseScale_s) / (last_omega_rad_s_ * last_omega_rad_s_);
+  }
+  double omega_noise() const noexcept { return omega_p_.density(kNoiseScale_s); }
+  // Clamp force at a cell: of the line where it reaches, else as measured.
+  double clamp_force_N(const Cell& cell) const noexcept {
+    return force_line_.valid && cell.t_s >= force_line_.begin_s ? force_line_.at(cell.t_s)
+                                                                : cell.clamp_force_N;
+  }
+  double duration_s() const noexcept { return last_t_s_; }
+  // The torque's reading has stepped since the clamp force began to fall.
+  bool torque_stepped() const noexcept { return torque_stepped_; }
+
+ private:
+  // Frames of 20 Hz and more are independent over this time; torque and slip hardly vary in it.
+  static constexpr double kNoiseScale_s = 0.2;
+
+  History history_;
+  Trend force_, torque_, omega_p_;
+  Trend slip_speed_;  // slip times speed
+  Line force_line_, torque_line_;
+  StepWatch torque_watch_;
+  double first_force_N_ = 0.0;
+  bool torque_stepped_ = false;
+  double last_t_s_ = 0.0;
+  double last_omega_rad_s_ = 1.0;
+};
+
+}  // namespace beltgrip::estimator
