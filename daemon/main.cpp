@@ -1,27 +1,39 @@
 // beltgripd: reads the configuration, opens the bus, starts the helper thread and runs the loop on
 // the main thread until SIGTERM or SIGINT. Exit codes are those of sysexits.
+#include <malloc.h>
 #include <signal.h>
 #include <sys/signalfd.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <variant>
 
 #include "daemon/core/config.h"
+#include "daemon/core/config_fingerprint.h"
 #include "daemon/core/event.h"
+#include "daemon/core/history_link.h"
 #include "daemon/core/loop.h"
-#include "daemon/core/own_frames.h"
+#include "daemon/core/observation.h"
 #include "daemon/core/pipeline.h"
+#include "daemon/core/reload.h"
+#include "daemon/io/flight_recorder.h"
+#include "daemon/io/history_keeper.h"
 #include "daemon/io/housekeeper.h"
 #include "daemon/io/inproc_bus.h"
 #include "daemon/io/link_health.h"
 #include "daemon/io/log_sink.h"
+#include "daemon/io/reloader.h"
 #include "daemon/io/rt_setup.h"
+#include "daemon/io/service_notify.h"
 #include "daemon/io/socket_port.h"
+#include "daemon/io/status_server.h"
 
 namespace {
 
@@ -34,31 +46,30 @@ constexpr std::string_view kInproc = "inproc:";
 struct Arguments {
   std::string config = "/etc/beltgrip/beltgripd.toml";
   std::string log_level = "info";
+  std::string record;  // folder; empty: nothing is recorded
   bool print_default_config = false;
 };
 
+MonoTime steady_ns() {
+  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+}
+
 void complain(const std::string& line) { std::fprintf(stderr, "%s\n", line.c_str()); }
 
-// A descriptor that is readable once SIGTERM or SIGINT has come; they reach no thread otherwise.
-int stop_descriptor() {
+// A descriptor that is readable once one of these signals has come; they reach no thread otherwise.
+int signal_descriptor(std::initializer_list<int> numbers) {
   sigset_t signals;
   sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
+  for (const int number : numbers) sigaddset(&signals, number);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  signal(SIGPIPE, SIG_IGN);
   return signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK);
 }
 
-std::vector<can::CanId> wanted_identifiers(const Config& config) {
-  std::vector<can::CanId> identifiers;
-  identifiers.reserve(config.roles.size() + kOwnMessageCount);
-  for (const RoleBinding& role : config.roles) identifiers.push_back(role.id);
-  // Our own: an echo says that a frame has left, another node's is a fault.
-  for (std::size_t i = 0; i < kOwnMessageCount; ++i) {
-    identifiers.push_back({own_identifier(config.identifiers, static_cast<OwnMessage>(i)), false});
-  }
-  return identifiers;
+// The next signal that has come, 0: none. Several of a kind are one.
+int next_signal(int descriptor) {
+  signalfd_siginfo info{};
+  if (read(descriptor, &info, sizeof info) != sizeof info) return 0;
+  return static_cast<int>(info.ssi_signo);
 }
 
 // The port, and the bus behind it where it is the embedded one.
@@ -75,7 +86,12 @@ Bus open_bus(const Config& config, int stop_fd) {
     bus.port = bus.inproc->connect();
     return bus;
   }
-  auto opened = SocketPort::open(config.interface, wanted_identifiers(config), stop_fd);
+  std::vector<BusToOpen> buses{{config.interface, "bus.interface"}};
+  if (config.further_bus) {
+    const FurtherBus& further = *config.further_bus;
+    buses.push_back({further.interface, "bus." + further.name + ".interface"});
+  }
+  auto opened = SocketPort::open(buses, wanted_frames(config), stop_fd);
   if (const auto* error = std::get_if<BusError>(&opened)) {
     bus.error = error->text;
   } else {
@@ -84,6 +100,96 @@ Bus open_bus(const Config& config, int stop_fd) {
   return bus;
 }
 
+// Empty: nothing is kept.
+std::string state_folder(const Config& config, const std::string& config_path) {
+  if (!config.state_dir.empty()) {
+    return (std::filesystem::path(config_path).parent_path() / config.state_dir).string();
+  }
+  const char* given = std::getenv("STATE_DIRECTORY");  // systemd: one or several, with colons
+  const std::string folders = given == nullptr ? "" : given;
+  return folders.substr(0, folders.find(':'));
+}
+
+// Empty: nobody asks.
+std::string runtime_folder() {
+  const char* given = std::getenv("RUNTIME_DIRECTORY");
+  const std::string folders = given == nullptr ? "" : given;
+  return folders.substr(0, folders.find(':'));
+}
+
+// "wake-up p50 61 us, p99 140 us, worst 900 us (12000)"
+std::string latency_text(const std::string& name, const LatencyHistogram& histogram) {
+  const auto us = [](Duration duration) { return std::to_string(duration / 1000) + " us"; };
+  return name + " p50 " + us(histogram.quantile(0.5)) + ", p99 " + us(histogram.quantile(0.99)) +
+         ", worst " + us(histogram.maximum()) + " (" + std::to_string(histogram.count()) + ")";
+}
+
+double unix_time_s() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+// What an operator asks of a running daemon: SIGHUP reads the configuration again, SIGUSR1 and
+// SIGUSR2 log more and less. The manager waits for a reload, but not for a long experiment.
+class Requests {
+ public:
+  Requests(int descriptor, Reloader& reloader, LogSink& log, ServiceNotify& service)
+      : descriptor_(descriptor), reloader_(reloader), log_(log), service_(service) {}
+  ~Requests() { close(descriptor_); }
+  Requests(const Requests&) = delete;
+  Requests& operator=(const Requests&) = delete;
+
+  // True: another configuration is in force.
+  bool turn(MonoTime now) {
+    const bool changed = reloader_.turn();
+    for (int number; (number = next_signal(descriptor_)) != 0;) {
+      if (number == SIGUSR1) log_.more();
+      if (number == SIGUSR2) log_.less();
+      if (number != SIGHUP) continue;
+      service_.reloading(now);
+      manager_waits_ = true;
+      patience_ends_ = now + kPatience;
+      reloader_.request();
+    }
+    if (!manager_waits_) return changed;
+    const bool late = now >= patience_ends_;
+    if (reloader_.waiting() && !late) return changed;
+    if (reloader_.waiting()) log_.info("reload: waits for the end of the experiment");
+    service_.reloaded();
+    manager_waits_ = false;
+    return changed;
+  }
+
+ private:
+  static constexpr Duration kPatience = 2 * kSecond;
+  int descriptor_;
+  Reloader& reloader_;
+  LogSink& log_;
+  ServiceNotify& service_;
+  bool manager_waits_ = false;
+  MonoTime patience_ends_ = 0;
+};
+
+// At level debug, once a second.
+std::string pulse(const Observation& seen) {
+  return status_line(seen) + ", " + std::to_string(seen.pipeline.samples) + " samples, " +
+         std::to_string(seen.pipeline.frames_decoded) + " frames taken";
+}
+
+// All who look at each sample.
+class Sinks final : public SampleSink {
+ public:
+  Sinks(EventSink& events, ObservationSink& observations)
+      : events_(events), observations_(observations) {}
+  void on_report(const SampleReport& report) noexcept override {
+    events_.on_report(report);
+    observations_.on_report(report);
+  }
+
+ private:
+  EventSink& events_;
+  ObservationSink& observations_;
+};
+
 int run(const Arguments& arguments) {
   const ConfigResult loaded = load_config(arguments.config);
   for (const std::string& warning : loaded.warnings) complain(warning);
@@ -91,7 +197,12 @@ int run(const Arguments& arguments) {
   if (!loaded.config) return loaded.exit_code();
   const Config& config = *loaded.config;
 
-  const int stop_fd = stop_descriptor();
+  // The helper thread's allocations come from the one heap: its own arena would count as 64 MB
+  // against the limit of locked memory.
+  mallopt(M_ARENA_MAX, 1);
+  const int stop_fd = signal_descriptor({SIGTERM, SIGINT});
+  const int request_fd = signal_descriptor({SIGHUP, SIGUSR1, SIGUSR2});
+  signal(SIGPIPE, SIG_IGN);
   Bus bus = open_bus(config, stop_fd);
   if (bus.port == nullptr) {
     complain(arguments.config + ": " + bus.error);
@@ -100,19 +211,84 @@ int run(const Arguments& arguments) {
 
   Pipeline pipeline(config);
   EventRing events;
-  EventSink sink(events);
+  EventSink event_sink(events);
+  LoopMeters meters;
+  LatestSlot<Observation> slot;
+  ObservationSink observation_sink(pipeline, meters, slot);
+  Sinks sinks(event_sink, observation_sink);
+  std::unique_ptr<RecordRings> record_rings;
+  std::unique_ptr<RecordTap> tap;
+  if (!arguments.record.empty()) {
+    record_rings = std::make_unique<RecordRings>();
+    tap = std::make_unique<RecordTap>(*record_rings);
+  }
   LogSink log(arguments.log_level);
   log.info("version " BELTGRIP_VERSION ", " + arguments.config + ", bus " + config.interface);
   if (bus.inproc == nullptr) log.info(link_health(config.interface));
+  if (config.further_bus) log.info(link_health(config.further_bus->interface));
   std::function<void()> on_stop;
   if (bus.inproc != nullptr) on_stop = [&] { bus.inproc->close(); };
+  const auto say = [&log](bool warning, const std::string& line) {
+    warning ? log.warning(line) : log.info(line);
+  };
+  std::unique_ptr<HistoryKeeper> history;
+  if (const std::string folder = state_folder(config, arguments.config); !folder.empty()) {
+    history = std::make_unique<HistoryKeeper>(folder, config_fingerprint(config), say, unix_time_s);
+    const estimator::LearnedFriction learned = history->open();
+    if (tap != nullptr) tap->learned(bus.port->now(), learned);
+    pipeline.learn(learned);
+  } else {
+    log.info("no state directory: results are not kept");
+  }
+  HistoryRings rings;
+  HistoryLink link(rings, pipeline, sinks, tap.get());
+  ReloadSlot reload_slot;
+  ReloadLink reload_link(reload_slot, pipeline, *bus.port, link, tap.get());
   log.info(prepare_real_time());
-  Housekeeper housekeeper(events, log, stop_fd, on_stop);
+  ServiceNotify service;
+  std::string no_status;
+  StatusServer status(runtime_folder(), no_status);
+  if (!no_status.empty()) log.warning(no_status);
+  std::unique_ptr<FlightRecorder> recorder;
+  const auto recorder_messages = [&] {
+    if (recorder == nullptr) return;
+    for (const auto& [warning, line] : recorder->take_messages()) say(warning, line);
+  };
+  Reloader reloader(arguments.config, config, reload_slot, say);
+  Requests requests(request_fd, reloader, log, service);
+  bool observed = false;
+  MonoTime pulse_at = 0;
+  const auto on_turn = [&] {
+    const MonoTime now = steady_ns();
+    if (requests.turn(now) && history != nullptr) {
+      rings.learned.push(history->change_fingerprint(config_fingerprint(reloader.running())));
+    }
+    recorder_messages();
+    observed = slot.take() || observed;
+    const Observation* newest = observed ? &slot.latest() : nullptr;
+    service.turn(now, newest);
+    status.turn(reloader.running(), now, newest);
+    if (newest == nullptr || now < pulse_at) return;
+    log.debug(pulse(*newest));
+    pulse_at = now + kSecond;
+  };
+  if (record_rings != nullptr) {
+    const auto wall_ns = static_cast<std::int64_t>(unix_time_s() * static_cast<double>(kSecond));
+    std::vector<std::string> interfaces{config.interface};
+    if (config.further_bus) interfaces.push_back(config.further_bus->interface);
+    recorder = std::make_unique<FlightRecorder>(arguments.record, std::move(interfaces),
+                                                *record_rings, wall_ns - steady_ns());
+  }
+  Housekeeper housekeeper(events, rings, history.get(), log, stop_fd, on_stop, on_turn);
 
-  const LoopCounters loop = run_loop(*bus.port, pipeline, config.estimator.sample_rate_hz,
-                                     estimator::StopReason::kShutdown, &sink);
+  const LoopCounters loop =
+      run_loop(*bus.port, pipeline, config.estimator.sample_rate_hz,
+               estimator::StopReason::kShutdown, &reload_link, &meters, tap.get());
 
   housekeeper.stop();
+  if (recorder != nullptr) recorder->stop();
+  recorder_messages();
+  service.stopping();
   const PipelineCounters& counters = pipeline.counters();
   log.info("stopped: " + std::to_string(counters.frames) + " frames, " +
            std::to_string(counters.frames_decoded) + " taken, " +
@@ -120,6 +296,17 @@ int run(const Arguments& arguments) {
            " samples, " + std::to_string(loop.samples_late) + " late, " +
            std::to_string(loop.sends_failed) + " sends failed, " +
            std::to_string(counters.frames_refused) + " refused");
+  if (const UdsCounters& uds = counters.diagnostics;
+      uds.requests + uds.answers + uds.refusals > 0) {
+    log.info("diagnostics: " + std::to_string(uds.requests) + " requests, " +
+             std::to_string(uds.answers) + " answers, " + std::to_string(uds.refusals) +
+             " refusals, " + std::to_string(uds.timeouts) + " without answer, " +
+             std::to_string(uds.broken) + " broken, " + std::to_string(uds.foreign) +
+             " frames of another tester");
+  }
+  log.info("latency: " + latency_text("wake-up", meters.wake_up) + "; " +
+           latency_text("sample to frame", meters.sample_to_frame) + "; " +
+           latency_text("frame age", meters.frame_age));
   close(stop_fd);
   return kDone;
 }
@@ -139,6 +326,10 @@ int main(int argc, char** argv) {
       ->type_name("LEVEL")
       ->check(CLI::IsMember(LogSink::level_names()))
       ->capture_default_str();
+  app.add_option("--record", arguments.record,
+                 "keep the frames around every experiment and every fault in this folder, at most "
+                 "256 MiB of them; beltgrip replay reads them")
+      ->type_name("DIR");
   app.add_flag("--print-default-config", arguments.print_default_config,
                "print every key with default, unit and range, and exit");
   try {

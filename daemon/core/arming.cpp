@@ -70,7 +70,7 @@ bool Arming::steady(const Now& now) const noexcept {
              kTorqueDrift * std::abs(torque_since_) + kTorqueDrift_Nm;
 }
 
-std::uint32_t Arming::clearance(const Now& now) noexcept {
+void Arming::look(const Now& now) noexcept {
   const bool low = now.omega_s_rad_s / now.omega_p_rad_s < 1.0;
   RampPoint point;
   point.torque_Nm = std::abs(now.torque_Nm);
@@ -84,14 +84,21 @@ std::uint32_t Arming::clearance(const Now& now) noexcept {
   point.mu_expected =
       now.mu_max_known > 0.0 ? kKnownMargin * now.mu_max_known : settings_.friction_expected;
   point.peak_slip = low ? kPeakSlipLow : kPeakSlipOverdrive;
-  if (reachable_mu(point) < point.mu_expected) return inhibit_bit(Inhibit::kUnreachable);
+  if (reachable_mu(point) < point.mu_expected) {
+    search_ = {};
+    unclear_ = inhibit_bit(Inhibit::kUnreachable);
+    return;
+  }
 
   Reaction reaction;
   reaction.detection_s = kDetection_s;
   reaction.stale_s = static_cast<double>(now.stale) * kSecondsPerTick;
   reaction.dead_time_s = settings_.actuator_dead_time_s;
   reaction.lag_s = settings_.actuator_lag_s;
-  ramp_ = choose_ramp(point, reaction, SlipLimits{}, rate_max_N_per_s_);
+  search_ = RampSearch(point, reaction, SlipLimits{}, rate_max_N_per_s_);
+}
+
+std::uint32_t Arming::clearance(const Now& now) const noexcept {
   if (ramp_.rate_N_per_s <= 0.0) return inhibit_bit(Inhibit::kRamp);
 
   // How long the primary stays above its least speed, as it has slowed since the trigger held.
@@ -120,16 +127,24 @@ void Arming::step(const Now& now) noexcept {
     omega_p_since_ = now.omega_p_rad_s;
     next_look_ = now.t + kSettle;
     unclear_ = 0;
-    cleared_ = false;
+    looked_ = cleared_ = false;
+    search_ = {};
   }
   const Duration held = now.t - held_since_;
   settled_ = held >= kSettle;
   if (!settled_ || control_ != Control::kCommand) return;
-  if (now.t >= next_look_) {
+  // A search takes some samples, one excursion each; what was found before holds until its end.
+  if (!search_.done()) {
+    if (search_.step()) {
+      ramp_ = search_.ramp();
+      unclear_ = clearance(now);
+    }
+  } else if (now.t >= next_look_) {
     next_look_ = now.t + kClearancePeriod;
-    unclear_ = clearance(now);
-    cleared_ = unclear_ == 0;
+    look(now);
   }
+  looked_ = looked_ || search_.done();
+  cleared_ = looked_ && unclear_ == 0;
   inhibits_ = unclear_;
   settled_ = cleared_ || held >= kSettle + kPatience;
 }

@@ -99,7 +99,8 @@ class Arming {
                                               inhibit_bit(Inhibit::kRamp) |
                                               inhibit_bit(Inhibit::kTime);
   std::uint32_t preconditions(const Now& now) const noexcept;
-  std::uint32_t clearance(const Now& now) noexcept;
+  void look(const Now& now) noexcept;
+  std::uint32_t clearance(const Now& now) const noexcept;
   bool steady(const Now& now) const noexcept;
 
   Trigger trigger_;
@@ -113,6 +114,7 @@ class Arming {
   std::uint32_t inhibits_ = inhibit_bit(Inhibit::kInputs);
   bool held_ = false;
   bool settled_ = false;
+  bool looked_ = false;   // since the trigger holds
   bool cleared_ = false;  // as found by the last look
   std::uint32_t unclear_ = 0;
   MonoTime held_since_ = 0;
@@ -120,7 +122,8 @@ class Arming {
   double ratio_since_ = 0.0;
   double torque_since_ = 0.0;
   double omega_p_since_ = 0.0;
-  Ramp ramp_;
+  RampSearch search_;
+  Ramp ramp_;  // found by the last search
 };
 
 }  // namespace beltgrip::daemon

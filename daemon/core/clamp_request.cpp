@@ -9,8 +9,10 @@ using estimator::StopReason;
 
 namespace {
 constexpr double kSecondsPerTick = 1e-9;
+// What the slip since the start leaves out: slip at the start, and the deformation that is gone.
+constexpr double kSlipAtStart = 0.01;
 constexpr Duration kSlipMean = 15 * kMillisecond;
-constexpr Duration kSlipApart = 50 * kMillisecond;
+constexpr Duration kSlipRateOver = 80 * kMillisecond;
 constexpr Duration kReleaseMinimum = 300 * kMillisecond;
 constexpr double kStuckForce = 1.1;     // of the last request
 constexpr double kStuckFriction = 0.8;  // of the friction expected: the belt is near its peak
@@ -28,40 +30,43 @@ void ClampRequest::begin(const Now& now, double rate_N_per_s, double floor_N) no
   start_torque_Nm_ = now.torque_Nm;
   start_ratio_ = now.omega_s_rad_s / now.omega_p_rad_s;
   count_ = 0;
-  slip_ = slip_rate_1_s_ = energy_J_ = 0.0;
+  slip_ = slip_max_ = slip_rate_1_s_ = energy_J_ = 0.0;
 }
 
 // Slip from the speeds alone, without the estimator's filters and their delay.
 void ClampRequest::follow_slip(const Now& now) noexcept {
   const double drift = now.omega_s_rad_s / now.omega_p_rad_s / start_ratio_ - 1.0;
   points_[count_++ % kPoints] = {now.t, -std::copysign(1.0, start_torque_Nm_) * drift};
-  const auto mean = [&](Duration from, Duration to, double& t_s) {
-    double sum = 0.0, sum_t = 0.0, n = 0.0;
-    for (std::size_t age = 0; age < std::min(count_, kPoints); ++age) {
-      const Point& point = points_[(count_ - 1 - age) % kPoints];
-      const Duration before = now.t - point.t;
-      if (before > to) break;
-      if (before < from) continue;
-      sum += point.slip;
-      sum_t += static_cast<double>(before) * kSecondsPerTick;
-      n += 1.0;
-    }
-    t_s = n > 0.0 ? sum_t / n : 0.0;
-    return n > 0.0 ? sum / n : 0.0;
-  };
-  double young_s = 0.0, old_s = 0.0;
-  slip_ = mean(0, kSlipMean, young_s);
-  const double earlier = mean(kSlipApart, kSlipApart + kSlipMean, old_s);
-  slip_rate_1_s_ = old_s > young_s ? (slip_ - earlier) / (old_s - young_s) : 0.0;
+  double recent = 0.0, recent_n = 0.0, oldest_s = 0.0;
+  double n = 0.0, sum_t = 0.0, sum_x = 0.0, sum_tt = 0.0, sum_tx = 0.0;
+  for (std::size_t age = 0; age < std::min(count_, kPoints); ++age) {
+    const Point& point = points_[(count_ - 1 - age) % kPoints];
+    const Duration before = now.t - point.t;
+    if (before > kSlipRateOver) break;
+    const double t = -static_cast<double>(before) * kSecondsPerTick;
+    oldest_s = t;
+    n += 1.0;
+    sum_t += t;
+    sum_x += point.slip;
+    sum_tt += t * t;
+    sum_tx += t * point.slip;
+    if (before > kSlipMean) continue;
+    recent += point.slip;
+    recent_n += 1.0;
+  }
+  slip_ = recent / recent_n;
+  slip_max_ = std::max(slip_max_, slip_);
+  const bool whole = -oldest_s > 0.8 * static_cast<double>(kSlipRateOver) * kSecondsPerTick;
+  slip_rate_1_s_ = whole ? (n * sum_tx - sum_t * sum_x) / (n * sum_tt - sum_t * sum_t) : 0.0;
   if (slip_ > kSlipCounted) {
-    energy_J_ += slip_ * std::abs(now.torque_Nm) * now.omega_p_rad_s *
+    energy_J_ += (slip_ + kSlipAtStart) * std::abs(now.torque_Nm) * now.omega_p_rad_s *
                  static_cast<double>(now.t - last_) * kSecondsPerTick;
   }
 }
 
 StopReason ClampRequest::judge(const Now& now, double floor_N) const noexcept {
   if (slip_ > kSlipBand) return StopReason::kSlip;
-  if (slip_ > kSlipCounted / 2.0 && slip_rate_1_s_ > kSlipRate_1_s) return StopReason::kSlipRate;
+  if (slip_ > kSlipRateFrom && slip_rate_1_s_ > kSlipRate_1_s) return StopReason::kSlipRate;
   if (energy_J_ > kSlipEnergy_J) return StopReason::kSlipEnergy;
   if (force_N_ <= floor_N) return StopReason::kForceFloor;
   if (now.t - begun_ >= Arming::kRequestMax) return StopReason::kTime;

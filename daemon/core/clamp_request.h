@@ -4,7 +4,7 @@
 //
 // Backup stops while a request stands (strict):
 //   Slip         the speed ratio has moved by more than kSlipBand since the start
-//   SlipRate     and faster than kSlipRate, over 50 ms
+//   SlipRate     it moves faster than kSlipRate, over 80 ms
 //   SlipEnergy   dissipated beyond kSlipCounted
 //   ForceFloor   the ramp has arrived at the floor
 //   Time         the request has stood for Arming::kRequestMax
@@ -27,16 +27,17 @@ namespace beltgrip::daemon {
 class ClampRequest {
  public:
   static constexpr double kSlipBand = 0.045;
-  static constexpr double kSlipRate_1_s = 0.09;
+  static constexpr double kSlipRate_1_s = 0.12;
+  static constexpr double kSlipRateFrom = 0.0075;  // slip from which the rate counts
   static constexpr double kSlipCounted = 0.02;
-  static constexpr double kSlipEnergy_J = 45.0;
+  static constexpr double kSlipEnergy_J = 35.0;
   static constexpr double kSpeedBand = 0.06;    // share of the speed
   static constexpr double kSpeedMargin = 0.93;  // of the least speed at the start
   static constexpr double kTorqueBand = 0.35;   // share of the torque
   static constexpr double kTorqueBand_Nm = 5.0;
   static constexpr double kRatioBand = 0.015;  // share of the ratio, the wrong way
-  static constexpr double kFollowBand = 0.10;  // share of the force
-  static constexpr double kFollowBand_N = 120.0;
+  static constexpr double kFollowBand = 0.05;  // share of the force
+  static constexpr double kFollowBand_N = 80.0;
   static constexpr Duration kFollowTime = 100 * kMillisecond;
   static constexpr Duration kReleaseTime = 1500 * kMillisecond;  // then the force must be back
   static constexpr double kRestored = 0.85;                      // of the force before the request
@@ -65,6 +66,8 @@ class ClampRequest {
   estimator::StopReason backup_stop() const noexcept { return stop_; }
   // False: the clamping force has been off the request for kFollowTime.
   bool followed() const noexcept { return followed_; }
+  // The largest slip since the start, of the request that stands or was the last.
+  double slip_max() const noexcept { return slip_max_; }
 
   // After the end.
   bool released(const Now& now) const noexcept;
@@ -105,6 +108,7 @@ class ClampRequest {
   std::array<Point, kPoints> points_{};
   std::size_t count_ = 0;
   double slip_ = 0.0;  // mean of the last 15 ms
+  double slip_max_ = 0.0;
   double slip_rate_1_s_ = 0.0;
   double energy_J_ = 0.0;
 };

@@ -6,7 +6,9 @@
 
 #include "daemon/core/config_binding.h"
 #include "daemon/core/config_document.h"
+#include "daemon/core/config_model.h"
 #include "daemon/core/config_options.h"
+#include "daemon/core/config_uds.h"
 
 namespace beltgrip::daemon {
 
@@ -33,15 +35,23 @@ class Loader {
   void read_options();
   void read_option(const Option& option, const TomlNode& node);
   void read_number(const Option& option, const TomlNode& node);
-  void read_texts(const TomlNode& node);
+  void read_paths(const std::string& key, const TomlNode& node, std::vector<std::string>& paths);
+  void read_further_bus(const TomlNode& node);
   void read_identifiers(const TomlNode& node);
   void read_sensors();
   void read_sensor(Role role, const TomlNode& node);
   void read_signals();
+  void read_protections();
   void check_required_roles(const TomlNode* signals);
+  void read_catalogue(const std::vector<std::string>& paths, const std::string& key,
+                      std::uint32_t line, SignalCatalogue& catalogue);
+  // The bus that the role's value names; nothing when an error was added.
+  std::optional<std::uint8_t> bus_of(const std::string& key, const TomlNode& node);
   void check_across();
+  void check_interface(const std::string& key, std::uint32_t line, const std::string& name);
+  void check_further_bus();
   void check_command();
-  void check_not_there_yet();
+  void read_model_file();
 
   const TomlNode* section(std::string_view name) const;
   // The line of a key, else of its section, else 1.
@@ -54,7 +64,8 @@ class Loader {
   ConfigErrors errors_;
   TomlNode root_;
   Config config_;
-  SignalCatalogue catalogue_;
+  SignalCatalogue catalogue_, further_catalogue_;
+  std::uint32_t further_line_ = 1;  // of [bus.NAME]
   std::array<estimator::ChannelAccuracy, kRoleCount> accuracies_{};
 };
 
@@ -79,11 +90,9 @@ void Loader::load(ConfigScope scope) {
   read_options();
   read_sensors();
   if (scope != ConfigScope::kVariator) read_signals();
+  if (scope == ConfigScope::kAll) read_model_file();
   check_across();
-  if (scope == ConfigScope::kAll) {
-    check_command();
-    check_not_there_yet();
-  }
+  if (scope == ConfigScope::kAll) check_command();
   if (!result_.errors.empty()) return;
   std::sort(config_.roles.begin(), config_.roles.end(),
             [](const RoleBinding& a, const RoleBinding& b) { return a.role < b.role; });
@@ -148,6 +157,7 @@ void Loader::check_keys() {
       errors_.add(node.line, node.key, node.found(), "a section [" + node.key + "]");
       continue;
     }
+    if (node.key == "protection") continue;  // its keys are names of messages
     std::vector<std::string> keys;
     for (const Option& option : option_table()) {
       if (option.section == node.key) keys.emplace_back(option.key);
@@ -161,6 +171,10 @@ void Loader::check_keys() {
     }
     for (const TomlNode& child : node.children) {
       if (std::find(keys.begin(), keys.end(), child.key) != keys.end()) continue;
+      if (node.key == "bus" && child.type == TomlType::kTable) {
+        read_further_bus(child);
+        continue;
+      }
       errors_.add(child.line, key_of(node.key, child.key), "an unknown key",
                   "a key of [" + node.key + "]" + nearest_hint(child.key, keys));
     }
@@ -202,7 +216,7 @@ void Loader::read_option(const Option& option, const TomlNode& node) {
       break;
     }
     case Option::Kind::kTexts:
-      read_texts(node);
+      read_paths(key, node, config_.dbc);
       break;
     case Option::Kind::kIdentifiers:
       read_identifiers(node);
@@ -219,17 +233,45 @@ void Loader::read_number(const Option& option, const TomlNode& node) {
   option.number(config_) = node.number * option.factor;
 }
 
-void Loader::read_texts(const TomlNode& node) {
+void Loader::read_paths(const std::string& key, const TomlNode& node,
+                        std::vector<std::string>& paths) {
   if (node.type != TomlType::kArray) {
-    errors_.add(node.line, "bus.dbc", node.found(), "an array of paths: [\"vehicle.dbc\"]");
+    errors_.add(node.line, key, node.found(), "an array of paths: [\"vehicle.dbc\"]");
     return;
   }
   for (const TomlNode& each : node.children) {
     if (each.type == TomlType::kText && !each.text.empty()) {
-      config_.dbc.push_back(each.text);
+      paths.push_back(each.text);
     } else {
-      errors_.add(each.line, "bus.dbc", each.found(), "the path of a DBC file in quotes");
+      errors_.add(each.line, key, each.found(), "the path of a DBC file in quotes");
     }
+  }
+}
+
+void Loader::read_further_bus(const TomlNode& node) {
+  const std::string key = "bus." + node.key;
+  if (config_.further_bus) {
+    errors_.add(node.line, key, "a third bus", "[bus] and one [bus.NAME] at most");
+    return;
+  }
+  FurtherBus& bus = config_.further_bus.emplace();
+  bus.name = node.key;
+  further_line_ = node.line;
+  for (const TomlNode& child : node.children) {
+    if (child.key == "interface" && child.type == TomlType::kText) {
+      bus.interface = child.text;
+      check_interface(key + ".interface", child.line, bus.interface);
+    } else if (child.key == "interface") {
+      errors_.add(child.line, key + ".interface", child.found(), "text in quotes");
+    } else if (child.key == "dbc") {
+      read_paths(key + ".dbc", child, bus.dbc);
+    } else {
+      errors_.add(child.line, key + "." + child.key, "an unknown key",
+                  "interface or dbc" + nearest_hint(child.key, {"interface", "dbc"}));
+    }
+  }
+  if (node.find("interface") == nullptr) {
+    errors_.add(node.line, key, "a bus without interface", "interface = \"can1\"");
   }
 }
 
@@ -301,21 +343,95 @@ void Loader::read_signals() {
     }
     return;
   }
-  for (const std::string& path : config_.dbc) {
-    catalogue_.add_file(path, directory_, line, errors_, result_.warnings);
+  read_catalogue(config_.dbc, "bus.dbc", line, catalogue_);
+  const bool further_dbc = config_.further_bus && !config_.further_bus->dbc.empty();
+  if (further_dbc) {
+    read_catalogue(config_.further_bus->dbc, "bus." + config_.further_bus->name + ".dbc",
+                   further_line_, further_catalogue_);
   }
-  catalogue_.check_identifiers(line, errors_);
   const TomlNode* signals = section("signals");
-  if (catalogue_.complete() && signals != nullptr) {
+  if (catalogue_.complete() && further_catalogue_.complete() && signals != nullptr) {
     for (std::size_t i = 0; i < kRoleCount; ++i) {
       const Role role = static_cast<Role>(i);
       const TomlNode* node = signals->find(role_name(role));
       if (node == nullptr) continue;
-      std::optional<RoleBinding> binding = catalogue_.bind(role, *node, errors_);
-      if (binding) config_.roles.push_back(std::move(*binding));
+      const std::optional<std::uint8_t> bus = bus_of(key_of("signals", role_name(role)), *node);
+      const SignalCatalogue& catalogue =
+          bus.value_or(0) != 0 && further_dbc ? further_catalogue_ : catalogue_;
+      std::optional<RoleBinding> binding = catalogue.bind(role, *node, errors_);
+      if (!binding || !bus) continue;
+      binding->bus = *bus;
+      config_.roles.push_back(std::move(*binding));
     }
+    check_uds(config_, *signals, errors_);
   }
+  check_further_bus();
   check_required_roles(signals);
+  if (catalogue_.complete()) read_protections();
+}
+
+void Loader::read_protections() {
+  const TomlNode* protections = section("protection");
+  if (protections == nullptr) return;
+  for (const TomlNode& node : protections->children) {
+    const std::optional<MessageProtection> found = catalogue_.protect(node, errors_);
+    if (!found) continue;
+    const bool used =
+        std::any_of(config_.roles.begin(), config_.roles.end(), [&](const RoleBinding& role) {
+          return !role.uds && role.bus == 0 && role.id == found->id;
+        });
+    const bool twice =
+        std::any_of(config_.protections.begin(), config_.protections.end(),
+                    [&](const MessageProtection& each) { return each.id == found->id; });
+    if (!used || twice) {
+      errors_.add(node.line, key_of("protection", node.key),
+                  twice ? "a second entry for one message" : "a message without a role",
+                  twice ? "one" : "a message of [bus] that [signals] names");
+      continue;
+    }
+    config_.protections.push_back(*found);
+  }
+}
+
+void Loader::read_catalogue(const std::vector<std::string>& paths, const std::string& key,
+                            std::uint32_t line, SignalCatalogue& catalogue) {
+  for (const std::string& path : paths) {
+    catalogue.add_file(key, path, directory_, line, errors_, result_.warnings);
+  }
+  catalogue.check_identifiers(key, line, errors_);
+}
+
+std::optional<std::uint8_t> Loader::bus_of(const std::string& key, const TomlNode& node) {
+  const TomlNode* bus = node.find("bus");
+  // What is no text is reported with the role's other keys.
+  if (node.type != TomlType::kTable || bus == nullptr || bus->type != TomlType::kText) return 0;
+  if (config_.further_bus && bus->text == config_.further_bus->name) return 1;
+  errors_.add(bus->line, key + ".bus", in_quotes(bus->text),
+              config_.further_bus ? in_quotes(config_.further_bus->name) + ", or no such key"
+                                  : "a bus that the file has as [bus.NAME]");
+  return {};
+}
+
+// A second interface is there for a role, and is one that can be waited for together with the
+// first.
+void Loader::check_further_bus() {
+  if (!config_.further_bus || !result_.errors.empty()) return;
+  const FurtherBus& bus = *config_.further_bus;
+  const std::string key = "bus." + bus.name;
+  constexpr std::string_view kInproc = "inproc:";
+  if (bus.interface == config_.interface) {
+    errors_.add(further_line_, key + ".interface", in_quotes(bus.interface),
+                "another than bus.interface");
+  } else if (bus.interface.starts_with(kInproc) || config_.interface.starts_with(kInproc)) {
+    errors_.add(further_line_, key + ".interface", "an embedded bus beside another bus",
+                "two SocketCAN interfaces");
+  }
+  const bool used = std::any_of(config_.roles.begin(), config_.roles.end(),
+                                [](const RoleBinding& each) { return each.bus != 0; });
+  if (!used) {
+    errors_.add(further_line_, key, "a bus that no role is on",
+                "bus = " + in_quotes(bus.name) + " in a role of [signals]");
+  }
 }
 
 void Loader::check_required_roles(const TomlNode* signals) {
@@ -342,17 +458,19 @@ void Loader::check_required_roles(const TomlNode* signals) {
   }
 }
 
-void Loader::check_across() {
+void Loader::check_interface(const std::string& key, std::uint32_t line, const std::string& name) {
   constexpr std::string_view kInproc = "inproc:";
-  const std::string& name = config_.interface;
   const bool inproc = name.starts_with(kInproc) && name.size() > kInproc.size();
   const bool socket = !name.empty() && name.size() <= kInterfaceNameMax &&
                       name.find_first_of("/: \t\n") == std::string::npos && name != "." &&
                       name != "..";
   if (!inproc && !socket) {
-    errors_.add(line_of("bus", "interface"), "bus.interface", in_quotes(name),
-                "an interface of 1 to 15 characters, or inproc:NAME");
+    errors_.add(line, key, in_quotes(name), "an interface of 1 to 15 characters, or inproc:NAME");
   }
+}
+
+void Loader::check_across() {
+  check_interface("bus.interface", line_of("bus", "interface"), config_.interface);
 
   const auto keys = identifier_keys();
   for (std::size_t i = 0; i < keys.size(); ++i) {
@@ -364,7 +482,10 @@ void Loader::check_across() {
           "four different ones");
     }
     for (const RoleBinding& role : config_.roles) {
-      if (role.id.extended || role.id.value != config_.identifiers.*keys[i].field) continue;
+      if (role.uds || role.bus != 0 || role.id.extended ||
+          role.id.value != config_.identifiers.*keys[i].field) {
+        continue;
+      }
       errors_.add(line_of("signals", role_name(role.role)), key_of("signals", role_name(role.role)),
                   "message " + role.message_name + " with the identifier of BeltGrip's " +
                       std::string(keys[i].key) + " frame",
@@ -395,6 +516,11 @@ void Loader::check_across() {
                 number_text(settings.lowpass_hz),
                 "less than half of sample_rate_hz, " + number_text(settings.sample_rate_hz / 2.0));
   }
+  if (settings.method == estimator::Method::kPaper &&
+      settings.stop_rule == estimator::StopRule::kConfidence) {
+    errors_.add(line_of("experiment", "stop"), "experiment.stop", "\"confidence\"",
+                "\"peak\", as estimator.method is \"paper\": it has no interval before the peak");
+  }
 }
 
 // What a request for clamping force needs beyond what observation does.
@@ -412,20 +538,18 @@ void Loader::check_command() {
   }
 }
 
-void Loader::check_not_there_yet() {
-  constexpr std::string_view kNotThere = ", which this version does not do yet";
-  const auto refuse = [&](std::string_view section_name, std::string_view key,
-                          const std::string& found, const std::string& expected) {
-    const TomlNode* in = section(section_name);
-    const bool given = in != nullptr && in->find(key) != nullptr;
-    errors_.add(line_of(section_name, key), key_of(section_name, key),
-                (given ? "" : "the default, ") + found + std::string(kNotThere), expected);
-  };
-  if (config_.estimator.stop_rule == estimator::StopRule::kConfidence) {
-    refuse("experiment", "stop", "\"confidence\"", "stop = \"peak\"");
-  }
-  if (!config_.model.empty()) {
-    refuse("estimator", "model", in_quotes(config_.model), "model = \"\"");
+// The model's [variator] wins over the configuration's.
+void Loader::read_model_file() {
+  if (config_.model.empty()) return;
+  ModelFile base;
+  base.variator = config_.variator;
+  try {
+    const ModelFile model =
+        read_model((std::filesystem::path(directory_) / config_.model).string(), base);
+    config_.variator = model.variator;
+    config_.corrected = whole_machine(model);
+  } catch (const ModelError& error) {
+    result_.errors.push_back({error.missing_file ? kExitNoInput : 78, error.text});
   }
 }
 

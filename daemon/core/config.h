@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -12,6 +13,7 @@
 
 #include "can_dbc/signal_codec.h"
 #include "can_dbc/unit_text.h"
+#include "estimator/machine_effects.h"
 #include "estimator/parameters.h"
 
 namespace beltgrip::daemon {
@@ -44,13 +46,26 @@ struct MuxCondition {
   std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges;  // inclusive
 };
 
-// One role bound to one signal of one message: SI value = factor * (scale * signal + offset) +
-// shift.
+// Where a signal lives that no frame broadcasts: in the answer of one ECU to ReadDataByIdentifier.
+struct UdsSource {
+  can::CanId request, response;
+  std::uint16_t identifier = 0;
+  can::SignalDef signal{};  // in the data after the identifier; start bit as in a DBC
+};
+
+// One role bound to one signal of one message, or of one diagnostic answer (then codec is that of
+// the data after the identifier, and there is neither message nor multiplexer nor range): SI value
+// = factor * (scale * signal + offset) + shift.
 struct RoleBinding {
   Role role{};
+  std::uint8_t bus = 0;  // 1: the further one
+  std::optional<UdsSource> uds;
   std::string message_name;
   std::string signal_name;
   can::CanId id;
+  // J1939 and NMEA 2000: the source addresses whose frames of this parameter group are this
+  // message, all but those that the DBC files give to another. None: the full identifier counts.
+  std::bitset<256> sources;
   std::uint32_t message_length = 0;  // bytes, as in the DBC
   bool message_fd = false;
   can::SignalCodec codec;
@@ -58,10 +73,29 @@ struct RoleBinding {
   double minimum = 0.0, maximum = 0.0;  // physical range of the DBC; equal: not given
   double factor = 1.0, shift = 0.0;     // physical value of the signal -> SI
   std::optional<double> period_ms;      // from the DBC's cycle time or the configuration
+  double delay_ms =
+      0.0;  // a frame tells what was so long before its stamp; < 0: relative to others
+};
+
+// How the frames of a message are protected.
+struct CounterProtection {
+  can::SignalCodec codec;
+  std::uint32_t maximum = 15;  // then comes 0
+};
+// CRC-8 as in AUTOSAR E2E profile 1 (can_dbc/e2e.h), over data id and all other bytes.
+struct CrcProtection {
+  std::size_t byte = 0;
+  std::uint16_t data_id = 0;
+};
+struct MessageProtection {
+  can::CanId id;
+  std::optional<CounterProtection> counter;
+  std::optional<CrcProtection> crc;
 };
 
 enum class Trigger : std::uint8_t { kCoastDown, kSteady, kSignal, kAlways };
 enum class Control : std::uint8_t { kObserve, kCommand };
+enum class Diagnostics : std::uint8_t { kListen, kPoll };
 
 // What an experiment in the vehicle needs before it begins and keeps to while it lasts. SI, degrees
 // Celsius.
@@ -82,18 +116,29 @@ struct FrameIdentifiers {  // standard 11 bit
   std::uint32_t estimate = 0x6A0, slip = 0x6A1, clamp = 0x6A2, status = 0x6A3;
 };
 
+struct FurtherBus {
+  std::string name;  // [bus.NAME]
+  std::string interface;
+  std::vector<std::string> dbc;  // of its messages; empty: those of [bus]
+};
+
 struct Config {
   std::string interface = "vcan0";
   std::vector<std::string> dbc;
+  std::optional<FurtherBus> further_bus;
+  Diagnostics diagnostics = Diagnostics::kListen;
   FrameIdentifiers identifiers;
   std::vector<RoleBinding> roles;  // sorted by role, each at most once
+  std::vector<MessageProtection> protections;
   estimator::VariatorParameters variator;
   estimator::SensorAccuracies sensors;
   estimator::EstimatorSettings estimator;
-  std::string model;  // path as in the file; empty: none
+  std::string model;                                   // path as in the file; empty: none
+  std::optional<estimator::MachineEffects> corrected;  // what the model says to take out of inputs
   Trigger trigger = Trigger::kCoastDown;
   Control control = Control::kObserve;
   ExperimentSettings experiment;
+  std::string state_dir;  // path as in the file; empty: $STATE_DIRECTORY, or nothing is kept
 };
 
 struct ConfigError {

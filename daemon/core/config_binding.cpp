@@ -11,7 +11,9 @@
 #include <map>
 
 #include "can_dbc/dbc_parser.h"
+#include "can_dbc/message_index.h"
 #include "daemon/core/config_options.h"
+#include "daemon/core/config_uds.h"
 
 namespace beltgrip::daemon {
 
@@ -21,6 +23,7 @@ constexpr int kExitData = 65;
 constexpr int kExitNoInput = 66;
 constexpr std::size_t kWarningsPerFile = 10;
 constexpr std::size_t kMuxDepth = 16;
+constexpr std::uint32_t kClassicPayload = 8;
 constexpr std::size_t kDbcSizeMax = std::size_t{256} << 20;
 
 std::string id_text(can::CanId id) {
@@ -66,10 +69,12 @@ std::string lower(std::string_view text) {
 // What a role says in its TOML value.
 struct RoleText {
   std::string signal;
+  std::optional<UdsSource> uds;
   std::string unit;
   bool has_unit = false;
   double scale = 1.0, offset = 0.0;
   std::optional<double> period_ms;
+  double delay_ms = 0.0;
   std::uint32_t signal_line = 0, unit_line = 0;
 };
 
@@ -85,7 +90,8 @@ std::optional<RoleText> read_role(const std::string& key, const TomlNode& node,
     errors.add(node.line, key, node.found(), "\"Message.Signal\" or { signal = \"...\", ... }");
     return {};
   }
-  static const std::vector<std::string> kKeys{"signal", "unit", "scale", "offset", "period_ms"};
+  static const std::vector<std::string> kKeys{"signal", "uds",       "unit",     "scale",
+                                              "offset", "period_ms", "delay_ms", "bus"};
   bool good = true;
   const auto wrong = [&](const TomlNode& child, const std::string& expected) {
     errors.add(child.line, key + "." + child.key, child.found(), expected);
@@ -96,6 +102,11 @@ std::optional<RoleText> read_role(const std::string& key, const TomlNode& node,
       text.signal = child.text;
       text.signal_line = child.line;
       if (child.type != TomlType::kText) wrong(child, "text \"Message.Signal\"");
+    } else if (child.key == "uds") {
+      text.uds = read_uds(key + ".uds", child, errors);
+      good = good && text.uds;
+    } else if (child.key == "bus") {
+      if (child.type != TomlType::kText) wrong(child, "the name of a bus in quotes");
     } else if (child.key == "unit") {
       text.unit = child.text;
       text.has_unit = true;
@@ -115,14 +126,29 @@ std::optional<RoleText> read_role(const std::string& key, const TomlNode& node,
           !(child.number <= kPeriodMaximum_ms)) {
         wrong(child, "a number from 0.5 to 10000");
       }
+    } else if (child.key == "delay_ms") {
+      text.delay_ms = child.number;
+      if (!child.is_number() || !(child.number >= kDelayMinimum_ms) ||
+          !(child.number <= kDelayMaximum_ms)) {
+        wrong(child, "a number from -50 to 200");
+      }
     } else {
       errors.add(child.line, key + "." + child.key, "an unknown key",
-                 "signal, unit, scale, offset or period_ms" + nearest_hint(child.key, kKeys));
+                 "signal, uds, unit, scale, offset, period_ms, delay_ms or bus" +
+                     nearest_hint(child.key, kKeys));
       good = false;
     }
   }
-  if (node.find("signal") == nullptr) {
-    errors.add(node.line, key, "a table without signal", "signal = \"Message.Signal\"");
+  const bool by_uds = node.find("uds") != nullptr;
+  if (by_uds == (node.find("signal") != nullptr)) {
+    errors.add(node.line, key, by_uds ? "both signal and uds" : "a table without signal",
+               by_uds ? "one of them" : "signal = \"Message.Signal\"");
+    good = false;
+  }
+  for (const char* each : {"scale", "offset"}) {
+    const TomlNode* child = by_uds ? node.find(each) : nullptr;
+    if (child == nullptr) continue;
+    errors.add(child->line, key + "." + each, "a key beside uds", "it inside uds = { ... }");
     good = false;
   }
   return good ? std::optional(text) : std::nullopt;
@@ -135,7 +161,7 @@ std::optional<can::Unit> role_unit(Role role, const std::string& key, const Role
   const can::Dimension dimension = role_dimension(role);
   const std::string& unit_text = text.has_unit ? text.unit : signal.unit;
   const std::optional<can::Unit> unit = can::parse_unit(unit_text);
-  const std::string where = text.has_unit ? "" : " in " + dbc_path;
+  const std::string where = text.has_unit || dbc_path.empty() ? "" : " in " + dbc_path;
   const std::string found =
       unit_text.empty() ? "no unit" + where : "unit " + in_quotes(unit_text) + where;
   if (dimension == can::Dimension::kNone) {
@@ -149,8 +175,9 @@ std::optional<can::Unit> role_unit(Role role, const std::string& key, const Role
   }
   const std::string wanted = "a unit of " + std::string(can::dimension_name(dimension)) +
                              " such as " + std::string(can::si_unit_text(dimension));
-  const std::string hint =
-      text.has_unit ? "" : "; set unit in { signal = \"...\", unit = \"...\" }";
+  const std::string hint = text.has_unit ? ""
+                           : text.uds    ? "; set unit in { uds = { ... }, unit = \"...\" }"
+                                         : "; set unit in { signal = \"...\", unit = \"...\" }";
   if (!unit || unit->dimension == can::Dimension::kNone) {
     errors.add(text.unit_line, key, found, wanted + hint);
     return {};
@@ -162,6 +189,31 @@ std::optional<can::Unit> role_unit(Role role, const std::string& key, const Role
     return {};
   }
   return unit;
+}
+
+std::string signal_text(const can::SignalDef& signal) {
+  return std::to_string(signal.start_bit) + "|" + std::to_string(signal.length) +
+         (signal.byte_order == can::ByteOrder::kBig ? "@0" : "@1") +
+         (signal.type == can::ValueType::kSigned ? "-" : "+");
+}
+
+std::optional<RoleBinding> bind_uds(Role role, const std::string& key, const RoleText& text,
+                                    const UdsSource& source, ConfigErrors& errors) {
+  const can::SignalDef& signal = source.signal;
+  const std::optional<can::Unit> unit = role_unit(role, key, text, signal, "", errors);
+  if (!unit) return {};
+  RoleBinding binding;
+  binding.role = role;
+  binding.uds = source;
+  binding.id = source.response;
+  binding.message_name = id_text(source.response);
+  binding.signal_name = "did " + id_text({source.identifier, false}) + " " + signal_text(signal);
+  binding.codec = can::SignalCodec(signal);
+  binding.factor = unit->factor;
+  binding.shift = unit->offset;
+  binding.period_ms = text.period_ms;
+  binding.delay_ms = text.delay_ms;
+  return binding;
 }
 
 }  // namespace
@@ -206,15 +258,15 @@ std::string nearest_hint(std::string_view name, const std::vector<std::string>& 
   return best == nullptr ? std::string() : "; nearest is " + in_quotes(*best);
 }
 
-void SignalCatalogue::add_file(const std::string& path, const std::string& directory,
-                               std::uint32_t line, ConfigErrors& errors,
-                               std::vector<std::string>& warnings) {
+void SignalCatalogue::add_file(const std::string& key, const std::string& path,
+                               const std::string& directory, std::uint32_t line,
+                               ConfigErrors& errors, std::vector<std::string>& warnings) {
   const std::string full = (std::filesystem::path(directory) / path).string();
   std::string text;
   std::string reason = read_text_file(full, kDbcSizeMax, text);
   if (text.size() > kDbcSizeMax) reason = "it is larger than 256 MiB";
   if (!reason.empty()) {
-    errors.add(line, "bus.dbc", in_quotes(path) + " that cannot be read (" + reason + ")",
+    errors.add(line, key, in_quotes(path) + " that cannot be read (" + reason + ")",
                "the path of a DBC file, relative to " + (directory.empty() ? "." : directory),
                kExitNoInput);
     complete_ = false;
@@ -227,7 +279,7 @@ void SignalCatalogue::add_file(const std::string& path, const std::string& direc
       const can::Problem& first = parsed.problems.front();
       why = "line " + std::to_string(first.line) + ": " + first.text;
     }
-    errors.add(line, "bus.dbc", in_quotes(path) + " without a readable message (" + why + ")",
+    errors.add(line, key, in_quotes(path) + " without a readable message (" + why + ")",
                "a DBC file", kExitData);
     complete_ = false;
     return;
@@ -247,7 +299,8 @@ void SignalCatalogue::add_file(const std::string& path, const std::string& direc
   files_.push_back({path, std::move(parsed.database)});
 }
 
-void SignalCatalogue::check_identifiers(std::uint32_t line, ConfigErrors& errors) const {
+void SignalCatalogue::check_identifiers(const std::string& key, std::uint32_t line,
+                                        ConfigErrors& errors) const {
   std::map<can::CanId, std::pair<const File*, const can::MessageDef*>> seen;
   std::size_t clashes = 0;
   std::string first;
@@ -264,7 +317,7 @@ void SignalCatalogue::check_identifiers(std::uint32_t line, ConfigErrors& errors
   }
   if (clashes == 0) return;
   if (clashes > 1) first += " and " + std::to_string(clashes - 1) + " more such";
-  errors.add(line, "bus.dbc", first, "each identifier in one file only");
+  errors.add(line, key, first, "each identifier in one file only");
 }
 
 std::vector<std::string> SignalCatalogue::message_names() const {
@@ -273,6 +326,24 @@ std::vector<std::string> SignalCatalogue::message_names() const {
     for (const can::MessageDef& message : file.database.messages) names.push_back(message.name);
   }
   return names;
+}
+
+std::bitset<256> SignalCatalogue::sources_of(const can::MessageDef& message) const {
+  constexpr std::uint32_t kSourceMask = 0xFF;
+  std::bitset<256> sources;
+  if (!message.j1939) return sources;
+  std::vector<const can::Database*> databases;
+  databases.reserve(files_.size());
+  for (const File& file : files_) databases.push_back(&file.database);
+  const can::MessageIndex index(databases);
+  for (std::uint32_t source = 0; source < sources.size(); ++source) {
+    const std::uint32_t id = (message.id.value & ~kSourceMask) | source;
+    const can::MessageIndex::Place* place = index.lookup({id, true});
+    sources[source] =
+        place != nullptr && &files_[place->database].database.messages[place->message] == &message;
+  }
+  sources.set(message.id.value & kSourceMask);  // of two messages of one identifier, either
+  return sources;
 }
 
 std::optional<SignalCatalogue::Found> SignalCatalogue::find_message(std::string_view name,
@@ -314,6 +385,7 @@ std::optional<RoleBinding> SignalCatalogue::bind(Role role, const TomlNode& node
   const std::string key = "signals." + std::string(role_name(role));
   const std::optional<RoleText> text = read_role(key, node, errors);
   if (!text) return {};
+  if (text->uds) return bind_uds(role, key, *text, *text->uds, errors);
   const std::size_t dot = text->signal.find('.');
   if (dot == std::string::npos || dot == 0 || dot + 1 == text->signal.size()) {
     errors.add(text->signal_line, key, in_quotes(text->signal),
@@ -342,6 +414,7 @@ std::optional<RoleBinding> SignalCatalogue::bind(Role role, const TomlNode& node
   binding.message_name = message.name;
   binding.signal_name = signal->name;
   binding.id = message.id;
+  binding.sources = sources_of(message);
   binding.message_length = message.length;
   binding.message_fd = message.fd;
   binding.codec = can::SignalCodec(*signal);
@@ -350,6 +423,14 @@ std::optional<RoleBinding> SignalCatalogue::bind(Role role, const TomlNode& node
                "signal " + in_quotes(signal_name) + " that lies outside the " +
                    std::to_string(message.length) + " bytes of " + message.name,
                "a signal inside its message");
+    return {};
+  }
+  const std::uint32_t longest = message.fd ? can::kMaxPayload : kClassicPayload;
+  if (message.length > longest) {
+    errors.add(text->signal_line, key,
+               "message " + in_quotes(message.name) + " of " + std::to_string(message.length) +
+                   " bytes in " + found->file->path,
+               "one that fits in a frame: at most 8 bytes, or 64 where the DBC marks it as CAN FD");
     return {};
   }
   if (!std::isfinite(signal->scale) || signal->scale == 0.0 || !std::isfinite(signal->offset)) {
@@ -383,10 +464,97 @@ std::optional<RoleBinding> SignalCatalogue::bind(Role role, const TomlNode& node
   binding.factor = unit->factor * text->scale;
   binding.shift = unit->factor * text->offset + unit->offset;
   binding.period_ms = text->period_ms;
+  binding.delay_ms = text->delay_ms;
   if (!binding.period_ms && message.cycle_ms && *message.cycle_ms > 0.0) {
     binding.period_ms = message.cycle_ms;
   }
   return binding;
+}
+
+std::optional<MessageProtection> SignalCatalogue::protect(const TomlNode& node,
+                                                          ConfigErrors& errors) const {
+  const std::string key = "protection." + node.key;
+  if (node.type != TomlType::kTable) {
+    errors.add(node.line, key, node.found(), "{ counter = \"Signal\", ... }");
+    return {};
+  }
+  const std::optional<Found> found = find_message(node.key, key, node.line, errors);
+  if (!found) return {};
+  const can::MessageDef& message = *found->message;
+  bool good = true;
+  const auto wrong = [&](std::uint32_t line, const std::string& child, const std::string& what,
+                         const std::string& expected) {
+    errors.add(line, child.empty() ? key : key + "." + child, what, expected);
+    good = false;
+  };
+  static const std::vector<std::string> kKeys{"counter", "counter_max", "crc", "data_id"};
+  for (const TomlNode& child : node.children) {
+    if (std::find(kKeys.begin(), kKeys.end(), child.key) == kKeys.end()) {
+      wrong(child.line, child.key, "an unknown key",
+            "counter, counter_max, crc or data_id" + nearest_hint(child.key, kKeys));
+    }
+  }
+  // A plain unsigned signal of the message, or null with an error.
+  const auto signal_of = [&](const TomlNode& child) -> const can::SignalDef* {
+    const can::SignalDef* signal =
+        child.type == TomlType::kText ? message.find_signal(child.text) : nullptr;
+    constexpr std::uint32_t kLongest = 8;
+    if (signal == nullptr || signal->type != can::ValueType::kUnsigned || signal->multiplexed_by ||
+        signal->length > kLongest || !can::SignalCodec(*signal).fits(message.length)) {
+      wrong(child.line, child.key, child.found(),
+            "an unsigned signal of " + message.name + " of up to 8 bits, not multiplexed");
+      return nullptr;
+    }
+    return signal;
+  };
+  const auto integer_of = [&](const TomlNode& child, std::int64_t low, std::int64_t high) {
+    const bool in_range =
+        child.type == TomlType::kInteger && child.integer >= low && child.integer <= high;
+    if (!in_range) {
+      wrong(child.line, child.key, child.found(),
+            "an integer from " + std::to_string(low) + " to " + std::to_string(high));
+    }
+    return in_range ? static_cast<std::uint32_t>(child.integer) : 0U;
+  };
+  MessageProtection out;
+  out.id = message.id;
+  const TomlNode* counter = node.find("counter");
+  const TomlNode* counter_max = node.find("counter_max");
+  const TomlNode* crc = node.find("crc");
+  const TomlNode* data_id = node.find("data_id");
+  if (message.j1939) {
+    wrong(node.line, "", "a message of a J1939 group", "one with an identifier of its own");
+  }
+  if (counter == nullptr && crc == nullptr) {
+    wrong(node.line, "", "neither counter nor crc", "one of them");
+  }
+  if (counter == nullptr && counter_max != nullptr) {
+    wrong(counter_max->line, "counter_max", "no counter", "counter = \"Signal\"");
+  }
+  if ((crc == nullptr) != (data_id == nullptr)) {
+    wrong((crc != nullptr ? crc : data_id)->line, "", crc != nullptr ? "no data_id" : "no crc",
+          "crc = \"Signal\" and data_id = 0x123");
+  }
+  if (const can::SignalDef* signal = counter == nullptr ? nullptr : signal_of(*counter)) {
+    out.counter.emplace();
+    out.counter->codec = can::SignalCodec(*signal);
+    out.counter->maximum = static_cast<std::uint32_t>(out.counter->codec.mask());
+    if (counter_max != nullptr) {
+      out.counter->maximum = integer_of(*counter_max, 1, out.counter->maximum);
+    }
+  }
+  if (const can::SignalDef* signal = crc == nullptr ? nullptr : signal_of(*crc)) {
+    constexpr std::uint32_t kByte = 8;
+    const std::uint32_t first = signal->byte_order == can::ByteOrder::kLittle ? 0 : kByte - 1;
+    if (signal->length != kByte || signal->start_bit % kByte != first) {
+      wrong(crc->line, "crc", crc->found(), "a signal that is one byte of the frame");
+    }
+    out.crc = CrcProtection{signal->start_bit / kByte, 0};
+    if (data_id != nullptr) {
+      out.crc->data_id = static_cast<std::uint16_t>(integer_of(*data_id, 0, 0xFFFF));
+    }
+  }
+  return good ? std::optional(out) : std::nullopt;
 }
 
 }  // namespace beltgrip::daemon

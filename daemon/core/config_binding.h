@@ -1,5 +1,5 @@
-// From names in the configuration to signals in the DBC files: reads the files, finds what a role
-// names, settles its unit. Start-up and tools only.
+// From names in the configuration to signals in the DBC files of a bus: reads the files, finds what
+// a role names, settles its unit. Start-up and tools only.
 #pragma once
 
 #include <optional>
@@ -36,15 +36,18 @@ std::string nearest_hint(std::string_view name, const std::vector<std::string>& 
 
 class SignalCatalogue {
  public:
-  // Reads one DBC file; path as in the configuration, directory that of the configuration.
-  void add_file(const std::string& path, const std::string& directory, std::uint32_t line,
-                ConfigErrors& errors, std::vector<std::string>& warnings);
+  // Reads one DBC file; path as in the configuration under `key`, directory that of the
+  // configuration.
+  void add_file(const std::string& key, const std::string& path, const std::string& directory,
+                std::uint32_t line, ConfigErrors& errors, std::vector<std::string>& warnings);
   // Every identifier in one file only.
-  void check_identifiers(std::uint32_t line, ConfigErrors& errors) const;
+  void check_identifiers(const std::string& key, std::uint32_t line, ConfigErrors& errors) const;
   // True when every file could be read: only then roles can be judged.
   bool complete() const { return complete_; }
   // The binding of a role from its TOML value; nothing when errors were added.
   std::optional<RoleBinding> bind(Role role, const TomlNode& node, ConfigErrors& errors) const;
+  // The protection of the message that the node's key names; nothing when errors were added.
+  std::optional<MessageProtection> protect(const TomlNode& node, ConfigErrors& errors) const;
 
  private:
   struct File {
@@ -58,6 +61,8 @@ class SignalCatalogue {
   std::optional<Found> find_message(std::string_view name, const std::string& key,
                                     std::uint32_t line, ConfigErrors& errors) const;
   std::vector<std::string> message_names() const;
+  // Empty unless messages of this file are told by parameter group.
+  std::bitset<256> sources_of(const can::MessageDef& message) const;
 
   std::vector<File> files_;
   bool complete_ = true;

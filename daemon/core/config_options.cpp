@@ -16,6 +16,7 @@ constexpr std::string_view kMethods[] = {"robust", "paper"};
 constexpr std::string_view kTriggers[] = {"coast_down", "steady", "signal", "always"};
 constexpr std::string_view kControls[] = {"observe", "command"};
 constexpr std::string_view kRatios[] = {"overdrive", "low", "either"};
+constexpr std::string_view kDiagnostics[] = {"listen", "poll"};
 constexpr std::string_view kStops[] = {"peak", "confidence"};
 
 Option number(std::string_view section, std::string_view key, std::string_view unit, double minimum,
@@ -88,6 +89,12 @@ const Option kOptions[] = {
      .choices = {},
      .help = "Identifiers of the frames that BeltGrip publishes, 11 bit, all different. Their data "
              "ids\n(protection) stay those of the default."},
+    choice<&Config::diagnostics>(
+        "bus", "diagnostics", kDiagnostics,
+        "Roles with { uds = ... }: \"listen\" waits for the answers that another tester asks for "
+        "and sends\nnothing; \"poll\" asks itself, each identifier every period_ms, one request "
+        "at a time to an ECU, less\noften when it is refused or not answered, and not within 5 s "
+        "of another tester's request."),
 
     number(
         "variator", "half_wedge_angle_deg", "degrees", 1.0, 45.0,
@@ -138,7 +145,10 @@ const Option kOptions[] = {
      .kind = Kind::kText,
      .unit = {},
      .choices = {},
-     .help = "Model file whose effects the estimator corrects for. Not in this version.",
+     .help =
+         "Model file (beltgrip diagnose --model-out): its [variator] wins over this file's, and\n"
+         "what it says of torque, clamp force, geometry and delays is taken out of the inputs.\n"
+         "A channel that it says comes late makes all others, and every decision, wait.",
      .text = [](Config& c) -> std::string& { return c.model; }},
     number(
         "estimator", "sample_rate_hz", "Hz", 100.0, 1000.0,
@@ -188,7 +198,15 @@ const Option kOptions[] = {
         "experiment", "ratio", kRatios, "The end stop at which slip is defined."),
     choice<&Config::estimator, &estimator::EstimatorSettings::stop_rule>(
         "experiment", "stop", kStops,
-        "What ends an experiment. \"confidence\" is not in this version."),
+        "What ends an experiment: \"peak\" once the traction curve has been seen to turn down; "
+        "\"confidence\"\nas soon as what it has shown tells mu_max to confidence_width, which may "
+        "be "
+        "before the peak\n(method \"robust\")."),
+    number(
+        "experiment", "confidence_width", "", 0.005, 1.0,
+        [](Config& c) -> double& { return c.estimator.confidence_width; },
+        "With stop = \"confidence\": width of the 95 % interval of mu_max, as a share of mu_max,\n"
+        "that is narrow enough."),
     number(
         "experiment", "ramp_rate_max_N_per_s", "N/s", 1.0, 10e3,
         [](Config& c) -> double& { return c.estimator.ramp_rate_max_N_per_s; },
@@ -234,10 +252,20 @@ const Option kOptions[] = {
         "experiment", "cooldown_m", "m", 0.0, 1e6,
         [](Config& c) -> double& { return c.experiment.cooldown_m; },
         "Distance likewise; both must have passed."),
+
+    {.section = "daemon",
+     .key = "state_dir",
+     .kind = Kind::kText,
+     .unit = {},
+     .choices = {},
+     .help = "Folder of what outlives the daemon: history.db, every experiment with its result. "
+             "Empty: the\nfolder that systemd gives (StateDirectory, as $STATE_DIRECTORY); where "
+             "there is none, nothing is\nkept and MinClampForce rests on the last result alone.",
+     .text = [](Config& c) -> std::string& { return c.state_dir; }},
 };
 
-constexpr std::string_view kSections[] = {"bus",      "signals",   "sensors",
-                                          "variator", "estimator", "experiment"};
+constexpr std::string_view kSections[] = {"bus",      "signals",   "protection", "sensors",
+                                          "variator", "estimator", "experiment", "daemon"};
 
 constexpr std::array<std::string_view, kRoleCount> kRoleHelp{
     "Speed of the primary pulley. Required.",
@@ -331,13 +359,36 @@ std::string range_text(const Option& option) {
   }
 }
 
+void add_further_bus(std::string& out) {
+  add_comment(out,
+              "A further bus, where roles live that say bus = \"NAME\"; BeltGrip's own frames stay "
+              "on the first.\n"
+              "  [bus.NAME]\n"
+              "  interface = \"can1\"\n"
+              "  dbc = [\"other.dbc\"]     where its messages are not in the files of [bus]");
+}
+
 void add_signals(std::string& out) {
   add_comment(
       out,
       "role = \"Message.Signal\" | \"0x123.Signal\" | \"0x12345678x.Signal\" (29 bit)\n"
-      "or { signal = \"...\", unit = \"...\", scale = 1.0, offset = 0.0, period_ms = ... }:\n"
-      "role = scale * signal + offset, in unit. Unit and period are the DBC's where they "
-      "are not given.\n"
+      "or { signal = \"...\", unit = \"...\", scale = 1.0, offset = 0.0, period_ms = ...,\n"
+      "delay_ms = 0.0, bus = \"NAME\" }: role = scale * signal + offset, in unit. Unit and period "
+      "are the DBC's\n"
+      "where they are not given. delay_ms, -50.0 to 200.0: how much later than the others its "
+      "values come;\n"
+      "what a frame tells is taken for so much older (beltgrip calibrate measures it). Samples "
+      "wait "
+      "for it up\n"
+      "to 50 ms in all; the slope of what comes later is followed.\n"
+      "Or from diagnostics (UDS ReadDataByIdentifier over ISO-TP):\n"
+      "{ uds = { request = 0x7E1, response = 0x7E9, did = 0x1101, start = 7, length = 16, "
+      "byte_order = \"big\",\n"
+      "scale = 1.0, offset = 0.0, signed = false }, unit = \"kPa\", period_ms = 50 }: start "
+      "counts the bits of\n"
+      "the data after the identifier as a DBC does (big: of the highest bit; 7 is the highest of "
+      "the first\n"
+      "byte). Identifiers above 0x7FF are 29 bit.\n"
       "Units: rpm, 1/min, rad/s, bar, kPa, MPa, Pa, Nm, degC, K, km/h, m/s, %, N, kN, m, mm.");
   for (std::size_t i = 0; i < kRoleCount; ++i) {
     const Role role = static_cast<Role>(i);
@@ -349,6 +400,20 @@ void add_signals(std::string& out) {
     }
     out += "# " + std::string(role_name(role)) + " = \"\"\n";
   }
+}
+
+void add_protection(std::string& out) {
+  add_comment(
+      out,
+      "Counter and CRC of messages of [bus], message by message. A frame whose counter "
+      "stands still or\njumps by more than three, or whose CRC is wrong, is not used; after a "
+      "jump, and after three bad ones\nof eight, none is until five in a row are good. "
+      "counter is a signal of up to 8 bits, counting to\ncounter_max (default: all bits one). "
+      "crc is a signal of one byte: CRC-8 as in AUTOSAR E2E profile 1\n(polynomial 0x1D) over "
+      "the low and the high byte of data_id and all other bytes of the frame.");
+  out +=
+      "# \"Message\" = { counter = \"Signal\", counter_max = 14, crc = \"Signal\", data_id = "
+      "0x123 }\n";
 }
 
 void add_sensors(std::string& out) {
@@ -410,6 +475,7 @@ std::string default_config_text() {
   for (const std::string_view section : kSections) {
     out += "\n[" + std::string(section) + "]\n";
     if (section == "signals") add_signals(out);
+    if (section == "protection") add_protection(out);
     if (section == "sensors") add_sensors(out);
     bool first = true;
     for (const Option& option : kOptions) {
@@ -421,6 +487,7 @@ std::string default_config_text() {
       if (!range.empty()) add_comment(out, "(" + range + ")");
       out += "# " + std::string(option.key) + " = " + default_value(option, defaults) + "\n";
     }
+    if (section == "bus") add_further_bus(out += "\n");
   }
   return out;
 }

@@ -45,5 +45,7 @@ struct IdentifierKey {
 std::span<const IdentifierKey> identifier_keys();
 
 inline constexpr double kPeriodMinimum_ms = 0.5, kPeriodMaximum_ms = 10'000.0;
+inline constexpr double kDelayMinimum_ms = -50.0, kDelayMaximum_ms = 200.0;
+inline constexpr double kPollPeriodMinimum_ms = 10.0;
 
 }  // namespace beltgrip::daemon

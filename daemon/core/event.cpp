@@ -1,8 +1,12 @@
 #include "daemon/core/event.h"
 
 #include <array>
+#include <bit>
 #include <charconv>
 #include <cmath>
+#include <utility>
+
+#include "daemon/core/arming.h"
 
 namespace beltgrip::daemon {
 
@@ -57,6 +61,8 @@ std::string text_of(const Event& event) {
       }
       return text;
     }
+    case EventId::kInhibit:
+      return "no experiment: " + std::string(kInhibitNames[event.to]);
     case EventId::kFaultRaised:
       return "fault " + std::string(kFaultNames[event.to]);
     case EventId::kFaultCleared:
@@ -65,13 +71,29 @@ std::string text_of(const Event& event) {
   return "fault " + std::string(kFaultNames[event.to]) + " gone";
 }
 
+bool LineBudget::take(const Event& event) noexcept {
+  if (event.id == EventId::kStop || event.id == EventId::kResult) return true;
+  MonoTime& oldest = taken_[count_ % kMost];
+  if (count_ >= kMost && event.t - oldest < kSecond) {
+    ++left_out_;
+    return false;
+  }
+  oldest = event.t;
+  ++count_;
+  return true;
+}
+
+unsigned LineBudget::left_out(MonoTime t) noexcept {
+  if (left_out_ == 0 || t - said_ < kSecond) return 0;
+  said_ = t;
+  return std::exchange(left_out_, 0U);
+}
+
 void EventSink::on_report(const SampleReport& report) noexcept {
   if (report.macro_slip_stop && !stop_) {
     ring_.push({.t = report.t,
                 .id = EventId::kStop,
-                .reason = report.result.outcome == Outcome::kAborted && report.new_result
-                              ? report.result.stop_reason
-                              : report.curve.stop,
+                .reason = report.stop_reason,
                 .first = report.curve.sigma_star_percent,
                 .second = report.curve.mu_star});
   }
@@ -101,6 +123,22 @@ void EventSink::on_report(const SampleReport& report) noexcept {
                 .to = static_cast<std::uint8_t>(fault)});
   }
   faults_ = report.faults;
+  look_at_inhibits(report);
+}
+
+void EventSink::look_at_inhibits(const SampleReport& report) noexcept {
+  const std::uint32_t now = report.in_experiment ? 0U : report.inhibits;
+  if (now != inhibits_) inhibits_since_ = report.t;
+  inhibits_ = now;
+  if (now == 0 && report.in_experiment) inhibit_said_ = 0;
+  if (!std::has_single_bit(now) || now == inhibit_said_ ||
+      report.t - inhibits_since_ < kInhibitAfter) {
+    return;
+  }
+  inhibit_said_ = now;
+  ring_.push({.t = report.t,
+              .id = EventId::kInhibit,
+              .to = static_cast<std::uint8_t>(std::countr_zero(now))});
 }
 
 }  // namespace beltgrip::daemon

@@ -40,6 +40,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 #include "daemon/core/mono_time.h"
 #include "estimator/slip_curve_estimator.h"
@@ -70,6 +71,13 @@ struct ExperimentResult {
   std::int64_t samples = 0;         // from start to stop
   estimator::Direction direction = estimator::Direction::kDrive;
   estimator::EndStop end_stop = estimator::EndStop::kOverdrive;
+  // Where it was at its end.
+  double omega_p_rad_s = 0.0;
+  double omega_s_rad_s = 0.0;
+  double torque_Nm = 0.0;  // on the belt, signed
+  double clamp_force_N = 0.0;
+  double sensor_std = 0.0;  // of mu_max: the part by constant errors of the sensors, [sensors]
+  double oil_degC = std::numeric_limits<double>::quiet_NaN();  // no number: not known
 };
 
 struct Guards {

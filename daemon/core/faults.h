@@ -25,15 +25,20 @@ enum class Fault : std::uint8_t {
   kBusDown,        // interface down or gone
   kForeignSender,  // another node sends with one of our identifiers; latched
   kSendFailed,
-  kFrameRefused  // by the transmit gate; latched
+  kFrameRefused,      // by the transmit gate; latched
+  kResultDoubtful,    // the last result contradicts the ones before it, or itself
+  kHistoryUnwritten,  // the history of experiments cannot be read or written as it should
+  kInputRate,         // an input message comes too often or too seldom
+  kInputProtection    // wrong counter or CRC of an input message
 };
-inline constexpr std::size_t kFaultCount = 15;
+inline constexpr std::size_t kFaultCount = 19;
 
 // Signal names are "Fault" followed by these.
 inline constexpr std::array<std::string_view, kFaultCount> kFaultNames{
-    "InputMissing", "InputStale", "InputFrozen",   "InputRange", "InputNotFinite",
-    "InputFrame",   "TimeStamp",  "FramesLost",    "SampleLate", "BusPassive",
-    "BusOff",       "BusDown",    "ForeignSender", "SendFailed", "FrameRefused"};
+    "InputMissing",   "InputStale",       "InputFrozen",   "InputRange",     "InputNotFinite",
+    "InputFrame",     "TimeStamp",        "FramesLost",    "SampleLate",     "BusPassive",
+    "BusOff",         "BusDown",          "ForeignSender", "SendFailed",     "FrameRefused",
+    "ResultDoubtful", "HistoryUnwritten", "InputRate",     "InputProtection"};
 
 constexpr std::uint32_t fault_bit(Fault fault) {
   return std::uint32_t{1} << static_cast<unsigned>(fault);

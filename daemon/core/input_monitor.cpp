@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "can_dbc/message_index.h"
 
 namespace beltgrip::daemon {
 
@@ -28,16 +31,30 @@ std::size_t hash_of(std::uint32_t id, std::size_t size) noexcept {
   return (id * 0x9E37'79B1U >> 16) % size;
 }
 
+constexpr std::uint8_t source_of(can::CanId id) noexcept {
+  return static_cast<std::uint8_t>(id.value & 0xFFU);
+}
+
+// What the frames of a 29-bit message have in common. Groups differ from identifiers in bit 31.
+constexpr std::uint32_t key_of(std::uint8_t bus, can::CanId id, bool by_group) noexcept {
+  static_assert(kBusMax <= 4, "two bits");
+  constexpr std::uint32_t kGroup = std::uint32_t{1} << 31;
+  return (id.value & can::identifier_mask(id, by_group)) | std::uint32_t{bus} << 29U |
+         (by_group ? kGroup : 0);
+}
+
 Duration scaled(Duration duration, double factor) {
   return static_cast<Duration>(static_cast<double>(duration) * factor);
 }
 
 }  // namespace
 
-InputMonitor::InputMonitor(const Config& config) : config_(config) {
-  standard_.fill(kNone);
+InputMonitor::InputMonitor(const Config& config) : config_(config), uds_(config) {
+  for (auto& each : standard_) each.fill(kNone);
+  newest_.fill(std::numeric_limits<MonoTime>::min());
   extended_.fill(kNone);
   for (const RoleBinding& binding : config_.roles) bind(binding);
+  for (std::uint8_t i = 0; i < message_count_; ++i) guard(messages_[i]);
 
   const Role torque =
       config_.estimator.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque;
@@ -60,62 +77,132 @@ void InputMonitor::bind(const RoleBinding& binding) {
   if (binding.period_ms) {
     row.period = static_cast<Duration>(*binding.period_ms * static_cast<double>(kMillisecond));
   }
+  row.delay = static_cast<Duration>(binding.delay_ms * static_cast<double>(kMillisecond));
   row.learns = !row.period;
+  row.by_group = binding.sources.any();
+  constexpr std::uint8_t kNullAddress = 0xFE;  // what a DBC writes for "any source"
+  if (row.by_group && source_of(binding.id) < kNullAddress) row.own_source = source_of(binding.id);
+
+  if (binding.uds) return;
 
   const auto role_index = static_cast<std::uint8_t>(binding.role);
   for (std::uint8_t i = 0; i < message_count_; ++i) {
-    if (messages_[i].id != binding.id) continue;
+    if (messages_[i].bus != binding.bus || messages_[i].id != binding.id) continue;
     messages_[i].rows[messages_[i].row_count++] = role_index;
     return;
   }
   Message& message = messages_[message_count_];
+  message.bus = binding.bus;
   message.id = binding.id;
+  message.sources = binding.sources;
   message.fd = binding.message_fd;
   message.length = binding.message_fd ? fd_length(binding.message_length)
                                       : static_cast<std::uint8_t>(binding.message_length);
   message.rows[message.row_count++] = role_index;
-  if (binding.id.extended) {
-    std::size_t slot = hash_of(binding.id.value, kHashSize);
-    while (extended_[slot] != kNone) slot = (slot + 1) % kHashSize;
-    extended_[slot] = message_count_;
-  } else {
-    standard_[binding.id.value] = message_count_;
-  }
+  bind_identifier(message, message_count_);
   ++message_count_;
 }
 
-const InputMonitor::Message* InputMonitor::message_of(can::CanId id) const noexcept {
-  if (!id.extended) {
-    if (id.value > can::kStandardIdMax || standard_[id.value] == kNone) return nullptr;
-    return &messages_[standard_[id.value]];
+void InputMonitor::guard(Message& message) noexcept {
+  std::optional<Duration> period = rows_[message.rows[0]].period;
+  for (std::size_t i = 0; i < message.row_count; ++i) {
+    if (!rows_[message.rows[i]].binding->mux.empty() || message.sources.any()) period.reset();
   }
-  for (std::size_t slot = hash_of(id.value, kHashSize); extended_[slot] != kNone;
-       slot = (slot + 1) % kHashSize) {
-    if (messages_[extended_[slot]].id == id) return &messages_[extended_[slot]];
+  const auto protection =
+      std::find_if(config_.protections.begin(), config_.protections.end(),
+                   [&](const auto& each) { return message.bus == 0 && each.id == message.id; });
+  message.guard =
+      FrameGuard(period, protection == config_.protections.end() ? nullptr : &*protection);
+}
+
+void InputMonitor::bind_identifier(const Message& message, std::uint8_t index) noexcept {
+  if (!message.id.extended) {
+    standard_[message.bus][message.id.value] = index;
+    return;
+  }
+  std::size_t slot = hash_of(key_of(message.bus, message.id, message.sources.any()), kHashSize);
+  while (extended_[slot] != kNone) slot = (slot + 1) % kHashSize;
+  extended_[slot] = index;
+}
+
+InputMonitor::Message* InputMonitor::message_of(std::uint8_t bus, can::CanId id) noexcept {
+  if (bus >= kBusMax) return nullptr;
+  if (!id.extended) {
+    if (id.value > can::kStandardIdMax || standard_[bus][id.value] == kNone) return nullptr;
+    return &messages_[standard_[bus][id.value]];
+  }
+  for (const bool by_group : {false, true}) {
+    const std::uint32_t key = key_of(bus, id, by_group);
+    for (std::size_t slot = hash_of(key, kHashSize); extended_[slot] != kNone;
+         slot = (slot + 1) % kHashSize) {
+      Message& message = messages_[extended_[slot]];
+      if (message.sources.any() != by_group || key_of(message.bus, message.id, by_group) != key) {
+        continue;
+      }
+      if (!by_group || message.sources[source_of(id)]) return &message;
+    }
   }
   return nullptr;
 }
 
+bool InputMonitor::is_followed(const Message& message, std::uint8_t source) const noexcept {
+  return message.sources.none() ||
+         std::any_of(message.rows.begin(), message.rows.begin() + message.row_count,
+                     [&](std::uint8_t i) { return rows_[i].source.value_or(source) == source; });
+}
+
 FrameUse InputMonitor::on_frame(const RxFrame& frame, FaultSet& faults) noexcept {
   const can::CanFrame& can_frame = frame.frame;
-  const Message* message = can_frame.error ? nullptr : message_of(can_frame.id);
-  if (message == nullptr) return FrameUse::kForeign;
-  if (frame.t < newest_) faults.raise(Fault::kTimeStamp, newest_);
-  const MonoTime t = std::max(frame.t, newest_);
+  Message* message = can_frame.error ? nullptr : message_of(frame.bus, can_frame.id);
+  if (message == nullptr) {
+    UdsReading reading;
+    if (!uds_.on_frame(frame, reading)) return FrameUse::kForeign;
+    return take_reading(reading, faults) ? FrameUse::kTaken : FrameUse::kBad;
+  }
+  MonoTime& newest = newest_[message->bus];
+  if (frame.t < newest) faults.raise(Fault::kTimeStamp, newest);
+  const MonoTime t = std::max(frame.t, newest);
   if (can_frame.remote || can_frame.fd != message->fd || can_frame.length != message->length) {
+    if (!is_followed(*message, source_of(can_frame.id))) return FrameUse::kForeign;
     faults.raise(Fault::kInputFrame, t);
     return FrameUse::kBad;
   }
-  newest_ = t;
+  message->guard.count(t);
+  if (message->guard.wrong_rate()) faults.raise(Fault::kInputRate, t);
+  if (!message->guard.admit(can_frame)) {
+    faults.raise(Fault::kInputProtection, t);
+    return FrameUse::kBad;
+  }
+  newest = t;
   for (std::size_t i = 0; i < message->row_count; ++i) {
-    take(rows_[message->rows[i]], frame, t, faults);
+    take(rows_[message->rows[i]], can_frame.payload(), source_of(can_frame.id), t, faults);
   }
   return FrameUse::kTaken;
 }
 
-void InputMonitor::take(Row& row, const RxFrame& frame, MonoTime t, FaultSet& faults) noexcept {
+// False when an answer is too short for a role that it should hold.
+bool InputMonitor::take_reading(const UdsReading& reading, FaultSet& faults) noexcept {
+  bool whole = true;
+  for (const Role role : reading.roles) {
+    if (row(role).binding->codec.fits(reading.data.size())) {
+      take(row(role), reading.data, 0, reading.t, faults);
+    } else {
+      faults.raise(Fault::kInputFrame, reading.t);
+      whole = false;
+    }
+  }
+  return whole;
+}
+
+void InputMonitor::take(Row& row, std::span<const std::uint8_t> payload, std::uint8_t source,
+                        MonoTime t, FaultSet& faults) noexcept {
   const RoleBinding& binding = *row.binding;
-  const auto payload = frame.frame.payload();
+  const bool another = row.by_group && row.source.value_or(source) != source;
+  if (another && row.own_source != source && row.quality != SignalQuality::kStale) return;
+  // What a source is not followed for is no fault of the input.
+  const auto refuse = [&](Fault fault) {
+    if (!another) faults.raise(fault, t);
+  };
   for (const MuxCondition& condition : binding.mux) {
     const std::uint64_t selector = condition.selector.raw(payload);
     const bool selected = std::any_of(
@@ -127,7 +214,7 @@ void InputMonitor::take(Row& row, const RxFrame& frame, MonoTime t, FaultSet& fa
   const double physical = binding.codec.physical(raw);
   const double value = binding.factor * physical + binding.shift;
   if (!std::isfinite(physical) || !std::isfinite(value)) {
-    faults.raise(Fault::kInputNotFinite, t);
+    refuse(Fault::kInputNotFinite);
     return;
   }
   // A signed signal of all ones is -1, an ordinary value; it reads as 64 ones.
@@ -135,9 +222,15 @@ void InputMonitor::take(Row& row, const RxFrame& frame, MonoTime t, FaultSet& fa
   const bool in_range =
       row.has_range ? physical >= row.minimum && physical <= row.maximum : !all_ones;
   if (!in_range || (row.is_flag && physical != 0.0 && physical != 1.0)) {
-    faults.raise(Fault::kInputRange, t);
+    refuse(Fault::kInputRange);
     return;
   }
+  if (another) {
+    row.history.clear();
+    row.interval_count = 0;
+    row.quality = SignalQuality::kMissing;  // until update() has judged it
+  }
+  row.source = source;
   if (row.learns) learn(row, t);
   row.history.add(t, value);
 }
@@ -213,6 +306,12 @@ void InputMonitor::update(MonoTime t, FaultSet& faults) noexcept {
 bool InputMonitor::all_valid() const noexcept {
   return std::all_of(required().begin(), required().end(),
                      [&](Role role) { return quality(role) == SignalQuality::kValid; });
+}
+
+bool InputMonitor::suspect() const noexcept {
+  return std::any_of(messages_.begin(), messages_.begin() + message_count_, [](const auto& each) {
+    return each.guard.wrong_rate() || each.guard.invalid();
+  });
 }
 
 bool InputMonitor::any_lost() const noexcept {

@@ -6,17 +6,29 @@
 // those of the DBC. A value is taken when its multiplexer selects it, it is finite, and inside the
 // DBC's range; all bits one in a signal without a range counts as "not available". What is not
 // taken is as if it had not come: the row grows stale.
+//
+// Rate, counter and CRC of each message are judged by frame_guard.h; the rate where its period is
+// configured or in the DBC, and neither the message is multiplexed nor several sources may send it.
+//
+// J1939 and NMEA 2000: a frame is a message's by its parameter group. Where several sources send
+// one group, each row follows one of them: the source address of the DBC's identifier when values
+// come from it, else the first source that gives a value, until the row has grown stale. On a
+// change nothing of the former source stays in the history.
+//
+// A role from diagnostics takes the data of a positive answer as another takes a payload.
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <cstdint>
-#include <limits>
 #include <optional>
 
 #include "daemon/core/config.h"
 #include "daemon/core/faults.h"
+#include "daemon/core/frame_guard.h"
 #include "daemon/core/port.h"
 #include "daemon/core/signal_history.h"
+#include "daemon/core/uds_client.h"
 
 namespace beltgrip::daemon {
 
@@ -39,6 +51,8 @@ class InputMonitor {
   explicit InputMonitor(const Config& config);
 
   FrameUse on_frame(const RxFrame& frame, FaultSet& faults) noexcept;
+  UdsClient& diagnostics() noexcept { return uds_; }
+  const UdsClient& diagnostics() const noexcept { return uds_; }
   // Ages every row to t and raises the faults of the required ones. The first call starts the time
   // after which an input that never came counts as missing.
   void update(MonoTime t, FaultSet& faults) noexcept;
@@ -48,21 +62,28 @@ class InputMonitor {
   const SignalHistory& history(Role role) const noexcept { return row(role).history; }
   // Configured, from the DBC, or learned; nothing until then.
   std::optional<Duration> period(Role role) const noexcept { return row(role).period; }
+  // Configured: how long before its stamp a value was true.
+  Duration delay(Role role) const noexcept { return row(role).delay; }
 
   // The roles without which there is no sample.
   std::span<const Role> required() const noexcept { return {required_.data(), required_count_}; }
   bool all_valid() const noexcept;  // every required role
   bool any_lost() const noexcept;   // a required role stale or frozen
+  bool suspect() const noexcept;    // a message at a wrong rate, or invalid by its protection
 
  private:
   struct Row {
     const RoleBinding* binding = nullptr;
     double minimum = 0.0, maximum = 0.0;  // of the physical value, with half a step to spare
     bool has_range = false;
-    bool is_flag = false;  // 0 or 1
+    bool is_flag = false;                    // 0 or 1
+    bool by_group = false;                   // J1939
+    std::optional<std::uint8_t> own_source;  // of the DBC's identifier, unless it is the null one
+    std::optional<std::uint8_t> source;      // that it follows
     SignalHistory history;
     SignalQuality quality = SignalQuality::kUnbound;
     std::optional<Duration> period;
+    Duration delay = 0;
     bool learns = false;
     std::array<Duration, kLearnIntervals> intervals{};
     std::size_t interval_count = 0;
@@ -75,19 +96,27 @@ class InputMonitor {
     double other = 0.0;
   };
   struct Message {
+    std::uint8_t bus = 0;
     can::CanId id;
+    std::bitset<256> sources;  // J1939; else none
     bool fd = false;
     std::uint8_t length = 0;
     std::uint8_t row_count = 0;
     std::array<std::uint8_t, kRoleCount> rows{};
+    FrameGuard guard;
   };
   static constexpr std::uint8_t kNone = 0xFF;
 
   Row& row(Role role) noexcept { return rows_[static_cast<std::size_t>(role)]; }
   const Row& row(Role role) const noexcept { return rows_[static_cast<std::size_t>(role)]; }
   void bind(const RoleBinding& binding);
-  const Message* message_of(can::CanId id) const noexcept;
-  void take(Row& row, const RxFrame& frame, MonoTime t, FaultSet& faults) noexcept;
+  void guard(Message& message) noexcept;
+  void bind_identifier(const Message& message, std::uint8_t index) noexcept;
+  Message* message_of(std::uint8_t bus, can::CanId id) noexcept;
+  bool is_followed(const Message& message, std::uint8_t source) const noexcept;
+  bool take_reading(const UdsReading& reading, FaultSet& faults) noexcept;
+  void take(Row& row, std::span<const std::uint8_t> payload, std::uint8_t source, MonoTime t,
+            FaultSet& faults) noexcept;
   void learn(Row& row, MonoTime t) noexcept;
   SignalQuality judge(const Row& row, MonoTime t) const noexcept;
   static bool is_frozen(Motion& motion, const Row& row, const Row& other, MonoTime t) noexcept;
@@ -96,13 +125,16 @@ class InputMonitor {
   std::array<Row, kRoleCount> rows_{};
   std::array<Message, kRoleCount> messages_{};
   std::uint8_t message_count_ = 0;
-  std::array<std::uint8_t, can::kStandardIdMax + 1> standard_{};  // identifier -> message
-  static constexpr std::size_t kHashSize = 64;                    // four times the messages
-  std::array<std::uint8_t, kHashSize> extended_{};                // open addressing
+  // Bus and identifier -> message.
+  std::array<std::array<std::uint8_t, can::kStandardIdMax + 1>, kBusMax> standard_{};
+  static constexpr std::size_t kHashSize = 64;  // four times the messages
+  // Open addressing, by what identifies the message: bus, and identifier or parameter group.
+  std::array<std::uint8_t, kHashSize> extended_{};
   std::array<Role, kRoleCount> required_{};
   std::size_t required_count_ = 0;
   Motion primary_motion_, secondary_motion_;
-  MonoTime newest_ = std::numeric_limits<MonoTime>::min();  // stamp of the newest frame taken
+  std::array<MonoTime, kBusMax> newest_;  // stamp of the newest frame taken from each bus
+  UdsClient uds_;
   std::optional<MonoTime> began_;
 };
 

@@ -9,22 +9,29 @@ namespace {
 
 constexpr std::size_t kBatch = 64;
 // Samples that are later than this are given up: the socket's buffer may not have held their
-// frames.
-constexpr Duration kLatenessMaximum = 100 * kMillisecond;
+// frames, and the receiver of a request gives it up after 50 ms of silence.
+constexpr Duration kLatenessMaximum = 45 * kMillisecond;
 
 class Loop {
  public:
-  Loop(Port& port, Pipeline& pipeline, double sample_rate_hz, SampleSink* sink) noexcept
+  Loop(Port& port, Pipeline& pipeline, double sample_rate_hz, SampleSink* sink, LoopMeters* meters,
+       RecordTap* tap) noexcept
       : port_(port),
         pipeline_(pipeline),
         sink_(sink),
+        meters_(meters),
+        tap_(tap),
         period_(std::llround(static_cast<double>(kSecond) / sample_rate_hz)),
-        next_(port.now()) {}
+        next_(port.now()),
+        buses_(static_cast<std::uint8_t>(pipeline.bus_count())) {
+    if (tap_ != nullptr) tap_->start(next_);
+  }
 
   LoopCounters run(estimator::StopReason end_reason) noexcept {
     for (;;) {
       switch (port_.wait_until(next_)) {
         case Wake::kDeadline:
+          if (meters_ != nullptr) meters_->wake_up.add(port_.now() - next_);
           sample();
           break;
         case Wake::kFrames:
@@ -42,9 +49,12 @@ class Loop {
     const std::size_t count = port_.receive(frames_);
     // A port that announces frames and has none must not keep the samples from their turn.
     if (count == 0 && port_.now() >= next_) sample();
+    const MonoTime taken = meters_ != nullptr ? port_.now() : 0;
     for (std::size_t i = 0; i < count; ++i) {
+      if (meters_ != nullptr) meters_->frame_age.add(taken - frames_[i].t);
       // A frame that came after a sample's instant is not seen by that sample, however late it is.
       while (frames_[i].t > next_) sample();
+      if (tap_ != nullptr) tap_->frame(frames_[i]);
       pipeline_.on_frame(frames_[i]);
     }
   }
@@ -52,6 +62,8 @@ class Loop {
   void sample() noexcept {
     const MonoTime now = port_.now();
     const Duration lateness = now - next_;
+    due_ = next_;
+    if (tap_ != nullptr && lateness > period_) tap_->late(due_, now);
     if (lateness > kLatenessMaximum) {
       const std::int64_t lost = lateness / period_;
       next_ += lost * period_;
@@ -61,40 +73,58 @@ class Loop {
       ++counters_.samples_late;
       pipeline_.on_late(next_, false);
     }
-    const BusState state = port_.bus_state();
-    if (state != bus_state_) pipeline_.on_bus_state(state, next_);
-    bus_state_ = state;
+    for (std::uint8_t bus = 0; bus < buses_; ++bus) {
+      const BusState state = port_.bus_state_of(bus);
+      if (state == bus_states_[bus]) continue;
+      if (tap_ != nullptr) tap_->bus(due_, bus, state);
+      pipeline_.on_bus_state(state, next_, bus);
+      bus_states_[bus] = state;
+    }
 
     outbox_.size = 0;
     const SampleReport& report = pipeline_.on_sample(next_, outbox_);
     send();
+    if (meters_ != nullptr) {
+      if (outbox_.size != 0) meters_->sample_to_frame.add(port_.now() - next_);
+      meters_->counters = counters_;
+    }
+    if (tap_ != nullptr) tap_->sampled(report);
     if (sink_ != nullptr) sink_->on_report(report);
     next_ += period_;
   }
 
   void end(estimator::StopReason reason) noexcept {
     outbox_.size = 0;
-    const SampleReport& report = pipeline_.on_end(port_.now(), reason, outbox_);
+    const MonoTime now = port_.now();
+    if (tap_ != nullptr) tap_->end(now);
+    const SampleReport& report = pipeline_.on_end(now, reason, outbox_);
     send();
     if (sink_ != nullptr) sink_->on_report(report);
   }
 
   void send() noexcept {
     for (std::size_t i = 0; i < outbox_.size; ++i) {
-      const SendResult result = port_.send(outbox_.frames[i]);
+      const SendResult result = port_.send_on(outbox_.bus[i], outbox_.frames[i]);
       if (result == SendResult::kSent) continue;
       ++counters_.sends_failed;
+      if (tap_ != nullptr) tap_->failed(due_, outbox_.bus[i], outbox_.frames[i].id.value, result);
       // A link that is down has a fault of its own.
-      if (result != SendResult::kDown) pipeline_.on_send_failed(outbox_.frames[i], next_);
+      if (result != SendResult::kDown) {
+        pipeline_.on_send_failed(outbox_.frames[i], next_, outbox_.bus[i]);
+      }
     }
   }
 
   Port& port_;
   Pipeline& pipeline_;
   SampleSink* sink_;
+  LoopMeters* meters_;
+  RecordTap* tap_;
   Duration period_;
   MonoTime next_;
-  BusState bus_state_ = BusState::kActive;
+  MonoTime due_ = 0;                            // of the sample under way, before any were given up
+  std::array<BusState, kBusMax> bus_states_{};  // kActive
+  std::uint8_t buses_;
   LoopCounters counters_;
   Outbox outbox_;
   std::array<RxFrame, kBatch> frames_{};
@@ -103,8 +133,9 @@ class Loop {
 }  // namespace
 
 LoopCounters run_loop(Port& port, Pipeline& pipeline, double sample_rate_hz,
-                      estimator::StopReason end_reason, SampleSink* sink) noexcept {
-  return Loop(port, pipeline, sample_rate_hz, sink).run(end_reason);
+                      estimator::StopReason end_reason, SampleSink* sink, LoopMeters* meters,
+                      RecordTap* tap) noexcept {
+  return Loop(port, pipeline, sample_rate_hz, sink, meters, tap).run(end_reason);
 }
 
 }  // namespace beltgrip::daemon

@@ -3,8 +3,10 @@
 // closed.
 #pragma once
 
+#include "daemon/core/latency_histogram.h"
 #include "daemon/core/pipeline.h"
 #include "daemon/core/port.h"
+#include "daemon/core/record_tap.h"
 
 namespace beltgrip::daemon {
 
@@ -20,11 +22,20 @@ struct LoopCounters {
   std::uint64_t sends_failed = 0;
 };
 
+// What the loop measures of itself while it runs, where somebody asks for it.
+struct LoopMeters {
+  LoopCounters counters;
+  LatencyHistogram wake_up;          // from a sample's instant to the return of the wait for it
+  LatencyHistogram sample_to_frame;  // from a sample's instant until the port had its frames
+  LatencyHistogram frame_age;        // from a frame's stamp to its turn here
+};
+
 // The sample grid starts at port.now() as it is when run_loop is called: the first frame's stamp
 // for a Port in log time. Samples that could not be taken in time are taken late, in order and with
 // the frames that had come by their instants, so a late loop decides what a punctual one would
 // have.
 LoopCounters run_loop(Port& port, Pipeline& pipeline, double sample_rate_hz,
-                      estimator::StopReason end_reason, SampleSink* sink) noexcept;
+                      estimator::StopReason end_reason, SampleSink* sink,
+                      LoopMeters* meters = nullptr, RecordTap* tap = nullptr) noexcept;
 
 }  // namespace beltgrip::daemon

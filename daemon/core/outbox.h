@@ -4,19 +4,23 @@
 #include <array>
 #include <cassert>
 #include <cstddef>
+#include <cstdint>
 
 #include "can_dbc/can_frame.h"
 
 namespace beltgrip::daemon {
 
 struct Outbox {
-  static constexpr std::size_t kCapacity = 12;
+  // Own frames at the most at the end; a request or a flow control to each ECU otherwise.
+  static constexpr std::size_t kCapacity = 32;
   std::array<can::CanFrame, kCapacity> frames;
+  std::array<std::uint8_t, kCapacity> bus;  // of each
   std::size_t size = 0;
 
-  void push(const can::CanFrame& frame) noexcept {
+  void push(const can::CanFrame& frame, std::uint8_t on_bus = 0) noexcept {
     assert(size < kCapacity);
-    frames[size++] = frame;
+    frames[size] = frame;
+    bus[size++] = on_bus;
   }
 };
 

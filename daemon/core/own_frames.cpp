@@ -120,7 +120,7 @@ can::CanFrame OwnFrames::pack(const EstimateValues& values, std::uint8_t counter
   put(frame, estimate_.mu_max, kind == PeakKind::kNone ? 0.0 : values.mu_max);
   put_rounded_up(frame, estimate_.mu_max_std, value ? values.mu_max_std : 0.0);
   put(frame, estimate_.count, values.experiment_count);
-  if (value && values.min_clamp_force_N && std::isfinite(*values.min_clamp_force_N)) {
+  if (values.min_clamp_force_N && std::isfinite(*values.min_clamp_force_N)) {
     put_rounded_up(frame, estimate_.min_force, *values.min_clamp_force_N);
   } else {
     put_or_not_available(frame, estimate_.min_force, false, 0.0);

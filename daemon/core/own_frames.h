@@ -36,7 +36,7 @@ struct EstimateValues {
   double mu_max = 0.0;      // value or lower bound
   double mu_max_std = 0.0;  // with kValue only
   std::uint8_t experiment_count = 0;
-  std::optional<double> min_clamp_force_N;
+  std::optional<double> min_clamp_force_N;  // of the last value, or of the history
 };
 
 struct SlipValues {

@@ -1,9 +1,12 @@
 #include "daemon/core/pipeline.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "daemon/core/bus_error.h"
 #include "daemon/core/pipeline_parts.h"
+#include "estimator/sensor_error.h"
 
 namespace beltgrip::daemon {
 
@@ -15,11 +18,15 @@ namespace {
 // More calls than an evaluation takes; at the end there is no next sample to go on with it.
 constexpr int kConcludeCallsMax = 1'000'000;
 
-// Two periods of BeltGripClamp and the jitter of one sample.
-constexpr Duration kConfirmationMax = 25 * kMillisecond;
+// Two periods of BeltGripClamp.
+constexpr Duration kConfirmationMax = 20 * kMillisecond;
+constexpr Duration kConfirmationRetry = kSecond;  // then the frame is taken for lost
 
-constexpr double kPedalMoved = 0.05;   // while a request stands: the driver wants something
-constexpr double kBoundMargin = 0.97;  // of mu* carried without a ramp
+constexpr Duration kStillComing = 50 * kMillisecond;
+
+constexpr double kPedalMoved = 0.05;    // while a request stands: the driver wants something
+constexpr double kSlipOfAPeak = 0.007;  // since the start: less of it has passed no peak
+constexpr double kBoundMargin = 0.97;   // of mu* carried without a ramp
 
 bool in_experiment(State state) noexcept {
   return state == State::kRamping || state == State::kEvaluating || state == State::kReleasing;
@@ -34,6 +41,7 @@ StopReason reason_of(SafetyVerdict verdict) noexcept {
     case SafetyVerdict::kEnergy:
       return StopReason::kSlipEnergy;
     case SafetyVerdict::kSpeed:
+    case SafetyVerdict::kEngine:
       return StopReason::kEngineSpeed;
     case SafetyVerdict::kDuration:
       return StopReason::kTime;
@@ -51,17 +59,23 @@ StopReason reason_of(SafetyVerdict verdict) noexcept {
 void Pipeline::on_frame(const RxFrame& frame) noexcept {
   Parts& parts = *parts_;
   ++parts.counters.frames;
+  if (frame.bus >= kBusMax) return;
+  Parts::BusHealth& bus = parts.buses[frame.bus];
   if (frame.dropped_before != 0) parts.faults.raise(Fault::kFramesLost, frame.t);
   if (frame.frame.error) {
     const std::optional<BusState> state = bus_state_of(frame.frame);
-    if (state) parts.controller = *state;
+    if (state) bus.controller = *state;
+    if (state == BusState::kOff) bus.off_since = frame.t;
     return;
   }
   switch (parts.inputs.on_frame(frame, parts.faults)) {
     case FrameUse::kTaken:
       ++parts.counters.frames_decoded;
-      // A controller that is off the bus hears nothing: it has come back.
-      if (parts.controller == BusState::kOff) parts.controller = BusState::kActive;
+      // A controller that is off the bus hears nothing: it has come back. What it had heard before
+      // may still be on its way.
+      if (bus.controller == BusState::kOff && frame.t - bus.off_since > kStillComing) {
+        bus.controller = BusState::kActive;
+      }
       break;
     case FrameUse::kBad:
       ++parts.counters.frames_bad;
@@ -73,7 +87,7 @@ void Pipeline::on_frame(const RxFrame& frame) noexcept {
 }
 
 void Pipeline::Parts::take_own_frame(const RxFrame& frame) noexcept {
-  if (frame.frame.id.extended) return;
+  if (frame.bus != 0 || frame.frame.id.extended) return;
   if (frame.own_echo) {
     if (frame.frame.id.value == config.identifiers.clamp) clamp_unconfirmed = false;
     return;
@@ -85,12 +99,13 @@ void Pipeline::Parts::take_own_frame(const RxFrame& frame) noexcept {
   }
 }
 
-void Pipeline::on_bus_state(BusState state, MonoTime) noexcept {
+void Pipeline::on_bus_state(BusState state, MonoTime, std::uint8_t bus) noexcept {
+  Parts::BusHealth& health = parts_->buses[bus];
   // A link that comes up again begins with a fresh controller.
-  if (state == BusState::kActive && parts_->link != BusState::kActive) {
-    parts_->controller = BusState::kActive;
+  if (state == BusState::kActive && health.link != BusState::kActive) {
+    health.controller = BusState::kActive;
   }
-  parts_->link = state;
+  health.link = state;
 }
 
 void Pipeline::on_late(MonoTime t, bool lost) noexcept {
@@ -98,17 +113,44 @@ void Pipeline::on_late(MonoTime t, bool lost) noexcept {
   parts_->samples_lost = parts_->samples_lost || lost;
 }
 
-void Pipeline::on_send_failed(const can::CanFrame& frame, MonoTime t) noexcept {
+void Pipeline::on_send_failed(const can::CanFrame& frame, MonoTime t, std::uint8_t bus) noexcept {
   parts_->faults.raise(Fault::kSendFailed, t);
-  if (frame.id.value == parts_->config.identifiers.clamp) parts_->clamp_refused = true;
+  parts_->inputs.diagnostics().on_send_failed(frame, bus, t);
+  if (bus == 0 && frame.id.value == parts_->config.identifiers.clamp) parts_->clamp_refused = true;
 }
 
 // --- one sample -----------------------------------------------------------------------------
 
 void Pipeline::Parts::raise_bus_faults(MonoTime t) noexcept {
-  if (link == BusState::kDown || link == BusState::kAbsent) faults.raise(Fault::kBusDown, t);
-  if (controller == BusState::kOff) faults.raise(Fault::kBusOff, t);
-  if (controller == BusState::kPassive) faults.raise(Fault::kBusPassive, t);
+  for (const BusHealth& bus : buses) {
+    if (bus.link == BusState::kDown || bus.link == BusState::kAbsent) {
+      faults.raise(Fault::kBusDown, t);
+    }
+    if (bus.controller == BusState::kOff) faults.raise(Fault::kBusOff, t);
+    if (bus.controller == BusState::kPassive) faults.raise(Fault::kBusPassive, t);
+  }
+}
+
+bool Pipeline::Parts::buses_up() const noexcept {
+  return std::all_of(buses.begin(), buses.end(),
+                     [](const BusHealth& bus) { return !bus.needed || bus.up(); });
+}
+
+void Pipeline::learn(const estimator::LearnedFriction& learned) noexcept {
+  parts_->learned = learned;
+}
+
+void Pipeline::Parts::raise_history_faults(MonoTime t) noexcept {
+  if (learned.doubtful || contradictory) faults.raise(Fault::kResultDoubtful, t);
+  if (learned.unwritten) faults.raise(Fault::kHistoryUnwritten, t);
+}
+
+// mu_max at the present direction and end stop: of all experiments where they are kept, else of the
+// last; 0: not known.
+double Pipeline::Parts::friction_known() const noexcept {
+  const estimator::FusedFriction& fused = learned.of(last.curve.direction, last.curve.end_stop);
+  if (fused.known) return fused.mu_max;
+  return estimate.kind == PeakKind::kValue ? estimate.mu_max : 0.0;
 }
 
 bool Pipeline::Parts::by_conditions() const noexcept {
@@ -149,12 +191,17 @@ Duration Pipeline::Parts::slowest_stale() const noexcept {
   return slowest;
 }
 
+// The clamp force in the transmission's own measure, which requests are made in.
+double Pipeline::Parts::measured_force_N() const noexcept {
+  return last.curve.clamp_force_N - (correction ? correction->force_error_N() : 0.0);
+}
+
 ClampRequest::Now Pipeline::Parts::request_now(MonoTime t) const noexcept {
   return {t,
           last.sample.omega_p_rad_s,
           last.sample.omega_s_rad_s,
           last.curve.torque_p_Nm,
-          last.curve.clamp_force_N,
+          measured_force_N(),
           last.curve.mu_star};
 }
 
@@ -168,15 +215,30 @@ void Pipeline::Parts::arm(MonoTime t) noexcept {
   now.cooled = !commands() || request.cooled();
   now.faulted =
       commands() && (faults.has(Fault::kForeignSender) || faults.has(Fault::kFrameRefused) ||
-                     faults.has(Fault::kBusPassive) || faults.has(Fault::kSampleLate));
+                     faults.has(Fault::kBusPassive) || faults.has(Fault::kSampleLate) ||
+                     faults.has(Fault::kBusOff) || faults.has(Fault::kBusDown) ||
+                     faults.has(Fault::kSendFailed) || inputs.suspect() || unconfirmed(t));
   now.omega_p_rad_s = last.sample.omega_p_rad_s;
   now.omega_s_rad_s = last.sample.omega_s_rad_s;
   now.torque_Nm = last.curve.torque_p_Nm;
-  now.clamp_force_N = last.curve.clamp_force_N;
+  now.clamp_force_N = measured_force_N();
   now.mu_max_known = estimate.kind == PeakKind::kValue ? estimate.mu_max : 0.0;
   now.stale = slowest_stale();
   now.conditions = conditions;
   arming.step(now);
+}
+
+// Nobody has confirmed what was asked: it may not be on the bus at all.
+bool Pipeline::Parts::unconfirmed(MonoTime t) const noexcept {
+  return clamp_unconfirmed && t - clamp_sent >= kConfirmationMax;
+}
+
+// A frame that was lost with its bus is never confirmed. Inactive frames tell whether the bus is
+// back, and the receiver that the request is over.
+void Pipeline::Parts::ask_again(MonoTime t) noexcept {
+  if (!clamp_unconfirmed || in_experiment(state) || t - clamp_sent < kConfirmationRetry) return;
+  clamp_unconfirmed = false;
+  if (!faults.has(Fault::kForeignSender)) publisher.repeat_inactive();
 }
 
 void Pipeline::Parts::withdraw(StopReason reason) noexcept {
@@ -189,7 +251,7 @@ void Pipeline::Parts::step_request(MonoTime t) noexcept {
   backup_stop = withdrawn = StopReason::kNone;
   if (!commands()) return;
   if (state == State::kRamping) {
-    if (!conditions.fresh) withdraw(StopReason::kInputs);
+    if (!conditions.fresh || inputs.suspect()) withdraw(StopReason::kInputs);
     if (!conditions.permitted) withdraw(StopReason::kPermission);
     const bool coast = config.trigger == Trigger::kCoastDown;
     if (conditions.brake_pressed || (coast && conditions.accelerator > kPedalMoved)) {
@@ -200,7 +262,7 @@ void Pipeline::Parts::step_request(MonoTime t) noexcept {
       withdraw(StopReason::kPermission);
     }
     if (clamp_refused || faults.has(Fault::kForeignSender) || faults.has(Fault::kFrameRefused) ||
-        (clamp_unconfirmed && t - clamp_sent > kConfirmationMax)) {
+        unconfirmed(t)) {
       withdraw(StopReason::kBus);
     }
     if (last.sample.usable && last.curve.usable) {
@@ -213,13 +275,16 @@ void Pipeline::Parts::step_request(MonoTime t) noexcept {
   }
   clamp_refused = false;
   SafetySignals signals;
-  signals.fresh = !inputs.any_lost() && !samples_lost && conditions.fresh;
+  signals.fresh = !inputs.any_lost() && !inputs.suspect() && !samples_lost && conditions.fresh;
   signals.omega_p_rad_s = last.sample.omega_p_rad_s;
   signals.omega_s_rad_s = last.sample.omega_s_rad_s;
   signals.torque_Nm = last.sample.torque_Nm;
   signals.primary_radius_m = signals.omega_s_rad_s > signals.omega_p_rad_s
                                  ? config.variator.primary_radius_overdrive_m
                                  : config.variator.primary_radius_low_m;
+  bool engine_known = inputs.is_bound(Role::kEngineSpeed);
+  const double omega_e_rad_s = value_or(Role::kEngineSpeed, 0.0, engine_known);
+  signals.omega_e_rad_s = engine_known ? omega_e_rad_s : 0.0;
   const SafetyVerdict verdict =
       safety.check(t, signals, state == State::kRamping ? request.force_N() : 0.0);
   if (verdict == SafetyVerdict::kAllowed) return;
@@ -235,9 +300,7 @@ Guards Pipeline::Parts::guards(MonoTime t) const noexcept {
   Guards now;
   now.inputs_usable = last.sample.usable;
   now.inputs_lost = inputs.any_lost() || samples_lost;
-  now.bus_up =
-      (link == BusState::kActive || link == BusState::kWarning || link == BusState::kPassive) &&
-      controller != BusState::kOff;
+  now.bus_up = buses_up();
   now.triggered = triggered();
   now.settled = !by_conditions() || arming.settled();
   now.cleared = !commands() || arming.cleared();
@@ -254,7 +317,7 @@ Guards Pipeline::Parts::guards(MonoTime t) const noexcept {
 }
 
 void Pipeline::Parts::step(MonoTime t) noexcept {
-  last.curve = estimator->step(last.sample);
+  last.curve = estimator->step(correction ? correction->correct(last.sample) : last.sample);
   if (state == State::kRamping && last.sample.usable) ++running.samples;
   // Outside an experiment the estimator only watches; what would have stopped it (a ratio that is
   // no end stop's, torque that changes its sign) starts it afresh.
@@ -272,6 +335,13 @@ void Pipeline::Parts::stop(MonoTime t, StopReason reason) noexcept {
   running.sigma_stop_percent = std::abs(last.curve.sigma_star_percent);
   running.direction = last.curve.direction;
   running.end_stop = last.curve.end_stop;
+  running.omega_p_rad_s = last.sample.omega_p_rad_s;
+  running.omega_s_rad_s = last.sample.omega_s_rad_s;
+  running.torque_Nm = last.curve.torque_p_Nm;
+  running.clamp_force_N = last.curve.clamp_force_N;
+  const bool oil_known = inputs.quality(Role::kOilTemperature) == SignalQuality::kValid;
+  running.oil_degC = oil_known ? inputs.history(Role::kOilTemperature).newest_value()
+                               : std::numeric_limits<double>::quiet_NaN();
 }
 
 Outcome Pipeline::Parts::judged_outcome() const noexcept {
@@ -280,9 +350,14 @@ Outcome Pipeline::Parts::judged_outcome() const noexcept {
 
 void Pipeline::Parts::publish_result(Outcome outcome) noexcept {
   running.outcome = outcome;
+  running.sensor_std =
+      running.peak.mu_max * estimator::relative_sensor_deviation(
+                                config.variator, config.sensors, std::abs(running.torque_Nm),
+                                running.clamp_force_N, running.omega_s_rad_s);
   result = running;
   last.new_result = true;
   if (outcome == Outcome::kAborted) return;  // says nothing of mu_max: the last result stands
+  contradictory = running.peak.contradictory;
   // Neither does a bound below what is known: coast-downs without a ramp come all the time.
   const bool weaker = running.peak.kind != PeakKind::kValue && estimate.kind == PeakKind::kValue &&
                       running.peak.mu_max <= estimate.mu_max;
@@ -334,7 +409,13 @@ void Pipeline::Parts::apply(const Transition& transition, MonoTime t) noexcept {
       break;
     case Action::kPublish:
       running.peak = estimator->peak();
-      if (refused) bound_only();
+      if (refused) {
+        bound_only();
+      } else if (commands() && running.peak.kind == PeakKind::kValue &&
+                 request.slip_max() < kSlipOfAPeak) {
+        running.peak.kind = PeakKind::kLowerBound;
+        running.peak.mu_max = running.peak.ci95_low;
+      }
       publish_result(judged_outcome());
       break;
     case Action::kOver:
@@ -363,7 +444,10 @@ const SampleReport& Pipeline::on_sample(MonoTime t, Outbox& outbox) noexcept {
   parts.faults.expire(t);
   parts.inputs.update(t, parts.faults);
   parts.raise_bus_faults(t);
+  parts.raise_history_faults(t);
   parts.last.sample = parts.sampler.sample(t, !in_experiment(parts.state));
+
+  parts.ask_again(t);
 
   // An experiment begins before the sample is used and stops after it.
   if (parts.by_conditions()) parts.arm(t);
@@ -391,6 +475,7 @@ const SampleReport& Pipeline::on_sample(MonoTime t, Outbox& outbox) noexcept {
   Outbox wanted;
   parts.report(t);
   parts.publisher.collect(t, parts.publication(), wanted);
+  parts.inputs.diagnostics().step(t, {parts.buses[0].up(), parts.buses[1].up()}, wanted);
   parts.pass_gate(wanted, outbox);
   return parts.last;
 }
@@ -426,6 +511,7 @@ void Pipeline::Parts::report(MonoTime t) noexcept {
   last.state = state;
   last.in_experiment = in_experiment(state);
   last.macro_slip_stop = macro_slip_stop;
+  last.stop_reason = macro_slip_stop ? running.stop_reason : StopReason::kNone;
   last.result = result;
   last.faults = faults.bits();
   last.inhibits = by_conditions() ? arming.inhibits() : 0U;
@@ -441,14 +527,15 @@ Publication Pipeline::Parts::publication() const noexcept {
   now.new_result = estimate_changed;
   now.estimate = estimate;
   const estimator::CurveEstimate& curve = last.curve;
-  if (estimate.kind == PeakKind::kValue && curve.usable && last.sample.usable) {
+  const double friction = friction_known();
+  if (friction > 0.0 && curve.usable && last.sample.usable) {
     const estimator::VariatorParameters& variator = config.variator;
     const double radius_m = curve.end_stop == estimator::EndStop::kOverdrive
                                 ? variator.primary_radius_overdrive_m
                                 : variator.primary_radius_low_m;
     now.estimate.min_clamp_force_N = variator.safety_factor * std::abs(curve.torque_p_Nm) *
                                      std::cos(variator.half_wedge_angle_rad) /
-                                     (2.0 * radius_m * estimate.mu_max);
+                                     (2.0 * radius_m * friction);
   }
   now.slip.macro_slip_stop = macro_slip_stop;
   now.slip.phase = curve.phase;
@@ -462,19 +549,63 @@ Publication Pipeline::Parts::publication() const noexcept {
 
 void Pipeline::Parts::pass_gate(const Outbox& wanted, Outbox& outbox) noexcept {
   for (std::size_t i = 0; i < wanted.size; ++i) {
-    if (!gate.permits(wanted.frames[i])) {
+    if (!gate.permits(wanted.frames[i], wanted.bus[i], last.t)) {
       faults.latch(Fault::kFrameRefused);
       continue;
     }
-    outbox.push(wanted.frames[i]);
-    if (wanted.frames[i].id.value == config.identifiers.clamp && !clamp_unconfirmed) {
+    outbox.push(wanted.frames[i], wanted.bus[i]);
+    if (wanted.bus[i] == 0 && wanted.frames[i].id.value == config.identifiers.clamp &&
+        !clamp_unconfirmed) {
       clamp_unconfirmed = true;
       clamp_sent = last.t;
     }
   }
-  counters.frames_refused = gate.refused();
+  counters.frames_refused = refused_before + gate.refused();
+  counters.diagnostics = inputs.diagnostics().counters();
+}
+
+// --- another configuration ------------------------------------------------------------------
+
+void Pipeline::Parts::go_on_from(const Parts& before, bool keeps_results) noexcept {
+  publisher.go_on_from(before.publisher);
+  faults = before.faults;
+  counters = before.counters;
+  refused_before = before.counters.frames_refused;
+  // A controller that kept a request is not to be asked again before a restart.
+  if (before.state == State::kFault) state = State::kFault;
+  for (std::size_t i = 0; i < kBusMax; ++i) {
+    const bool needed = buses[i].needed;
+    buses[i] = before.buses[i];
+    buses[i].needed = needed;
+  }
+  clamp_unconfirmed = before.clamp_unconfirmed;
+  clamp_sent = before.clamp_sent;
+  last.t = before.last.t;
+  // What was found is no less found under a configuration that it does not hold for.
+  estimate.experiment_count = before.estimate.experiment_count;
+  if (!keeps_results) return;
+  estimate = before.estimate;
+  result = before.result;
+  learned = before.learned;
+}
+
+void Pipeline::give_way_to(Pipeline& next, bool keeps_results) noexcept {
+  next.parts_->go_on_from(*parts_, keeps_results);
+  parts_.swap(next.parts_);
 }
 
 const PipelineCounters& Pipeline::counters() const noexcept { return parts_->counters; }
+
+std::size_t Pipeline::bus_count() const noexcept { return parts_->config.further_bus ? 2 : 1; }
+
+SignalObservation Pipeline::signal(Role role) const noexcept {
+  const SignalHistory& history = parts_->inputs.history(role);
+  SignalObservation seen{.quality = parts_->inputs.quality(role), .seen = !history.empty()};
+  if (seen.seen) {
+    seen.value = history.newest_value();
+    seen.t = history.newest();
+  }
+  return seen;
+}
 
 }  // namespace beltgrip::daemon

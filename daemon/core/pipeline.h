@@ -11,8 +11,10 @@
 #include "daemon/core/config.h"
 #include "daemon/core/experiment.h"
 #include "daemon/core/faults.h"
+#include "daemon/core/input_monitor.h"
 #include "daemon/core/outbox.h"
 #include "daemon/core/port.h"
+#include "estimator/belt_history.h"
 #include "estimator/slip_curve_estimator.h"
 
 namespace beltgrip::daemon {
@@ -23,6 +25,7 @@ struct SampleReport {
   State state = State::kInhibited;
   bool in_experiment = false;
   bool macro_slip_stop = false;
+  estimator::StopReason stop_reason = estimator::StopReason::kNone;  // while macro_slip_stop
   estimator::VariatorSample sample;
   estimator::CurveEstimate curve;
   bool new_result = false;       // an experiment has come to its outcome with this sample
@@ -33,12 +36,21 @@ struct SampleReport {
   double ramp_N_per_s = 0.0;     // of the request that stands
 };
 
+// The newest value of a role, as received.
+struct SignalObservation {
+  SignalQuality quality = SignalQuality::kUnbound;
+  bool seen = false;
+  double value = 0.0;  // SI
+  MonoTime t = 0;      // its stamp
+};
+
 struct PipelineCounters {
   std::uint64_t frames = 0;          // offered
   std::uint64_t frames_decoded = 0;  // of a message that carries a role, taken
   std::uint64_t frames_bad = 0;      // of such a message, but wrong length, kind or protection
   std::uint64_t samples = 0;
   std::uint64_t frames_refused = 0;  // by the transmit gate
+  UdsCounters diagnostics;
 };
 
 class Pipeline {
@@ -52,16 +64,24 @@ class Pipeline {
   // no echo comes from a foreign sender, which latches a fault.
   void on_frame(const RxFrame& frame) noexcept;
   // The link as the Port sees it; the controller's state comes with its error frames.
-  void on_bus_state(BusState state, MonoTime t) noexcept;
+  void on_bus_state(BusState state, MonoTime t, std::uint8_t bus = 0) noexcept;
   // A sample at t was taken late, or (lost) samples before t were not taken at all.
   void on_late(MonoTime t, bool lost) noexcept;
-  void on_send_failed(const can::CanFrame& frame, MonoTime t) noexcept;
+  void on_send_failed(const can::CanFrame& frame, MonoTime t, std::uint8_t bus = 0) noexcept;
   // The sample at t: decides and leaves in outbox what must be sent now.
   const SampleReport& on_sample(MonoTime t, Outbox& outbox) noexcept;
   // The end (stop request, end of a log): ends a running experiment and leaves the last frames. Its
   // report has no sample of its own (sample.usable is false).
   const SampleReport& on_end(MonoTime t, estimator::StopReason reason, Outbox& outbox) noexcept;
+  // What all experiments together say, from the next sample on: MinClampForce rests on it.
+  void learn(const estimator::LearnedFriction& learned) noexcept;
+  // Between two samples, while no experiment runs: this becomes `next`, which has not been used
+  // yet, and next becomes what this was. Inputs begin anew; the bus, its faults, the counters of
+  // frames, and with `keeps_results` what was found so far, go on.
+  void give_way_to(Pipeline& next, bool keeps_results) noexcept;
   const PipelineCounters& counters() const noexcept;
+  std::size_t bus_count() const noexcept;  // that it listens to
+  SignalObservation signal(Role role) const noexcept;
 
  private:
   struct Parts;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "daemon/core/arming.h"
 #include "daemon/core/clamp_request.h"
@@ -11,13 +12,16 @@
 #include "daemon/core/safety_monitor.h"
 #include "daemon/core/sampler.h"
 #include "daemon/core/tx_gate.h"
+#include "estimator/input_correction.h"
 
 namespace beltgrip::daemon {
 
 struct Pipeline::Parts {
   explicit Parts(const Config& config);
 
+  void go_on_from(const Parts& before, bool keeps_results) noexcept;
   void take_own_frame(const RxFrame& frame) noexcept;
+  bool buses_up() const noexcept;  // those that are needed
   void raise_bus_faults(MonoTime t) noexcept;
   bool by_conditions() const noexcept;  // trigger "coast_down" or "steady"
   bool commands() const noexcept { return config.control == Control::kCommand; }
@@ -25,9 +29,12 @@ struct Pipeline::Parts {
   double value_or(Role role, double otherwise, bool& fresh) const noexcept;
   Conditions read_conditions() const noexcept;
   Duration slowest_stale() const noexcept;
+  double measured_force_N() const noexcept;
   ClampRequest::Now request_now(MonoTime t) const noexcept;
   void arm(MonoTime t) noexcept;
   void step_request(MonoTime t) noexcept;
+  bool unconfirmed(MonoTime t) const noexcept;
+  void ask_again(MonoTime t) noexcept;
   void withdraw(estimator::StopReason reason) noexcept;
   Guards guards(MonoTime t) const noexcept;
   void apply(const Transition& transition, MonoTime t) noexcept;
@@ -36,6 +43,8 @@ struct Pipeline::Parts {
   void bound_only() noexcept;
   void publish_result(Outcome outcome) noexcept;
   Outcome judged_outcome() const noexcept;
+  void raise_history_faults(MonoTime t) noexcept;
+  double friction_known() const noexcept;
   void report(MonoTime t) noexcept;
   Publication publication() const noexcept;
   void pass_gate(const Outbox& wanted, Outbox& outbox) noexcept;
@@ -43,12 +52,14 @@ struct Pipeline::Parts {
   Config config;
   InputMonitor inputs;
   Sampler sampler;
+  std::optional<estimator::InputCorrection> correction;  // where the configuration names a model
   std::unique_ptr<estimator::SlipCurveEstimator> estimator;
   Publisher publisher;
   TxGate gate;
   FaultSet faults;
   PipelineCounters counters;
-  SampleReport last;  // as reported
+  std::uint64_t refused_before = 0;  // under the configurations before this one
+  SampleReport last;                 // as reported
   Arming arming;
   ClampRequest request;
   SafetyMonitor safety;
@@ -60,15 +71,27 @@ struct Pipeline::Parts {
   bool refused = false;       // the experiment under way never began
   estimator::StopReason backup_stop = estimator::StopReason::kNone;  // at this sample
   estimator::StopReason withdrawn = estimator::StopReason::kNone;    // at this sample
-  bool clamp_refused = false;               // by the gate, or by the port: since the last sample
-  bool clamp_unconfirmed = false;           // a clamp frame waits for its echo
-  MonoTime clamp_sent = 0;                  // the first that waits
-  bool estimate_changed = false;            // with this sample
-  ExperimentResult running;                 // the experiment under way
-  ExperimentResult result;                  // the last that came to its outcome
-  EstimateValues estimate;                  // the last that had a result
-  BusState link = BusState::kActive;        // as the port sees it
-  BusState controller = BusState::kActive;  // as error frames tell it
+  bool clamp_refused = false;          // by the gate, or by the port: since the last sample
+  bool clamp_unconfirmed = false;      // a clamp frame waits for its echo
+  MonoTime clamp_sent = 0;             // the first that waits
+  bool estimate_changed = false;       // with this sample
+  ExperimentResult running;            // the experiment under way
+  ExperimentResult result;             // the last that came to its outcome
+  EstimateValues estimate;             // the last that had a result
+  estimator::LearnedFriction learned;  // over all experiments, where they are kept
+  bool contradictory = false;          // the last result, in itself
+
+  struct BusHealth {
+    bool needed = false;                      // an experiment cannot go on without it
+    BusState link = BusState::kActive;        // as the port sees it
+    BusState controller = BusState::kActive;  // as error frames tell it
+    MonoTime off_since = 0;                   // with kOff
+    bool up() const noexcept {
+      return link != BusState::kDown && link != BusState::kAbsent && link != BusState::kOff &&
+             controller != BusState::kOff;
+    }
+  };
+  std::array<BusHealth, kBusMax> buses;
 };
 
 }  // namespace beltgrip::daemon

@@ -1,4 +1,5 @@
 // Construction of the pipeline: all its memory is taken here, at start-up.
+#include <algorithm>
 #include <cmath>
 
 #include "daemon/core/pipeline_parts.h"
@@ -31,6 +32,28 @@ ClampLimits clamp_limits(const Config& config) {
   return {config.variator.secondary_spring_force_N,
           config.estimator.ramp_rate_max_N_per_s * kFrameMax_s + kRounding_N, kFramesMax};
 }
+
+// Every identifier that may be asked for, once, at the shortest period of its roles.
+PollLimits poll_limits(const Config& config) {
+  PollLimits limits;
+  if (config.diagnostics != Diagnostics::kPoll) return limits;
+  for (const RoleBinding& role : config.roles) {
+    if (!role.uds || !role.period_ms) continue;
+    const auto period = static_cast<Duration>(*role.period_ms * static_cast<double>(kMillisecond));
+    const auto end = limits.requests.begin() + static_cast<std::ptrdiff_t>(limits.size);
+    const auto same = std::find_if(limits.requests.begin(), end, [&](const auto& each) {
+      return each.bus == role.bus && each.id == role.uds->request &&
+             each.identifier == role.uds->identifier;
+    });
+    if (same != end) {
+      same->period = std::min(same->period, period);
+    } else {
+      *same = {role.bus, role.uds->request, role.uds->identifier, period};
+      ++limits.size;
+    }
+  }
+  return limits;
+}
 }  // namespace
 
 Pipeline::Parts::Parts(const Config& given)
@@ -40,11 +63,22 @@ Pipeline::Parts::Parts(const Config& given)
       estimator(
           estimator::make_slip_curve_estimator(config.estimator, config.variator, config.sensors)),
       publisher(config.identifiers, sample_period(config)),
-      gate(config.identifiers, config.control, clamp_limits(config)),
+      gate(config.identifiers, config.control, clamp_limits(config), poll_limits(config)),
       arming(config),
       request(config),
       safety(safety_limits(config)) {
+  if (config.corrected) {
+    correction.emplace(*config.corrected, config.variator, config.estimator.sample_rate_hz);
+  }
   estimator->reset();
+  // A request to the transmission rests on every input that is there.
+  buses[0].needed = true;
+  for (const RoleBinding& role : config.roles) {
+    const auto required = inputs.required();
+    const bool is_required =
+        std::find(required.begin(), required.end(), role.role) != required.end();
+    if (is_required || commands()) buses[role.bus].needed = true;
+  }
 }
 
 Pipeline::Pipeline(const Config& config) : parts_(std::make_unique<Parts>(config)) {}

@@ -12,12 +12,23 @@
 
 namespace beltgrip::daemon {
 
+// Bus 0 is [bus] of the configuration, where BeltGrip's own frames go; 1 is the further one.
+inline constexpr std::size_t kBusMax = 2;
+
 struct RxFrame {
   MonoTime t = 0;  // arrival, monotonic; never later than now()
   can::CanFrame frame;
   bool own_echo = false;             // our own frame, confirmed as sent (a log's port leaves our
                                      // identifiers out: elsewhere they mean a foreign sender)
   std::uint32_t dropped_before = 0;  // frames the kernel lost since the previous RxFrame
+  std::uint8_t bus = 0;              // that it came from, < kBusMax
+};
+
+// Frames that are wanted: those of one identifier, or of its J1939 parameter group.
+struct WantedFrames {
+  can::CanId id;
+  bool by_group = false;
+  std::uint8_t bus = 0;
 };
 
 enum class Wake : std::uint8_t {
@@ -35,10 +46,19 @@ class Port {
   virtual MonoTime now() noexcept = 0;
   // Returns at the deadline or earlier. Frames due before the deadline are offered first.
   virtual Wake wait_until(MonoTime deadline) noexcept = 0;
-  // Takes at most out.size() frames, in order of arrival; 0 when there are none.
+  // Takes at most out.size() frames of all buses, in order of arrival; 0 when there are none.
   virtual std::size_t receive(std::span<RxFrame> out) noexcept = 0;
-  virtual SendResult send(const can::CanFrame& frame) noexcept = 0;
-  virtual BusState bus_state() noexcept = 0;
+  virtual SendResult send(const can::CanFrame& frame) noexcept = 0;  // on bus 0
+  virtual BusState bus_state() noexcept = 0;                         // of bus 0
+  // The same for any bus. A port with one bus has no other.
+  virtual SendResult send_on(std::uint8_t bus, const can::CanFrame& frame) noexcept {
+    return bus == 0 ? send(frame) : SendResult::kDown;
+  }
+  virtual BusState bus_state_of(std::uint8_t bus) noexcept {
+    return bus == 0 ? bus_state() : BusState::kAbsent;
+  }
+  // From now on these are wanted; a port that hands over every frame need not know.
+  virtual void select(std::span<const WantedFrames>) noexcept {}
 };
 
 }  // namespace beltgrip::daemon

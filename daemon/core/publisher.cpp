@@ -17,6 +17,14 @@ constexpr Duration kClampPeriod = 10 * kMillisecond;
 Publisher::Publisher(const FrameIdentifiers& identifiers, Duration sample_period)
     : frames_(identifiers), tolerance_(sample_period / 2) {}
 
+void Publisher::go_on_from(const Publisher& before) noexcept {
+  schedules_ = before.schedules_;
+  started_ = before.started_;
+  last_stop_ = before.last_stop_;
+  last_request_ = before.last_request_;
+  last_status_ = before.last_status_;
+}
+
 bool Publisher::due(OwnMessage message, MonoTime t, Duration period, bool at_once) noexcept {
   Schedule& schedule = schedules_[static_cast<std::size_t>(message)];
   if (at_once) {

@@ -42,6 +42,11 @@ class Publisher {
   void collect(MonoTime t, const Publication& publication, Outbox& outbox) noexcept;
   // Adds every message: the last ones before the end.
   void collect_all(MonoTime t, const Publication& publication, Outbox& outbox) noexcept;
+  // Counters and periods of another publisher's frames go on; clamp frames begin with inactive
+  // ones.
+  void go_on_from(const Publisher& before) noexcept;
+  // The inactive frames of the last request may not have come through.
+  void repeat_inactive() noexcept { inactive_left_ = kInactiveFrames; }
 
  private:
   struct Schedule {

@@ -11,8 +11,8 @@ constexpr double kFall = 0.4;         // of mu beyond the peak, per unit of slip
 constexpr double kSlopeBefore = 0.5;  // of mu just before the peak, per unit of slip
 constexpr int kRates = 16;            // tried, each kRateStep slower than the one before
 constexpr double kRateStep = 0.82;
-constexpr int kBisections = 24;
-constexpr int kIntegration = 24;  // points of the energy's integral in each phase
+constexpr int kBisections = 16;
+constexpr int kIntegration = 20;  // points of the energy's integral in each phase
 
 // Growth of slip beyond the peak while the force falls.
 struct Growth {
@@ -110,25 +110,43 @@ Excursion excursion(const RampPoint& point, const Reaction& reaction, double rat
   return out;
 }
 
-Ramp choose_ramp(const RampPoint& point, const Reaction& reaction, const SlipLimits& limits,
-                 double rate_max_N_per_s) noexcept {
-  const double worst_s = std::max(reaction.stale_s, reaction.timeout_s) + reaction.cycle_s;
-  double rate = rate_max_N_per_s;
-  for (int i = 0; i < kRates; ++i, rate *= kRateStep) {
-    const Excursion nominal = excursion(point, reaction, rate, reaction.cycle_s);
-    if (nominal.slip_at_stop > limits.slip_nominal || nominal.slip_max > limits.slip_max ||
-        nominal.energy_J > limits.energy_nominal_J) {
-      continue;
-    }
-    const Excursion worst = excursion(point, reaction, rate, worst_s);
-    if (worst.slip_max > limits.slip_max || worst.slip_speed_max_m_s > limits.slip_speed_max_m_s ||
-        worst.energy_J > limits.energy_max_J) {
-      continue;
-    }
-    const double fall_N = std::max(0.0, point.own_force_N - peak_force_N(point, point.mu_expected));
-    return {rate, fall_N / rate};
+RampSearch::RampSearch(const RampPoint& point, const Reaction& reaction, const SlipLimits& limits,
+                       double rate_max_N_per_s) noexcept
+    : point_(point),
+      reaction_(reaction),
+      limits_(limits),
+      rate_N_per_s_(rate_max_N_per_s),
+      done_(false) {}
+
+bool RampSearch::step() noexcept {
+  if (done_) return true;
+  if (!nominal_holds_) {
+    const Excursion nominal = excursion(point_, reaction_, rate_N_per_s_, reaction_.cycle_s);
+    nominal_holds_ = nominal.slip_at_stop <= limits_.slip_nominal &&
+                     nominal.slip_max <= limits_.slip_max &&
+                     nominal.energy_J <= limits_.energy_nominal_J;
+    if (!nominal_holds_) next_rate();
+    return done_;
   }
-  return {};
+  const double worst_s = std::max(reaction_.stale_s, reaction_.timeout_s) + reaction_.cycle_s;
+  const Excursion worst = excursion(point_, reaction_, rate_N_per_s_, worst_s);
+  const bool holds = worst.slip_max <= limits_.slip_max &&
+                     worst.slip_speed_max_m_s <= limits_.slip_speed_max_m_s &&
+                     worst.energy_J <= limits_.energy_max_J;
+  if (!holds) {
+    next_rate();
+    return done_;
+  }
+  const double fall_N =
+      std::max(0.0, point_.own_force_N - peak_force_N(point_, point_.mu_expected));
+  ramp_ = {rate_N_per_s_, fall_N / rate_N_per_s_};
+  return done_ = true;
+}
+
+void RampSearch::next_rate() noexcept {
+  nominal_holds_ = false;
+  rate_N_per_s_ *= kRateStep;
+  done_ = ++tried_ == kRates;
 }
 
 }  // namespace beltgrip::daemon

@@ -73,7 +73,27 @@ struct Ramp {
 // The fastest rate up to rate_max_N_per_s that keeps the limits, both with a nominal stop and with
 // the worst single fault, while the force goes on falling: an input that falls silent until it
 // counts as lost, or our own silence until the receiver's time-out.
-Ramp choose_ramp(const RampPoint& point, const Reaction& reaction, const SlipLimits& limits,
-                 double rate_max_N_per_s) noexcept;
+class RampSearch {
+ public:
+  RampSearch() noexcept = default;  // done, nothing found
+  RampSearch(const RampPoint& point, const Reaction& reaction, const SlipLimits& limits,
+             double rate_max_N_per_s) noexcept;
+  // One excursion, about 8,000 instructions; true when the ramp stands.
+  bool step() noexcept;
+  bool done() const noexcept { return done_; }
+  const Ramp& ramp() const noexcept { return ramp_; }
+
+ private:
+  void next_rate() noexcept;
+
+  RampPoint point_;
+  Reaction reaction_;
+  SlipLimits limits_;
+  double rate_N_per_s_ = 0.0;
+  int tried_ = 0;
+  bool nominal_holds_ = false;  // with the present rate
+  bool done_ = true;
+  Ramp ramp_;
+};
 
 }  // namespace beltgrip::daemon

@@ -7,6 +7,9 @@ namespace beltgrip::daemon {
 
 namespace {
 constexpr int kDebounce = 3;
+constexpr int kEngineDebounce = 5;
+constexpr int kNearReference = 16;  // samples: noise of one is as large as what is looked for
+constexpr double kNearMean = 8.0;
 constexpr double kRounding_N = 1.0;  // requests are whole newtons on the wire
 constexpr double kSecondsPerTick = 1e-9;
 }  // namespace
@@ -48,22 +51,47 @@ SafetyVerdict SafetyMonitor::judge(MonoTime t, const SafetySignals& signals,
     standing_ = true;
     begun_ = t;
     reference_ratio_ = signals.omega_s_rad_s / signals.omega_p_rad_s;
-    last_request_N_ = request_N;
-    energy_J_ = 0.0;
-    beyond_ = 0;
+    first_request_N_ = last_request_N_ = request_N;
+    energy_J_ = near_sum_ = near_mean_ = 0.0;
+    near_count_ = 0;
+    beyond_ = engine_beyond_ = 0;
+    reference_engine_ = signals.omega_e_rad_s / signals.omega_p_rad_s;
     return SafetyVerdict::kAllowed;
   }
-  const SafetyVerdict motion = judge_motion(t, signals);
+  const SafetyVerdict motion = judge_motion(t, signals, request_N);
   return motion != SafetyVerdict::kAllowed ? motion : judge_request(t, request_N, floor_N);
 }
 
-SafetyVerdict SafetyMonitor::judge_motion(MonoTime t, const SafetySignals& signals) noexcept {
+bool SafetyMonitor::slips_near_own_force(double ratio, double request_N) noexcept {
+  if (near_count_ < kNearReference) {
+    near_sum_ += ratio;
+    ++near_count_;
+    return false;
+  }
+  const double share = (1.0 - request_N / first_request_N_) / (1.0 - limits_.force_near);
+  if (share >= 1.0) return false;
+  near_mean_ += (ratio * kNearReference / near_sum_ - 1.0 - near_mean_) / kNearMean;
+  return std::abs(near_mean_) >
+         limits_.slip_nearest + (limits_.slip_near - limits_.slip_nearest) * share;
+}
+
+SafetyVerdict SafetyMonitor::judge_motion(MonoTime t, const SafetySignals& signals,
+                                          double request_N) noexcept {
   const double drift =
       std::abs(signals.omega_s_rad_s / signals.omega_p_rad_s / reference_ratio_ - 1.0);
   beyond_ = drift > limits_.slip_debounced ? beyond_ + 1 : 0;
-  if (drift > limits_.slip_max || beyond_ >= kDebounce) return SafetyVerdict::kSlip;
+  if (drift > limits_.slip_max || beyond_ >= kDebounce ||
+      slips_near_own_force(signals.omega_s_rad_s / signals.omega_p_rad_s, request_N)) {
+    return SafetyVerdict::kSlip;
+  }
   if (drift * signals.omega_p_rad_s * signals.primary_radius_m > limits_.slip_speed_max_m_s) {
     return SafetyVerdict::kSlipSpeed;
+  }
+  if (signals.omega_e_rad_s > 0.0 && reference_engine_ > 0.0) {
+    const double engine =
+        std::abs(signals.omega_e_rad_s / signals.omega_p_rad_s / reference_engine_ - 1.0);
+    engine_beyond_ = engine > limits_.engine_drift ? engine_beyond_ + 1 : 0;
+    if (engine_beyond_ > kEngineDebounce) return SafetyVerdict::kEngine;
   }
   if (drift > limits_.slip_counted) {
     energy_J_ += drift * std::abs(signals.torque_Nm) * signals.omega_p_rad_s *

@@ -6,7 +6,13 @@
 // A request may stand while all of this holds (strict: the limit itself is still allowed):
 //   every input is there and fresh; both shafts turn, the primary at least at speed_min
 //   |drift of the speed ratio| <= slip_max at every sample, <= slip_debounced over 3 in a row
+//   while the force asked for is above force_near of the first: |mean drift| of some samples, from
+//     the mean of the first ones, <= slip_near, and less the nearer. A belt that slips there has
+//     less friction than was measured last, and the controller's own force, to which it returns,
+//     could not catch it beyond the peak
 //   slip speed <= slip_speed_max
+//   engine speed over primary speed within engine_drift of what it was, but for 5 samples in a row:
+//   macro slip shows in both, speeds of the pulleys that are old or wrong do not
 //   energy, |T| omega_p |drift| while the drift is beyond slip_counted, <= energy_max
 //   the force asked for is >= floor, never rises, and falls no faster than rate_max
 //   it has stood no longer than duration_max, and begins no sooner than pause_min after the last
@@ -22,9 +28,13 @@ namespace beltgrip::daemon {
 struct SafetyLimits {
   double slip_max = 0.08;
   double slip_debounced = 0.055;
+  double slip_near = 0.0048;
+  double slip_nearest = 0.0015;  // at the first force; in between along a line
+  double force_near = 0.84;
   double slip_counted = 0.02;
   double slip_speed_max_m_s = 0.70;
   double energy_max_J = 80.0;
+  double engine_drift = 0.025;
   double speed_min_rad_s = 85.0;
   double rate_max_N_per_s = 300.0;
   double spring_force_N = 0.0;  // floor = spring + centrifugal * omega_s^2 + floor_force
@@ -40,6 +50,7 @@ struct SafetySignals {
   double omega_s_rad_s = 0.0;
   double torque_Nm = 0.0;
   double primary_radius_m = 0.0;
+  double omega_e_rad_s = 0.0;  // engine, from another node; 0: not known
 };
 
 enum class SafetyVerdict : std::uint8_t {
@@ -49,6 +60,7 @@ enum class SafetyVerdict : std::uint8_t {
   kSlip,
   kSlipSpeed,
   kEnergy,
+  kEngine,
   kFloor,
   kRise,
   kRate,
@@ -65,7 +77,8 @@ class SafetyMonitor {
 
  private:
   SafetyVerdict judge(MonoTime t, const SafetySignals& signals, double request_N) noexcept;
-  SafetyVerdict judge_motion(MonoTime t, const SafetySignals& signals) noexcept;
+  SafetyVerdict judge_motion(MonoTime t, const SafetySignals& signals, double request_N) noexcept;
+  bool slips_near_own_force(double ratio, double request_N) noexcept;
   SafetyVerdict judge_request(MonoTime t, double request_N, double floor_N) noexcept;
   void end(MonoTime t) noexcept;
 
@@ -77,9 +90,15 @@ class SafetyMonitor {
   MonoTime ended_ = 0;
   MonoTime last_ = 0;
   double reference_ratio_ = 0.0;
+  double first_request_N_ = 0.0;
   double last_request_N_ = 0.0;
   double energy_J_ = 0.0;
   int beyond_ = 0;  // samples in a row beyond slip_debounced
+  int near_count_ = 0;
+  double near_sum_ = 0.0;          // of the first speed ratios
+  double near_mean_ = 0.0;         // drift from their mean
+  double reference_engine_ = 0.0;  // omega_e / omega_p at the start; 0: not known
+  int engine_beyond_ = 0;
 };
 
 }  // namespace beltgrip::daemon

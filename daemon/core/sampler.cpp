@@ -12,19 +12,19 @@ void Sampler::settle() noexcept {
   for (const Role role : inputs_.required()) {
     const std::optional<Duration> period = inputs_.period(role);
     if (!period) return;
-    if (role == Role::kPrimarySpeed || role == Role::kSecondarySpeed) {
-      delay = std::max(delay, std::min(*period, kDelayMaximum));
-    } else if (role != Role::kExperimentActive && *period <= kSlow) {
-      delay = std::max(delay, *period);
-    }
+    const bool speed = role == Role::kPrimarySpeed || role == Role::kSecondarySpeed;
+    if (!speed && (role == Role::kExperimentActive || *period > kSlow)) continue;
+    delay = std::max(delay, std::min(*period + inputs_.delay(role), kDelayMaximum));
   }
   delay_ = delay;
 }
 
 bool Sampler::read(Role role, MonoTime t, double& value) const noexcept {
   constexpr Duration kReachPeriods = 2;
-  const Duration reach = kReachPeriods * inputs_.period(role).value_or(0);
-  return inputs_.history(role).value_at(t, reach, value);
+  const Duration delay = inputs_.delay(role);
+  const Duration reach =
+      kReachPeriods * inputs_.period(role).value_or(0) + std::max<Duration>(0, delay);
+  return inputs_.history(role).value_at(t + delay, reach, value);
 }
 
 const estimator::VariatorSample& Sampler::sample(MonoTime t, bool may_settle) noexcept {

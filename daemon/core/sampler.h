@@ -4,7 +4,8 @@
 // A sample taken at t represents the instant t - delay. The delay is the period of the slower of
 // the two speeds, so that both are interpolated: 10 ms of skew between them would read as 0.07 to
 // 0.24 percent of slip. Pressure and torque are interpolated as well where their periods are at
-// most kSlow; the slope of a slower one is followed instead of waiting for it.
+// most kSlow; the slope of a slower one is followed instead of waiting for it. What a role tells
+// late (delay_ms) is waited for as well, up to kDelayMaximum in all, and its slope followed beyond.
 #pragma once
 
 #include <limits>

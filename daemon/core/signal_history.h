@@ -26,7 +26,7 @@ class SignalHistory {
   bool value_at(MonoTime t, Duration reach, double& value) const noexcept;
 
  private:
-  static constexpr std::size_t kCapacity = 64;  // 50 ms of a signal that comes every millisecond
+  static constexpr std::size_t kCapacity = 128;  // 100 ms of a signal that comes every millisecond
   static constexpr std::size_t kLine = 4;
   struct Point {
     MonoTime t = 0;

@@ -1,5 +1,7 @@
 #include "daemon/core/tx_gate.h"
 
+#include <algorithm>
+
 #include "can_dbc/e2e.h"
 
 namespace beltgrip::daemon {
@@ -31,19 +33,20 @@ bool content_allowed(std::size_t message, const can::CanFrame& frame) noexcept {
     default: {
       const unsigned state = bytes[1] >> 4;
       const unsigned reason = bytes[2] >> 2 & 0x1FU;
-      return state <= 7 && reason <= 16 && (bytes[2] & 0x80U) == 0 && (bytes[4] & 0x80U) == 0 &&
-             bytes[5] == 0 && bytes[6] == 0 && bytes[7] == 0;
+      return state <= 7 && reason <= 16 && (bytes[2] & 0x80U) == 0 && (bytes[5] & 0xF8U) == 0 &&
+             bytes[6] == 0 && bytes[7] == 0;
     }
   }
 }
 
 }  // namespace
 
-TxGate::TxGate(const FrameIdentifiers& identifiers, Control control,
-               const ClampLimits& clamp) noexcept
+TxGate::TxGate(const FrameIdentifiers& identifiers, Control control, const ClampLimits& clamp,
+               const PollLimits& poll) noexcept
     : identifiers_{identifiers.estimate, identifiers.slip, identifiers.clamp, identifiers.status},
       control_(control),
-      clamp_(clamp) {
+      clamp_(clamp),
+      poll_(poll) {
   expected_counter_.fill(kAnyCounter);
 }
 
@@ -80,12 +83,7 @@ bool TxGate::request_allowed(const can::CanFrame& frame) noexcept {
   return true;
 }
 
-bool TxGate::permits(const can::CanFrame& frame) noexcept {
-  const std::size_t message = message_of(frame);
-  if (message == kMessages) {
-    ++refused_;
-    return false;
-  }
+bool TxGate::own_allowed(std::size_t message, const can::CanFrame& frame) noexcept {
   const auto counter = static_cast<std::uint8_t>(frame.data[1] & 0x0FU);
   std::uint8_t& expected = expected_counter_[message];
   const bool allowed =
@@ -93,13 +91,39 @@ bool TxGate::permits(const can::CanFrame& frame) noexcept {
       (expected == kAnyCounter || counter == expected) &&
       can::e2e::crc_profile1(kDataIds[message], frame.payload().subspan(1)) == frame.data[0] &&
       content_allowed(message, frame) && (message != kClamp || request_allowed(frame));
-  if (!allowed) {
-    expected = kAnyCounter;
-    ++refused_;
-    return false;
+  expected = allowed ? can::e2e::next_counter(counter) : kAnyCounter;
+  return allowed;
+}
+
+// Layout of ISO 15765-2 and ISO 14229-1, read here on its own.
+bool TxGate::poll_allowed(const can::CanFrame& frame, std::uint8_t bus, MonoTime t) noexcept {
+  if (frame.remote || frame.error || frame.fd || frame.length != kLength) return false;
+  const auto& bytes = frame.data;
+  const bool flow = (bytes[0] == 0x30 || bytes[0] == 0x32) && bytes[1] == 0 && bytes[2] == 0;
+  const bool read = bytes[0] == 0x03 && bytes[1] == 0x22;
+  for (std::size_t i = 0; i < poll_.size; ++i) {
+    const PollLimits::Request& request = poll_.requests[i];
+    Polled& polled = polled_[i];
+    if (request.bus != bus || request.id != frame.id) continue;
+    if (flow && polled.flow_left) {
+      polled.flow_left = false;
+      return true;
+    }
+    if (!read || (bytes[2] << 8 | bytes[3]) != request.identifier) continue;
+    if (polled.due > t + request.period / 2) return false;
+    polled.due = std::max(polled.due, t) + request.period;
+    polled.flow_left = true;
+    return true;
   }
-  expected = can::e2e::next_counter(counter);
-  return true;
+  return false;
+}
+
+bool TxGate::permits(const can::CanFrame& frame, std::uint8_t bus, MonoTime t) noexcept {
+  const std::size_t message = bus == 0 ? message_of(frame) : kMessages;
+  const bool allowed =
+      message != kMessages ? own_allowed(message, frame) : poll_allowed(frame, bus, t);
+  if (!allowed) ++refused_;
+  return allowed;
 }
 
 }  // namespace beltgrip::daemon

@@ -1,6 +1,7 @@
-// The helper thread: everything that may wait. Takes events out of the ring and logs them; where
-// the bus is the embedded one, it also watches for the stop request. Never in the way of the
-// real-time thread: if it hangs, the ring drops and counts.
+// The helper thread: everything that may wait. Takes events out of the ring and logs them, and
+// results and keeps them; where the bus is the embedded one, it also watches for the stop request;
+// and takes its turn at what main gives it. Never in the way of the real-time thread: if it hangs,
+// the ring drops and counts.
 #pragma once
 
 #include <atomic>
@@ -8,15 +9,19 @@
 #include <thread>
 
 #include "daemon/core/event.h"
+#include "daemon/core/history_link.h"
+#include "daemon/io/history_keeper.h"
 #include "daemon/io/log_sink.h"
 
 namespace beltgrip::daemon {
 
 class Housekeeper {
  public:
-  // stop_fd readable calls on_stop once, if there is one. The log is used by this thread alone from
-  // here until stop().
-  Housekeeper(EventRing& events, LogSink& log, int stop_fd, std::function<void()> on_stop);
+  // stop_fd readable calls on_stop once, if there is one; on_turn is called every kTurn_ms. Log and
+  // history (which may be absent) are used by this thread alone from here until stop().
+  static constexpr int kTurn_ms = 20;
+  Housekeeper(EventRing& events, HistoryRings& rings, HistoryKeeper* history, LogSink& log,
+              int stop_fd, std::function<void()> on_stop, std::function<void()> on_turn);
   ~Housekeeper();
   // Takes what is left in the ring and ends the thread.
   void stop();
@@ -24,11 +29,16 @@ class Housekeeper {
  private:
   void run();
   void drain();
+  void keep_history();
 
   EventRing& events_;
+  LineBudget lines_;
+  HistoryRings& rings_;
+  HistoryKeeper* history_;
   LogSink& log_;
   int stop_fd_;
   std::function<void()> on_stop_;
+  std::function<void()> on_turn_;
   std::uint64_t dropped_ = 0;
   std::atomic<bool> ending_{false};
   std::thread thread_;

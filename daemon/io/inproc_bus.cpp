@@ -26,7 +26,7 @@ struct InprocBus::Slot {
   MonoTime deadline = 0;
   std::condition_variable wake;
 
-  void put(const can::CanFrame& frame, MonoTime t) noexcept {
+  void put(const can::CanFrame& frame, MonoTime t, bool own) noexcept {
     if (count == ring.size()) {
       ++dropped;
       return;
@@ -35,6 +35,7 @@ struct InprocBus::Slot {
     entry = {};
     entry.t = t;
     entry.frame = frame;
+    entry.own_echo = own;
     entry.dropped_before = dropped;
     dropped = 0;
   }
@@ -100,8 +101,8 @@ class InprocBus::InprocPort final : public Port {
     if (bus_->closed_) return SendResult::kDown;
     const MonoTime t = bus_->time_now();
     for (auto& each : bus_->slots_) {
-      if (each == nullptr || each.get() == &slot_) continue;
-      each->put(frame, t);
+      if (each == nullptr) continue;
+      each->put(frame, t, each.get() == &slot_);
       if (bus_->clock_ == Clock::kMonotonic) each->wake.notify_one();
     }
     return SendResult::kSent;

@@ -2,9 +2,9 @@
 // real time, or in virtual time: then one port's thread runs at a time and time passes only while
 // all of them wait, so that a run is the same every time.
 //
-// A frame reaches every other port at the instant it was sent. Frames wait in a ring of fixed size;
-// what does not fit is dropped and counted, as a socket does. Ports lock a mutex: the embedded bus
-// is for demonstration and tests, the vehicle's bus is SocketPort.
+// A frame reaches every port at the instant it was sent, its sender as an echo. Frames wait in a
+// ring of fixed size; what does not fit is dropped and counted, as a socket does. Ports lock a
+// mutex: the embedded bus is for demonstration and tests, the vehicle's bus is SocketPort.
 #pragma once
 
 #include <condition_variable>

@@ -1,6 +1,6 @@
-// What the CAN controller behind an interface says of itself, over netlink (libsocketcan): state
-// and bit rate. Blocks, and the library complains on standard error where there is no controller;
-// so it is asked once, at start-up. While the loop runs, the controller's error frames tell.
+// What the CAN controller behind an interface says of itself (can_link.h), as a line for the log:
+// state and bit rate. It blocks, so it is asked once, at start-up. While the loop runs, the
+// controller's error frames tell.
 #pragma once
 
 #include <string>

@@ -1,4 +1,5 @@
-// The log: spdlog on standard error, journal-friendly. Helper thread and start-up only.
+// The log: spdlog, to the journal with its priorities where standard error leads there, else to
+// standard error. Helper thread and start-up only.
 #pragma once
 
 #include <cstdint>
@@ -16,6 +17,10 @@ class LogSink {
   explicit LogSink(const std::string& level);
   ~LogSink();
 
+  // One level more or less is logged from now on; says so.
+  void more();
+  void less();
+  void debug(const std::string& line);
   void info(const std::string& line);
   void warning(const std::string& line);
   // At most kLinesPerSecond of them; the rest is counted and the number logged.
@@ -24,6 +29,7 @@ class LogSink {
 
  private:
   static constexpr int kLinesPerSecond = 10;
+  void set_level(int level);
   struct Logger;
   std::unique_ptr<Logger> logger_;
   MonoTime second_ = 0;

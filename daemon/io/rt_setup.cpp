@@ -22,15 +22,20 @@ void touch_stack() {
 
 }  // namespace
 
-std::string prepare_real_time() {
-  touch_stack();
+bool lock_memory(std::string& line) {
   // Not what is mapped later: that is the helper thread's business, and would count against the
   // limit.
-  std::string line = "memory locked";
-  if (mlockall(MCL_CURRENT) != 0) {
-    line = std::string("memory not locked (") + std::strerror(errno) +
-           "; LimitMEMLOCK= or CAP_IPC_LOCK permits it)";
-  }
+  const bool locked = mlockall(MCL_CURRENT) == 0;
+  line = locked ? "memory locked"
+                : std::string("memory not locked (") + std::strerror(errno) +
+                      "; LimitMEMLOCK= or CAP_IPC_LOCK permits it)";
+  return locked;
+}
+
+std::string prepare_real_time() {
+  touch_stack();
+  std::string line;
+  lock_memory(line);
   const int policy = sched_getscheduler(0) & ~SCHED_RESET_ON_FORK;
   if (policy == SCHED_FIFO || policy == SCHED_RR) return line + ", real-time scheduling";
   return line + ", ordinary scheduling (CPUSchedulingPolicy=fifo in the unit gives real time)";

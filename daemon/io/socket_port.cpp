@@ -1,13 +1,6 @@
 #include "daemon/io/socket_port.h"
 
-#include <linux/can/error.h>
-#include <linux/can/raw.h>
-#include <linux/net_tstamp.h>
-#include <net/if.h>
 #include <poll.h>
-#include <sys/ioctl.h>
-#include <time.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -15,231 +8,101 @@
 
 namespace beltgrip::daemon {
 
-namespace {
-
-constexpr Duration kReopenFirst = 100 * kMillisecond;
-constexpr Duration kReopenMaximum = 5 * kSecond;
-
-std::int64_t nanoseconds(const timespec& time) noexcept {
-  return std::int64_t{time.tv_sec} * kSecond + time.tv_nsec;
+std::variant<std::unique_ptr<SocketPort>, BusError> SocketPort::open(
+    const std::string& interface, const std::vector<WantedFrames>& wanted, int stop_fd) {
+  return open({{interface, "bus.interface"}}, wanted, stop_fd);
 }
-
-std::int64_t clock_ns(clockid_t clock) noexcept {
-  timespec time{};
-  clock_gettime(clock, &time);
-  return nanoseconds(time);
-}
-
-template <typename T>
-bool set_option(int fd, int level, int name, const T& value) noexcept {
-  return setsockopt(fd, level, name, &value, sizeof value) == 0;
-}
-
-can_filter filter_of(can::CanId id) {
-  // Exactly this identifier of this kind, and no remote frames.
-  return {id.value | (id.extended ? CAN_EFF_FLAG : 0),
-          (id.extended ? CAN_EFF_MASK : CAN_SFF_MASK) | CAN_EFF_FLAG | CAN_RTR_FLAG};
-}
-
-}  // namespace
-
-SocketPort::SocketPort(const std::string& interface, const std::vector<can::CanId>& identifiers,
-                       int stop_fd)
-    : stop_fd_(stop_fd) {
-  interface.copy(interface_.data(), interface_.size() - 1);
-  for (const can::CanId id : identifiers) filters_.push_back(filter_of(id));
-  for (std::size_t i = 0; i < kBatch; ++i) {
-    vectors_[i] = {&raw_[i], sizeof raw_[i]};
-    headers_[i].msg_hdr.msg_iov = &vectors_[i];
-    headers_[i].msg_hdr.msg_iovlen = 1;
-  }
-}
-
-SocketPort::~SocketPort() { close_socket(); }
 
 std::variant<std::unique_ptr<SocketPort>, BusError> SocketPort::open(
-    const std::string& interface, const std::vector<can::CanId>& identifiers, int stop_fd) {
-  std::unique_ptr<SocketPort> port(new SocketPort(interface, identifiers, stop_fd));
-  const char* where = "";
-  const int error = port->open_socket(where);
-  if (error == 0) return port;
-  const std::string reason = std::string(where) + ": " + std::strerror(error);
-  if (error == EAFNOSUPPORT || error == EPROTONOSUPPORT) {
-    return BusError{"bus.interface: found no SocketCAN in this kernel (" + reason +
-                    "), expected one with CAN_RAW, or inproc:NAME"};
+    const std::vector<BusToOpen>& buses, const std::vector<WantedFrames>& wanted, int stop_fd) {
+  std::unique_ptr<SocketPort> port(new SocketPort(stop_fd));
+  for (const BusToOpen& bus : buses) {
+    port->sockets_[port->count_] =
+        std::make_unique<CanSocket>(bus.interface, wanted, static_cast<std::uint8_t>(port->count_));
+    CanSocket& opened = *port->sockets_[port->count_++];
+    const char* where = "";
+    const int error = opened.open(where);
+    if (error == 0) continue;
+    const std::string reason = std::string(where) + ": " + std::strerror(error);
+    if (error == EAFNOSUPPORT || error == EPROTONOSUPPORT) {
+      return BusError{bus.key + ": found no SocketCAN in this kernel (" + reason +
+                      "), expected one with CAN_RAW, or inproc:NAME"};
+    }
+    return BusError{bus.key + ": found no CAN interface \"" + bus.interface + "\" (" + reason +
+                    "), expected one that `ip link show` lists"};
   }
-  return BusError{"bus.interface: found no CAN interface \"" + interface + "\" (" + reason +
-                  "), expected one that `ip link show` lists"};
+  return port;
 }
 
-int SocketPort::open_socket(const char*& where) noexcept {
-  where = "socket";
-  socket_ = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
-  if (socket_ < 0) return errno;
-  const auto failed = [&](const char* call) {
-    const int error = errno;
-    where = call;
-    close_socket();
-    return error;
-  };
-  ifreq request{};
-  std::copy(interface_.begin(), interface_.end(), request.ifr_name);
-  if (ioctl(socket_, SIOCGIFINDEX, &request) != 0) return failed("look-up");
-  if (setsockopt(socket_, SOL_CAN_RAW, CAN_RAW_FILTER, filters_.data(),
-                 static_cast<socklen_t>(filters_.size() * sizeof(can_filter))) != 0) {
-    return failed("filters");
-  }
-  const can_err_mask_t errors = CAN_ERR_CRTL | CAN_ERR_BUSOFF | CAN_ERR_RESTARTED;
-  if (!set_option(socket_, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, errors)) return failed("error filter");
-  const int on = 1;
-  // Our own frames come back once they have been sent: an echo is no foreign sender.
-  if (!set_option(socket_, SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, on)) return failed("own frames");
-  if (!set_option(socket_, SOL_SOCKET, SO_TIMESTAMPNS, on)) return failed("time stamps");
-  if (!set_option(socket_, SOL_SOCKET, SO_RXQ_OVFL, on)) return failed("drop counter");
-  // Without these the port still does its work: classic frames only, a longer queue.
-  set_option(socket_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, on);
-  const int smallest = 0;  // the kernel's minimum: a full queue is said at once, nothing grows old
-  set_option(socket_, SOL_SOCKET, SO_SNDBUF, smallest);
-  sockaddr_can address{};
-  address.can_family = AF_CAN;
-  address.can_ifindex = request.ifr_ifindex;
-  if (bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    return failed("bind");
-  }
-  kernel_drops_ = 0;
-  drops_reported_ = 0;
-  state_ = BusState::kActive;
-  return 0;
-}
-
-void SocketPort::close_socket() noexcept {
-  if (socket_ >= 0) close(socket_);
-  socket_ = -1;
-}
-
-void SocketPort::try_reopen(MonoTime t) noexcept {
-  const char* where = "";
-  if (open_socket(where) == 0) return;
-  state_ = BusState::kAbsent;
-  reopen_pause_ = std::clamp(2 * reopen_pause_, kReopenFirst, kReopenMaximum);
-  reopen_at_ = t + reopen_pause_;
-}
-
-void SocketPort::lost(int error) noexcept {
-  if (error == ENETDOWN) {
-    state_ = BusState::kDown;
-  } else if (error == ENODEV || error == ENXIO || error == EBADF) {
-    close_socket();
-    state_ = BusState::kAbsent;
-    reopen_pause_ = 0;
-    reopen_at_ = now() + kReopenFirst;
-  }
-}
-
-MonoTime SocketPort::now() noexcept { return clock_ns(CLOCK_MONOTONIC); }
+MonoTime SocketPort::now() noexcept { return monotonic_now(); }
 
 Wake SocketPort::wait_until(MonoTime deadline) noexcept {
   for (;;) {
     const MonoTime t = now();
-    if (socket_ < 0 && t >= reopen_at_) try_reopen(t);
-    const MonoTime until = socket_ < 0 ? std::min(deadline, reopen_at_) : deadline;
-    const Duration left = std::max<Duration>(until - t, 0);
-    const timespec timeout{static_cast<time_t>(left / kSecond), static_cast<long>(left % kSecond)};
+    MonoTime until = deadline;
     // A negative descriptor is skipped by poll.
-    std::array<pollfd, 2> fds{pollfd{socket_, POLLIN, 0}, pollfd{stop_fd_, POLLIN, 0}};
-    const int ready = ppoll(fds.data(), fds.size(), &timeout, nullptr);
-    if (ready > 0 && (fds[1].revents & POLLIN) != 0) return Wake::kClosed;
-    if (ready > 0 && fds[0].revents != 0) return Wake::kFrames;
+    std::array<pollfd, kBusMax + 1> fds;
+    fds[0] = {stop_fd_, POLLIN, 0};
+    for (std::size_t i = 0; i < count_; ++i) {
+      sockets_[i]->try_reopen(t);
+      until = std::min(until, sockets_[i]->reopen_at());
+      fds[i + 1] = {sockets_[i]->descriptor(), POLLIN, 0};
+    }
+    const bool waiting = std::any_of(waiting_.begin(), waiting_.end(),
+                                     [](const Waiting& each) { return !each.empty(); });
+    const Duration left = waiting ? 0 : std::max<Duration>(until - t, 0);
+    const timespec timeout{static_cast<time_t>(left / kSecond), static_cast<long>(left % kSecond)};
+    const int ready = ppoll(fds.data(), count_ + 1, &timeout, nullptr);
+    if (ready > 0 && (fds[0].revents & POLLIN) != 0) return Wake::kClosed;
+    for (std::size_t i = 1; i <= count_ && ready > 0; ++i) {
+      if (fds[i].revents != 0) return Wake::kFrames;
+    }
+    if (waiting) return Wake::kFrames;
     if (now() >= deadline) return Wake::kDeadline;
   }
 }
 
 std::size_t SocketPort::receive(std::span<RxFrame> out) noexcept {
-  if (socket_ < 0) return 0;
-  const std::size_t wanted = std::min(out.size(), kBatch);
-  for (std::size_t i = 0; i < wanted; ++i) {
-    headers_[i].msg_hdr.msg_control = control_[i].data();
-    headers_[i].msg_hdr.msg_controllen = kControlSize;
-    headers_[i].msg_hdr.msg_flags = 0;
-  }
-  const int received =
-      recvmmsg(socket_, headers_.data(), static_cast<unsigned>(wanted), MSG_DONTWAIT, nullptr);
-  if (received < 0) {
-    if (errno != EAGAIN && errno != EINTR) lost(errno);
-    return 0;
-  }
-  if (state_ == BusState::kDown && received > 0) state_ = BusState::kActive;
-  stamps_.read(now(), clock_ns(CLOCK_REALTIME));
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(received); ++i) {
-    if (convert(headers_[i], raw_[i], out[count])) ++count;
-  }
-  return count;
+  return count_ == 1 ? sockets_[0]->receive(out) : receive_merged(out);
 }
 
-bool SocketPort::convert(const mmsghdr& message, const canfd_frame& raw, RxFrame& out) noexcept {
-  bool has_stamp = false;
-  std::int64_t stamp = 0;
-  msghdr header = message.msg_hdr;
-  for (const cmsghdr* each = CMSG_FIRSTHDR(&header); each != nullptr;
-       each = CMSG_NXTHDR(&header, const_cast<cmsghdr*>(each))) {
-    if (each->cmsg_level != SOL_SOCKET) continue;
-    if (each->cmsg_type == SO_TIMESTAMPNS) {
-      timespec time;
-      std::memcpy(&time, CMSG_DATA(each), sizeof time);
-      stamp = nanoseconds(time);
-      has_stamp = true;
-    } else if (each->cmsg_type == SO_RXQ_OVFL) {
-      std::memcpy(&kernel_drops_, CMSG_DATA(each), sizeof kernel_drops_);
+// What has come to one bus up to an instant is known only once that bus has been read after it: of
+// two buses, frames are handed on up to the instant before both were read.
+std::size_t SocketPort::receive_merged(std::span<RxFrame> out) noexcept {
+  const MonoTime known = now();
+  for (std::size_t i = 0; i < count_; ++i) {
+    Waiting& waiting = waiting_[i];
+    if (waiting.empty()) waiting.next = waiting.end = 0;
+    waiting.end += sockets_[i]->receive(std::span(waiting.frames).subspan(waiting.end));
+    waiting.full = waiting.end == waiting.frames.size();
+  }
+  std::size_t taken = 0;
+  while (taken < out.size()) {
+    Waiting* first = nullptr;
+    bool unread = false;
+    for (Waiting& each : waiting_) {
+      unread = unread || (each.empty() && each.full);
+      if (each.empty() || each.frames[each.next].t > known) continue;
+      if (first == nullptr || each.frames[each.next].t < first->frames[first->next].t) {
+        first = &each;
+      }
     }
+    if (first == nullptr || unread) break;
+    out[taken++] = first->frames[first->next++];
   }
-  out = {};
-  out.t = stamps_.convert(has_stamp, stamp);
-  const bool fd = message.msg_len == CANFD_MTU;
-  if ((!fd && message.msg_len != CAN_MTU) || (header.msg_flags & MSG_TRUNC) != 0 ||
-      raw.len > (fd ? CANFD_MAX_DLEN : CAN_MAX_DLEN)) {
-    return false;
-  }
-  out.dropped_before = kernel_drops_ - drops_reported_;
-  drops_reported_ = kernel_drops_;
-  out.own_echo = (header.msg_flags & MSG_CONFIRM) != 0;
-  can::CanFrame& frame = out.frame;
-  frame.error = (raw.can_id & CAN_ERR_FLAG) != 0;
-  frame.id.extended = !frame.error && (raw.can_id & CAN_EFF_FLAG) != 0;
-  frame.id.value = raw.can_id & (frame.error         ? CAN_ERR_MASK
-                                 : frame.id.extended ? CAN_EFF_MASK
-                                                     : CAN_SFF_MASK);
-  frame.remote = !frame.error && (raw.can_id & CAN_RTR_FLAG) != 0;
-  frame.fd = fd;
-  frame.bit_rate_switch = fd && (raw.flags & CANFD_BRS) != 0;
-  frame.error_state_indicator = fd && (raw.flags & CANFD_ESI) != 0;
-  frame.length = raw.len;
-  if (!frame.remote) std::copy_n(raw.data, raw.len, frame.data.begin());
-  return true;
+  return taken;
 }
 
-SendResult SocketPort::send(const can::CanFrame& frame) noexcept {
-  if (socket_ < 0) return SendResult::kDown;
-  // One layout holds both formats; the size that is written says which it is.
-  canfd_frame raw{};
-  raw.can_id =
-      frame.id.value | (frame.id.extended ? CAN_EFF_FLAG : 0) | (frame.remote ? CAN_RTR_FLAG : 0);
-  raw.len = frame.length;
-  raw.flags = static_cast<std::uint8_t>((frame.bit_rate_switch ? CANFD_BRS : 0) |
-                                        (frame.error_state_indicator ? CANFD_ESI : 0));
-  if (frame.error || frame.length > (frame.fd ? CANFD_MAX_DLEN : CAN_MAX_DLEN)) {
-    return SendResult::kFailed;
-  }
-  std::copy_n(frame.data.begin(), frame.length, raw.data);
-  const std::size_t size = frame.fd ? CANFD_MTU : CAN_MTU;
-  if (::write(socket_, &raw, size) == static_cast<ssize_t>(size)) {
-    if (state_ == BusState::kDown) state_ = BusState::kActive;
-    return SendResult::kSent;
-  }
-  const int error = errno;
-  if (error == EAGAIN || error == ENOBUFS || error == EINTR) return SendResult::kFull;
-  lost(error);
-  return state_ == BusState::kActive ? SendResult::kFailed : SendResult::kDown;
+SendResult SocketPort::send_on(std::uint8_t bus, const can::CanFrame& frame) noexcept {
+  return bus < count_ ? sockets_[bus]->send(frame) : SendResult::kDown;
+}
+
+void SocketPort::select(std::span<const WantedFrames> wanted) noexcept {
+  for (std::size_t i = 0; i < count_; ++i) sockets_[i]->select(wanted);
+}
+
+BusState SocketPort::bus_state_of(std::uint8_t bus) noexcept {
+  return bus < count_ ? sockets_[bus]->state() : BusState::kAbsent;
 }
 
 }  // namespace beltgrip::daemon

@@ -1,0 +1,484 @@
+#include "daemon/io/history_db.h"
+
+#include <sqlite3.h>
+#include <sys/stat.h>
+#include <zlib.h>
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string_view>
+
+#include "daemon/core/event.h"
+
+namespace beltgrip::daemon {
+
+namespace {
+
+using estimator::Direction;
+using estimator::EndStop;
+using estimator::PeakKind;
+using estimator::StopReason;
+
+constexpr int kApplicationId = 0x42475248;  // "BGRH"
+constexpr int kBusy_ms = 2000;
+
+constexpr const char* kSchema = R"(CREATE TABLE experiment (
+  id INTEGER PRIMARY KEY,
+  time_s REAL NOT NULL,
+  fingerprint TEXT NOT NULL,
+  outcome TEXT NOT NULL,
+  stop_reason TEXT NOT NULL,
+  kind TEXT NOT NULL,
+  mu_max REAL,
+  mu_max_std REAL,
+  ci95_low REAL,
+  ci95_high REAL,
+  sensor_std REAL,
+  sigma_stop_percent REAL,
+  sigma_peak_percent REAL,
+  samples INTEGER NOT NULL,
+  duration_s REAL,
+  direction TEXT NOT NULL,
+  ratio TEXT NOT NULL,
+  omega_p_rad_s REAL,
+  omega_s_rad_s REAL,
+  torque_Nm REAL,
+  clamp_force_N REAL,
+  oil_degC REAL,
+  notes INTEGER NOT NULL,
+  checksum INTEGER NOT NULL))";
+
+constexpr const char* kColumns =
+    "id, time_s, fingerprint, outcome, stop_reason, kind, mu_max, mu_max_std, ci95_low, ci95_high, "
+    "sensor_std, "
+    "sigma_stop_percent, sigma_peak_percent, samples, duration_s, direction, ratio, "
+    "omega_p_rad_s, omega_s_rad_s, torque_Nm, clamp_force_N, oil_degC, notes, checksum";
+
+// A row between HistoryRow and the file: each visitor sees every column once, in order.
+struct Columns {
+  std::function<void(std::int64_t&)> integer;
+  std::function<void(double&)> number;  // no number: NULL
+  std::function<void(std::string&)> text;
+};
+
+struct Stored {  // a row as the file has it
+  std::int64_t id = 0, samples = 0, notes = 0;
+  double duration_s = 0.0;
+  std::string fingerprint, outcome, stop_reason, kind, direction, ratio;
+  double time_s = 0.0;
+  ExperimentResult result;  // its numbers
+
+  void visit(const Columns& columns) {
+    columns.integer(id);
+    columns.number(time_s);
+    for (std::string* each : {&fingerprint, &outcome, &stop_reason, &kind}) columns.text(*each);
+    estimator::PeakEstimate& peak = result.peak;
+    for (double* each :
+         {&peak.mu_max, &peak.mu_max_std, &peak.ci95_low, &peak.ci95_high, &result.sensor_std,
+          &result.sigma_stop_percent, &peak.sigma_peak_percent}) {
+      columns.number(*each);
+    }
+    columns.integer(samples);
+    columns.number(duration_s);
+    columns.text(direction);
+    columns.text(ratio);
+    for (double* each : {&result.omega_p_rad_s, &result.omega_s_rad_s, &result.torque_Nm,
+                         &result.clamp_force_N, &result.oil_degC}) {
+      columns.number(*each);
+    }
+    columns.integer(notes);
+  }
+};
+
+std::uint32_t checksum(Stored& stored) {
+  std::string bytes;
+  const auto add = [&](auto value) {
+    std::array<char, 32> digits;
+    bytes.append(digits.data(),
+                 std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
+    bytes += '|';
+  };
+  stored.visit({[&](std::int64_t& value) { add(value); },
+                [&](double& value) {
+                  if (std::isnan(value)) bytes += '|';
+                  if (!std::isnan(value)) add(value + 0.0);  // the file knows no -0
+                },
+                [&](std::string& value) { bytes += value + '|'; }});
+  return static_cast<std::uint32_t>(
+      crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())));
+}
+
+template <typename Enum>
+std::optional<Enum> enum_of(std::string_view name, int count, auto&& name_of) {
+  for (int i = 0; i < count; ++i) {
+    if (name_of(static_cast<Enum>(i)) == name) return static_cast<Enum>(i);
+  }
+  return std::nullopt;
+}
+
+Stored stored_of(const HistoryRow& row) {
+  Stored stored;
+  stored.id = row.id;
+  stored.time_s = row.time_s;
+  stored.fingerprint = row.fingerprint;
+  stored.result = row.result;
+  stored.samples = row.result.samples;
+  stored.notes = row.notes;
+  stored.duration_s = static_cast<double>(row.result.end - row.result.start) * 1e-9;
+  stored.outcome = outcome_name(row.result.outcome);
+  stored.stop_reason = stop_reason_name(row.result.stop_reason);
+  stored.kind = kind_name(row.result.peak.kind);
+  stored.direction = direction_name(row.result.direction);
+  stored.ratio = end_stop_name(row.result.end_stop);
+  return stored;
+}
+
+std::optional<HistoryRow> row_of(const Stored& stored) {
+  const auto outcome = enum_of<Outcome>(stored.outcome, 4, outcome_name);
+  const auto reason = enum_of<StopReason>(stored.stop_reason, 17, stop_reason_name);
+  const auto kind = enum_of<PeakKind>(stored.kind, 3, kind_name);
+  const auto direction = enum_of<Direction>(stored.direction, 2, direction_name);
+  const auto end_stop = enum_of<EndStop>(stored.ratio, 2, end_stop_name);
+  if (!outcome || !reason || !kind || !direction || !end_stop) return std::nullopt;
+  HistoryRow row;
+  row.id = stored.id;
+  row.time_s = stored.time_s;
+  row.fingerprint = stored.fingerprint;
+  row.result = stored.result;
+  row.result.outcome = *outcome;
+  row.result.stop_reason = *reason;
+  row.result.peak.kind = *kind;
+  row.result.direction = *direction;
+  row.result.end_stop = *end_stop;
+  row.result.samples = stored.samples;
+  row.result.start = 0;
+  row.result.end = std::isfinite(stored.duration_s) && std::abs(stored.duration_s) < 1e9
+                       ? std::llround(stored.duration_s * 1e9)
+                       : 0;
+  row.notes = static_cast<std::uint32_t>(stored.notes);
+  return row;
+}
+
+class Statement {
+ public:
+  Statement(sqlite3* db, const char* sql) {
+    status_ = sqlite3_prepare_v2(db, sql, -1, &statement_, nullptr);
+  }
+  Statement(sqlite3* db, const std::string& sql) : Statement(db, sql.c_str()) {}
+  ~Statement() { sqlite3_finalize(statement_); }
+  Statement(const Statement&) = delete;
+  Statement& operator=(const Statement&) = delete;
+  int step() {
+    if (status_ == SQLITE_OK || status_ == SQLITE_ROW) status_ = sqlite3_step(statement_);
+    return status_;
+  }
+  sqlite3_stmt* get() const { return statement_; }
+
+ private:
+  sqlite3_stmt* statement_ = nullptr;
+  int status_;
+};
+
+int run(sqlite3* db, const char* sql) {
+  Statement statement(db, sql);
+  int status;
+  while ((status = statement.step()) == SQLITE_ROW) {
+  }
+  return status;
+}
+
+// The first integer of a query; the status where there is none.
+int query(sqlite3* db, const char* sql, std::int64_t& value) {
+  Statement statement(db, sql);
+  const int status = statement.step();
+  if (status == SQLITE_ROW) value = sqlite3_column_int64(statement.get(), 0);
+  return status;
+}
+
+bool is_damage(int status) {
+  return (status & 0xFF) == SQLITE_CORRUPT || (status & 0xFF) == SQLITE_NOTADB;
+}
+
+HistoryTrouble trouble_of(int status) {
+  if (is_damage(status)) return HistoryTrouble::kCorrupt;
+  if ((status & 0xFF) == SQLITE_CANTOPEN) return HistoryTrouble::kMissing;
+  if ((status & 0xFF) == SQLITE_READONLY) return HistoryTrouble::kReadOnly;
+  return HistoryTrouble::kNotWritten;
+}
+
+bool create(sqlite3* db) {
+  const std::string version = "PRAGMA user_version = " + std::to_string(kHistoryVersion);
+  const std::string application = "PRAGMA application_id = " + std::to_string(kApplicationId);
+  const bool made = run(db, "BEGIN IMMEDIATE") == SQLITE_DONE && run(db, kSchema) == SQLITE_DONE &&
+                    run(db, application.c_str()) == SQLITE_DONE &&
+                    run(db, version.c_str()) == SQLITE_DONE && run(db, "COMMIT") == SQLITE_DONE;
+  if (!made) run(db, "ROLLBACK");
+  return made;
+}
+
+// What the file is, without changing it. fresh: nothing is in it yet.
+HistoryTrouble inspect(sqlite3* db, bool& fresh, std::string& text) {
+  std::int64_t version = 0, application = 0, tables = 0;
+  int status = query(db, "PRAGMA user_version", version);
+  if (status == SQLITE_ROW) status = query(db, "PRAGMA application_id", application);
+  if (status == SQLITE_ROW) status = query(db, "SELECT count(*) FROM sqlite_schema", tables);
+  if (status != SQLITE_ROW) {
+    text = sqlite3_errmsg(db);
+    // A plain error here: a format that SQLite does not know.
+    return status == SQLITE_ERROR ? HistoryTrouble::kCorrupt : trouble_of(status);
+  }
+  fresh = version == 0 && application == 0 && tables == 0;
+  if (fresh) return HistoryTrouble::kNone;
+  if (application != kApplicationId) {
+    text = "it is not a history of BeltGrip";
+    return HistoryTrouble::kCorrupt;
+  }
+  if (version > kHistoryVersion) {
+    text = "its version is " + std::to_string(version) + ", this program knows " +
+           std::to_string(kHistoryVersion);
+    return HistoryTrouble::kNewer;
+  }
+  std::int64_t known = 0;
+  const std::string schema =
+      "SELECT count(*) FROM sqlite_schema WHERE sql = '" + std::string(kSchema) + "'";
+  if (query(db, schema.c_str(), known) != SQLITE_ROW || known != 1) {
+    text = "its table is not that of version " + std::to_string(kHistoryVersion);
+    return HistoryTrouble::kCorrupt;
+  }
+  Statement check(db, "PRAGMA integrity_check(1)");
+  status = check.step();
+  const auto* found = status == SQLITE_ROW
+                          ? reinterpret_cast<const char*>(sqlite3_column_text(check.get(), 0))
+                          : nullptr;
+  if (version != kHistoryVersion || found == nullptr || std::strcmp(found, "ok") != 0) {
+    text = found == nullptr ? sqlite3_errmsg(db) : found;
+    return HistoryTrouble::kCorrupt;
+  }
+  return HistoryTrouble::kNone;
+}
+
+bool has_content(const std::string& path) {
+  struct stat status {};
+  return stat(path.c_str(), &status) == 0 && status.st_size > 0;
+}
+
+// For a URI file name.
+std::string escaped(const std::string& path) {
+  constexpr std::string_view kHex = "0123456789ABCDEF";
+  std::string out;
+  for (const char c : path) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '%' || c == '?' || c == '#') {
+      out += {'%', kHex[byte >> 4], kHex[byte & 15]};
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+const char* direction_name(Direction direction) {
+  return direction == Direction::kDrive ? "Drive" : "Overrun";
+}
+const char* end_stop_name(EndStop end_stop) {
+  return end_stop == EndStop::kLow ? "Low" : "Overdrive";
+}
+const char* kind_name(PeakKind kind) {
+  switch (kind) {
+    case PeakKind::kValue:
+      return "Value";
+    case PeakKind::kLowerBound:
+      return "LowerBound";
+    case PeakKind::kNone:
+      break;
+  }
+  return "None";
+}
+
+estimator::BeltExperiment belt_experiment(const HistoryRow& row) {
+  estimator::BeltExperiment each;
+  const ExperimentResult& result = row.result;
+  each.time_s = row.time_s;
+  each.kind = result.outcome == Outcome::kAborted ? PeakKind::kNone : result.peak.kind;
+  each.mu_max = result.peak.mu_max;
+  each.mu_max_std = result.peak.mu_max_std;
+  each.ci95_low = result.peak.ci95_low;
+  each.ci95_high = result.peak.ci95_high;
+  each.sensor_std = result.sensor_std;
+  each.direction = result.direction;
+  each.end_stop = result.end_stop;
+  each.omega_p_rad_s = result.omega_p_rad_s;
+  each.torque_Nm = result.torque_Nm;
+  each.oil_degC = result.oil_degC;
+  return each;
+}
+
+HistoryDb::Opened HistoryDb::open(const std::string& path) {
+  Opened opened;
+  sqlite3* db = nullptr;
+  int status = sqlite3_open_v2(
+      path.c_str(), &db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, nullptr);
+  opened.db.reset(new HistoryDb(db));
+  const auto fail = [&](HistoryTrouble trouble, const std::string& text) {
+    opened.trouble = trouble;
+    opened.text = text;
+    opened.db.reset();
+    return std::move(opened);
+  };
+  if (status != SQLITE_OK) return fail(HistoryTrouble::kMissing, sqlite3_errmsg(db));
+  sqlite3_extended_result_codes(db, 1);
+  sqlite3_busy_timeout(db, kBusy_ms);
+  bool fresh = false;
+  std::string text;
+  const bool read_only = sqlite3_db_readonly(db, "main") == 1;
+  if (read_only) {
+    // Not even its write-ahead log may be made.
+    opened.db.reset();
+    opened = open_to_read(path);
+    if (opened.trouble == HistoryTrouble::kNone) opened.trouble = HistoryTrouble::kReadOnly;
+    opened.text = opened.text.empty() ? "it is read-only" : opened.text;
+    return opened;
+  }
+  const HistoryTrouble found = inspect(db, fresh, text);
+  if (found != HistoryTrouble::kNone) return fail(found, text);
+  if (sqlite3_db_readonly(db, "main") == 1) {  // its header says so
+    opened.trouble = HistoryTrouble::kReadOnly;
+    opened.text = "its header forbids it";
+    return opened;
+  }
+  status = run(db, "PRAGMA journal_mode = WAL");
+  if (status == SQLITE_DONE) status = run(db, "PRAGMA synchronous = FULL");
+  if (status == SQLITE_DONE) status = run(db, "PRAGMA wal_autocheckpoint = 0");
+  if (status != SQLITE_DONE || (fresh && !create(db))) {
+    const int code = sqlite3_extended_errcode(db);
+    return fail(trouble_of(code), sqlite3_errmsg(db));
+  }
+  run(db, "PRAGMA wal_checkpoint(TRUNCATE)");
+  return opened;
+}
+
+HistoryDb::Opened HistoryDb::open_to_read(const std::string& path) {
+  Opened opened;
+  sqlite3* db = nullptr;
+  // Without anything in the write-ahead log the file is complete by itself, and SQLite needs no
+  // files beside it, which it may not be allowed to make.
+  const bool alone = !has_content(path + "-wal");
+  const std::string uri = "file:" + escaped(path) + (alone ? "?immutable=1" : "?mode=ro");
+  const int status = sqlite3_open_v2(
+      uri.c_str(), &db, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
+  opened.db.reset(new HistoryDb(db));
+  if (status != SQLITE_OK) {
+    opened.text = sqlite3_errmsg(db);
+    opened.trouble = HistoryTrouble::kMissing;
+    opened.db.reset();
+    return opened;
+  }
+  sqlite3_extended_result_codes(db, 1);
+  sqlite3_busy_timeout(db, kBusy_ms);
+  bool fresh = false;
+  opened.trouble = inspect(db, fresh, opened.text);
+  if (opened.trouble == HistoryTrouble::kNone && fresh) {
+    opened.trouble = HistoryTrouble::kCorrupt;
+    opened.text = "it is empty";
+  }
+  // A damaged one may still have rows.
+  if (opened.trouble != HistoryTrouble::kNone && opened.trouble != HistoryTrouble::kCorrupt) {
+    opened.db.reset();
+  }
+  return opened;
+}
+
+HistoryDb::~HistoryDb() { sqlite3_close(db_); }
+
+HistoryContent HistoryDb::read() {
+  HistoryContent content;
+  // By place, not by name: a damaged name costs no rows.
+  Statement statement(db_, "SELECT * FROM experiment ORDER BY rowid");
+  std::int64_t last = 0;
+  int status;
+  while ((status = statement.step()) == SQLITE_ROW) {
+    Stored stored;
+    int column = 0;
+    sqlite3_stmt* row = statement.get();
+    stored.visit({[&](std::int64_t& value) { value = sqlite3_column_int64(row, column++); },
+                  [&](double& value) {
+                    value = sqlite3_column_type(row, column) == SQLITE_NULL
+                                ? std::numeric_limits<double>::quiet_NaN()
+                                : sqlite3_column_double(row, column);
+                    ++column;
+                  },
+                  [&](std::string& value) {
+                    const auto* text =
+                        reinterpret_cast<const char*>(sqlite3_column_text(row, column));
+                    const int size = sqlite3_column_bytes(row, column++);
+                    if (text != nullptr) value.assign(text, static_cast<std::size_t>(size));
+                  }});
+    const std::optional<HistoryRow> good = row_of(stored);
+    const bool whole =
+        good && stored.id > last && sqlite3_column_int64(row, column) == checksum(stored);
+    if (!whole || stored.id != last + 1) ++content.damaged;
+    last = stored.id;
+    if (whole) content.rows.push_back(*good);
+  }
+  if (status != SQLITE_DONE) ++content.damaged;
+  return content;
+}
+
+bool HistoryDb::is_there(HistoryRow& row) {
+  Statement same(db_,
+                 "SELECT id FROM experiment WHERE time_s = ? AND fingerprint = ? AND mu_max IS ?");
+  sqlite3_bind_double(same.get(), 1, row.time_s);
+  sqlite3_bind_text(same.get(), 2, row.fingerprint.data(), static_cast<int>(row.fingerprint.size()),
+                    SQLITE_TRANSIENT);
+  sqlite3_bind_double(same.get(), 3, row.result.peak.mu_max);
+  if (same.step() != SQLITE_ROW) return false;
+  row.id = sqlite3_column_int64(same.get(), 0);
+  return true;
+}
+
+bool HistoryDb::append(HistoryRow& row, std::string& why) {
+  const auto fail = [&] {
+    why = sqlite3_errmsg(db_);
+    run(db_, "ROLLBACK");
+    return false;
+  };
+  if (run(db_, "BEGIN IMMEDIATE") != SQLITE_DONE) return fail();
+  std::int64_t last = 0;
+  // An attempt that was reported as failed may have reached the disk after all.
+  if (is_there(row)) {
+    run(db_, "ROLLBACK");
+    return true;
+  }
+  if (query(db_, "SELECT coalesce(max(id), 0) FROM experiment", last) != SQLITE_ROW) return fail();
+  HistoryRow numbered = row;
+  numbered.id = last + 1;
+  Stored stored = stored_of(numbered);
+  std::string sql = std::string("INSERT INTO experiment (") + kColumns + ") VALUES (?";
+  for (const char* c = kColumns; *c != '\0'; ++c) sql += *c == ',' ? ", ?" : "";
+  Statement insert(db_, sql + ")");
+  int at = 0;
+  sqlite3_stmt* statement = insert.get();
+  stored.visit({[&](std::int64_t& value) { sqlite3_bind_int64(statement, ++at, value); },
+                // SQLite stores what is no number as NULL by itself.
+                [&](double& value) { sqlite3_bind_double(statement, ++at, value); },
+                [&](std::string& value) {
+                  sqlite3_bind_text(statement, ++at, value.data(), static_cast<int>(value.size()),
+                                    SQLITE_TRANSIENT);
+                }});
+  sqlite3_bind_int64(statement, ++at, checksum(stored));
+  if (insert.step() != SQLITE_DONE) return fail();
+  if (run(db_, "COMMIT") != SQLITE_DONE) return fail();
+  row = numbered;
+  // Where it cannot be folded back now (a reader, a full disk), the row is safe in the log.
+  run(db_, "PRAGMA wal_checkpoint(TRUNCATE)");
+  return true;
+}
+
+}  // namespace beltgrip::daemon

@@ -1,0 +1,105 @@
+#include "daemon/io/reloader.h"
+
+#include <charconv>
+#include <utility>
+
+#include "daemon/core/config_fingerprint.h"
+#include "daemon/core/own_frames.h"
+#include "daemon/io/rt_setup.h"
+
+namespace beltgrip::daemon {
+
+namespace {
+
+std::string quoted(const std::string& text) { return '"' + text + '"'; }
+
+std::string shortest(double value) {
+  char digits[32];
+  return {digits, std::to_chars(digits, digits + sizeof digits, value).ptr};
+}
+
+// What a daemon holds as long as it lives; empty: nothing of it has changed.
+std::string needs_restart(const Config& running, const Config& found) {
+  const auto line = [](const char* key, const std::string& now, const std::string& before) {
+    return std::string(key) + ": found " + now + ", expected " + before +
+           " (only a restart changes it)";
+  };
+  if (found.interface != running.interface) {
+    return line("bus.interface", quoted(found.interface), quoted(running.interface));
+  }
+  const auto further = [](const Config& config) {
+    return config.further_bus ? config.further_bus->interface : std::string();
+  };
+  if (further(found) != further(running)) {
+    std::string key = "bus";
+    for (const Config* config : {&found, &running}) {
+      if (key == "bus" && config->further_bus) key += "." + config->further_bus->name;
+    }
+    return line((key + ".interface").c_str(), quoted(further(found)), quoted(further(running)));
+  }
+  if (found.state_dir != running.state_dir) {
+    return line("daemon.state_dir", quoted(found.state_dir), quoted(running.state_dir));
+  }
+  if (found.estimator.sample_rate_hz != running.estimator.sample_rate_hz) {
+    return line("estimator.sample_rate_hz", shortest(found.estimator.sample_rate_hz),
+                shortest(running.estimator.sample_rate_hz));
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<WantedFrames> wanted_frames(const Config& config) {
+  std::vector<WantedFrames> wanted;
+  wanted.reserve(2 * config.roles.size() + kOwnMessageCount);
+  for (const RoleBinding& role : config.roles) {
+    wanted.push_back({role.id, role.sources.any(), role.bus});
+    // Another tester's requests: it has the right of way.
+    if (role.uds) wanted.push_back({role.uds->request, false, role.bus});
+  }
+  // Our own: an echo says that a frame has left, another node's is a fault.
+  for (std::size_t i = 0; i < kOwnMessageCount; ++i) {
+    wanted.push_back(
+        {{own_identifier(config.identifiers, static_cast<OwnMessage>(i)), false}, false});
+  }
+  return wanted;
+}
+
+Reloader::Reloader(std::string path, const Config& running, ReloadSlot& slot, Say say)
+    : path_(std::move(path)), running_(running), slot_(slot), say_(std::move(say)) {}
+
+bool Reloader::request() {
+  const ConfigResult loaded = load_config(path_);
+  std::string wrong;
+  if (!loaded.config) {
+    wrong = loaded.errors.front().text;
+    const std::size_t more = loaded.errors.size() - 1;
+    if (more > 0) wrong += " (and " + std::to_string(more) + " more)";
+  } else if (wrong = needs_restart(running_, *loaded.config); !wrong.empty()) {
+    wrong = path_ + ": " + wrong;
+  }
+  if (!loaded.config || !wrong.empty()) {
+    say_(true, "reload refused, the old configuration stays: " + wrong);
+    return false;
+  }
+  const Config& config = *loaded.config;
+  const bool same_belt = config_fingerprint(config) == config_fingerprint(running_);
+  std::unique_ptr<Reload> reload(
+      new Reload{config, wanted_frames(config), same_belt, Pipeline(config)});
+  // What the real-time thread is about to touch.
+  if (std::string memory; !lock_memory(memory)) say_(false, "reload: " + memory);
+  slot_.offer(std::move(reload));
+  waiting_ = true;
+  return true;
+}
+
+bool Reloader::turn() {
+  const std::unique_ptr<Reload> taken = slot_.collect();
+  if (taken == nullptr) return false;
+  running_ = taken->config;
+  waiting_ = false;
+  say_(false, "reload: " + path_ + " is in force");
+  return true;
+}
+
+}  // namespace beltgrip::daemon

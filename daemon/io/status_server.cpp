@@ -1,0 +1,177 @@
+#include "daemon/io/status_server.h"
+
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "daemon/core/arming.h"
+#include "daemon/core/event.h"
+
+namespace beltgrip::daemon {
+
+namespace {
+
+using Json = nlohmann::ordered_json;  // NaN and infinity become null
+
+constexpr std::array<const char*, 4> kPhases{"Quiet", "Excited", "Peak", "MacroSlip"};
+constexpr std::array<const char*, 6> kQualities{"valid", "learning", "frozen",
+                                                "stale", "missing",  "unbound"};
+// By can::Dimension.
+constexpr std::array<const char*, 9> kUnits{"rad/s", "Pa", "Nm", "degC", "m/s", "1", "N", "m", ""};
+constexpr double kMicrosecond = 1e3;
+constexpr int kWaitingMost = 8;
+
+double seconds(Duration duration) { return static_cast<double>(duration) / double{kSecond}; }
+
+Json latency(const LatencyHistogram& histogram) {
+  const auto us = [](Duration duration) { return static_cast<double>(duration) / kMicrosecond; };
+  Json classes = Json::array();
+  for (std::size_t i = 0; i < LatencyHistogram::kClasses; ++i) {
+    if (histogram.count_of(i) == 0) continue;
+    classes.push_back({us(histogram.upper_bound(i)), histogram.count_of(i)});
+  }
+  return {{"count", histogram.count()},
+          {"p50_us", us(histogram.quantile(0.5))},
+          {"p99_us", us(histogram.quantile(0.99))},
+          {"p999_us", us(histogram.quantile(0.999))},
+          {"max_us", us(histogram.maximum())},
+          {"classes", std::move(classes)}};
+}
+
+Json signals(MonoTime now, const Observation& observation) {
+  Json all = Json::object();
+  for (std::size_t i = 0; i < kRoleCount; ++i) {
+    const SignalObservation& seen = observation.signals[i];
+    if (seen.quality == SignalQuality::kUnbound) continue;
+    const auto role = static_cast<Role>(i);
+    Json& one = all[std::string(role_name(role))];
+    one["quality"] = kQualities[static_cast<std::size_t>(seen.quality)];
+    one["age_s"] = seen.seen ? Json(seconds(now - seen.t)) : Json();
+    one["value"] = seen.seen ? Json(seen.value) : Json();
+    one["unit"] = kUnits[static_cast<std::size_t>(role_dimension(role))];
+  }
+  return all;
+}
+
+Json result(MonoTime now, const ExperimentResult& last) {
+  if (last.outcome == Outcome::kNone) return {};
+  const estimator::PeakEstimate& peak = last.peak;
+  const bool value = peak.kind == estimator::PeakKind::kValue;
+  const bool bound = peak.kind == estimator::PeakKind::kLowerBound;
+  return {{"outcome", outcome_name(last.outcome)},
+          {"stop_reason", stop_reason_name(last.stop_reason)},
+          {"age_s", seconds(now - last.end)},
+          {"mu_max", value ? Json(peak.mu_max) : Json()},
+          {"mu_max_std", value ? Json(peak.mu_max_std) : Json()},
+          {"mu_max_lower_bound", bound ? Json(peak.mu_max) : Json()}};
+}
+
+// Null where no role comes from there.
+Json diagnostics(const Config& config, const UdsCounters& counters) {
+  const bool used = std::any_of(config.roles.begin(), config.roles.end(),
+                                [](const RoleBinding& role) { return role.uds.has_value(); });
+  if (!used) return {};
+  return {{"polls", config.diagnostics == Diagnostics::kPoll},
+          {"requests", counters.requests},
+          {"answers", counters.answers},
+          {"refusals", counters.refusals},
+          {"last_refusal", counters.refusals > 0 ? Json(counters.last_code) : Json()},
+          {"without_answer", counters.timeouts},
+          {"broken", counters.broken},
+          {"frames_of_another_tester", counters.foreign}};
+}
+
+template <std::size_t kCount>
+Json names(std::uint32_t bits, const std::array<std::string_view, kCount>& all) {
+  Json set = Json::array();
+  for (std::size_t i = 0; i < kCount; ++i) {
+    if ((bits >> i & 1U) != 0) set.push_back(all[i]);
+  }
+  return set;
+}
+
+}  // namespace
+
+std::string status_json(const Config& config, MonoTime now, const Observation& observation) {
+  const SampleReport& report = observation.report;
+  const estimator::CurveEstimate& curve = report.curve;
+  const bool usable = curve.usable && report.sample.usable;
+  const Json status{
+      {"interface", config.interface},
+      {"control", config.control == Control::kCommand ? "command" : "observe"},
+      {"age_s", seconds(now - observation.t)},
+      {"state", state_name(report.state)},
+      {"phase", kPhases[static_cast<std::size_t>(curve.phase)]},
+      {"in_experiment", report.in_experiment},
+      {"macro_slip_stop", report.macro_slip_stop},
+      {"request_force_N", report.request_force_N},
+      {"mu_star", usable ? Json(curve.mu_star) : Json()},
+      {"sigma_star_percent", usable ? Json(curve.sigma_star_percent) : Json()},
+      {"friction_slope", usable ? Json(curve.friction_slope) : Json()},
+      {"faults", names(report.faults, kFaultNames)},
+      {"inhibits", names(report.inhibits, kInhibitNames)},
+      {"result", result(now, report.result)},
+      {"signals", signals(now, observation)},
+      {"counters",
+       {{"frames", observation.pipeline.frames},
+        {"frames_decoded", observation.pipeline.frames_decoded},
+        {"frames_bad", observation.pipeline.frames_bad},
+        {"frames_refused", observation.pipeline.frames_refused},
+        {"samples", observation.pipeline.samples},
+        {"samples_late", observation.loop.counters.samples_late},
+        {"sends_failed", observation.loop.counters.sends_failed}}},
+      {"diagnostics", diagnostics(config, observation.pipeline.diagnostics)},
+      {"latency",
+       {{"wake_up", latency(observation.loop.wake_up)},
+        {"sample_to_frame", latency(observation.loop.sample_to_frame)},
+        {"frame_age", latency(observation.loop.frame_age)}}},
+  };
+  return status.dump() + "\n";
+}
+
+StatusServer::StatusServer(const std::string& folder, std::string& error) {
+  if (folder.empty()) return;
+  path_ = folder + "/status.sock";
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  constexpr mode_t kEverybody = 0666;
+  if (path_.size() < sizeof address.sun_path) {
+    path_.copy(address.sun_path, path_.size());
+    unlink(path_.c_str());  // left by one that was killed
+    socket_ = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (socket_ >= 0 && bind(socket_, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0 &&
+        chmod(path_.c_str(), kEverybody) == 0 && listen(socket_, kWaitingMost) == 0) {
+      return;
+    }
+  } else {
+    errno = ENAMETOOLONG;
+  }
+  error = path_ + ": no status to ask for (" + std::strerror(errno) + ")";
+  path_.clear();
+}
+
+StatusServer::~StatusServer() {
+  if (socket_ >= 0) close(socket_);
+  if (!path_.empty()) unlink(path_.c_str());
+}
+
+void StatusServer::turn(const Config& config, MonoTime now, const Observation* newest) {
+  if (socket_ < 0 || newest == nullptr) return;
+  for (int answered = 0; answered < kWaitingMost; ++answered) {
+    const int peer = accept4(socket_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (peer < 0) return;
+    // It fits into the socket's buffer, or the reader gets what fits.
+    const std::string text = status_json(config, now, *newest);
+    ::send(peer, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    close(peer);
+  }
+}
+
+}  // namespace beltgrip::daemon

@@ -1,0 +1,31 @@
+// Answers `beltgrip status`: whoever connects to the socket status.sock in the runtime directory
+// gets one JSON object and the end of the stream. Never waits for a reader. Helper thread only.
+#pragma once
+
+#include <string>
+
+#include "daemon/core/config.h"
+#include "daemon/core/observation.h"
+
+namespace beltgrip::daemon {
+
+// Absent things are null; times in s, latencies in us, everything else in SI with the unit beside
+// it.
+std::string status_json(const Config& config, MonoTime now, const Observation& observation);
+
+class StatusServer {
+ public:
+  // folder empty: nobody can ask. error, if not empty, is one line for the log.
+  StatusServer(const std::string& folder, std::string& error);
+  ~StatusServer();
+  StatusServer(const StatusServer&) = delete;
+  StatusServer& operator=(const StatusServer&) = delete;
+  // Answers all who wait. newest is nullptr before the first sample: then they wait on.
+  void turn(const Config& config, MonoTime now, const Observation* newest);
+
+ private:
+  std::string path_;
+  int socket_ = -1;
+};
+
+}  // namespace beltgrip::daemon
