@@ -62,7 +62,10 @@ std::unique_ptr<daemon::Port> open_bus(const std::string& name,
   if (name.starts_with(kInproc)) {
     return daemon::InprocBus::named(name.substr(kInproc.size()))->connect();
   }
-  auto opened = daemon::SocketPort::open(name, identifiers, stop_fd);
+  std::vector<daemon::WantedFrames> wanted;
+  wanted.reserve(identifiers.size());
+  for (const can::CanId id : identifiers) wanted.push_back({id, false});
+  auto opened = daemon::SocketPort::open(name, wanted, stop_fd);
   if (const auto* error = std::get_if<daemon::BusError>(&opened)) {
     throw Failure{kUnavailable, error->text};
   }
@@ -82,6 +85,29 @@ bool play(daemon::Port& port, const std::string& name, double speed,
     if (!send(port, name, stamped.frame)) return false;
   }
   return true;
+}
+
+bool play_node(daemon::Port& port, double speed, const NodeStep& advance) {
+  constexpr daemon::Duration kStep = daemon::kMillisecond;
+  const daemon::MonoTime origin = port.now();
+  std::array<daemon::RxFrame, 64> frames;
+  std::vector<can::CanFrame> out;
+  for (std::int64_t now_ns = 0;; now_ns += kStep) {
+    const auto due = origin + static_cast<daemon::Duration>(static_cast<double>(now_ns) / speed);
+    std::size_t count = 0;
+    for (;;) {
+      const daemon::Wake wake = port.wait_until(due);
+      if (wake == daemon::Wake::kClosed) return false;
+      if (wake == daemon::Wake::kDeadline) break;
+      count = port.receive(frames);
+      out.clear();
+      if (!advance(now_ns, {frames.data(), count}, out)) return true;
+      for (const can::CanFrame& frame : out) static_cast<void>(port.send(frame));
+    }
+    out.clear();
+    if (!advance(now_ns, {}, out)) return true;
+    for (const can::CanFrame& frame : out) static_cast<void>(port.send(frame));
+  }
 }
 
 }  // namespace beltgrip::cli

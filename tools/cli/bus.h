@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -24,5 +25,12 @@ std::unique_ptr<daemon::Port> open_bus(const std::string& name,
 // stopped before the end. Throws Failure 69 when the bus goes away.
 bool play(daemon::Port& port, const std::string& name, double speed,
           const std::function<bool(can::StampedFrame&)>& next);
+
+// A node that answers. Every millisecond of its own time, `advance` gets that time and the frames
+// that have come, leaves the frames to be sent, and returns false at its end. What a bus that is
+// down or full does not take is lost, as on any node. False when it was stopped before the end.
+using NodeStep = std::function<bool(std::int64_t now_ns, std::span<const daemon::RxFrame> received,
+                                    std::vector<can::CanFrame>& out)>;
+bool play_node(daemon::Port& port, double speed, const NodeStep& advance);
 
 }  // namespace beltgrip::cli

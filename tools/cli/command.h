@@ -8,6 +8,8 @@
 
 namespace beltgrip::cli {
 
+void add_calibrate(CLI::App& app);
+void add_history(CLI::App& app);
 void add_init(CLI::App& app);
 void add_monitor(CLI::App& app);
 void add_replay(CLI::App& app);

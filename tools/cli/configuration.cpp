@@ -1,8 +1,13 @@
 #include "tools/cli/configuration.h"
 
+#include <unistd.h>
+
 #include <cstdio>
+#include <filesystem>
+#include <memory>
 
 #include "tools/cli/exit_codes.h"
+#include "tools/cli/output_file.h"
 
 namespace beltgrip::cli {
 
@@ -23,6 +28,19 @@ daemon::Config load_configuration(const std::string& path, const std::string& me
         method == "paper" ? estimator::Method::kPaper : estimator::Method::kRobust;
   }
   return std::move(*result.config);
+}
+
+daemon::Config load_configuration_text(std::string_view toml, std::string_view dbc,
+                                       const std::string& method) {
+  std::string folder = (std::filesystem::temp_directory_path() / "beltgrip.XXXXXX").string();
+  if (mkdtemp(folder.data()) == nullptr) {
+    throw Failure{kCannotCreate, folder + ": no temporary directory can be made"};
+  }
+  const std::unique_ptr<const char, void (*)(const char*)> remove(
+      folder.c_str(), [](const char* path) { std::filesystem::remove_all(path); });
+  write_file(folder + "/vehicle.dbc", dbc);
+  write_file(folder + "/beltgrip.toml", toml);
+  return load_configuration(folder + "/beltgrip.toml", method);
 }
 
 }  // namespace beltgrip::cli

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "daemon/core/config.h"
 
@@ -9,5 +10,8 @@ namespace beltgrip::cli {
 
 // method: empty, or what --method says ("robust", "paper").
 daemon::Config load_configuration(const std::string& path, const std::string& method);
+// The same for texts that are in no file; the configuration names the DBC "vehicle.dbc".
+daemon::Config load_configuration_text(std::string_view toml, std::string_view dbc,
+                                       const std::string& method);
 
 }  // namespace beltgrip::cli

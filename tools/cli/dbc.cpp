@@ -1,5 +1,8 @@
 #include "tools/cli/dbc.h"
 
+#include <poll.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -9,6 +12,7 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -63,11 +67,12 @@ Tally tally(const std::vector<can::Problem>& problems) {
   return count;
 }
 
+std::string counted(std::size_t count, const char* what) {
+  return std::to_string(count) + ' ' + what + (count == 1 ? "" : "s");
+}
+
 std::string text_of(const Tally& count) {
-  const auto number = [](std::size_t n, const char* what) {
-    return std::to_string(n) + ' ' + what + (n == 1 ? "" : "s");
-  };
-  return number(count.errors, "error") + ", " + number(count.warnings, "warning");
+  return counted(count.errors, "error") + ", " + counted(count.warnings, "warning");
 }
 
 // One line on standard error if there is anything to know about the file.
@@ -91,7 +96,13 @@ void check(const std::string& path, bool strict) {
   if (result.database.messages.empty()) fail_without_message(path);
   const std::string summary = path + ": " + text_of(count);
   if (count.errors > 0 || (strict && count.warnings > 0)) throw Failure{kBadInput, summary};
-  std::fprintf(stderr, "%s\n", summary.c_str());
+  std::size_t signals = 0;
+  for (const can::MessageDef& message : result.database.messages) signals += message.signals.size();
+  const std::string read = counted(result.database.messages.size(), "message") + ", " +
+                           counted(signals, "signal") + " read";
+  std::fprintf(stderr, "%s; %s\n",
+               count.warnings == 0 ? (path + ": no problems").c_str() : summary.c_str(),
+               read.c_str());
 }
 
 // --- show ----------------------------------------------------------------------------------------
@@ -107,6 +118,56 @@ std::string number_text(double value) {
   return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
 }
 
+std::string on_one_line(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
+  return text;
+}
+
+std::string type_text(can::ValueType type) {
+  switch (type) {
+    case can::ValueType::kUnsigned:
+      return "unsigned";
+    case can::ValueType::kSigned:
+      return "signed";
+    default:
+      return "float";
+  }
+}
+
+// ", selected by Page = 1, 3-5"
+std::string selection_text(const can::MuxRule& rule) {
+  std::string text = ", selected by " + rule.selector;
+  const char* before = " = ";
+  for (const auto& [first, last] : rule.ranges) {
+    text += before + std::to_string(first);
+    if (last != first) text += '-' + std::to_string(last);
+    before = ", ";
+  }
+  return text;
+}
+
+void print_signal(const can::SignalDef& signal) {
+  std::printf("  %s: bit %" PRIu32 ", %" PRIu32 " bits, %s endian, %s, factor %s, offset %s",
+              signal.name.c_str(), signal.start_bit, signal.length,
+              signal.byte_order == can::ByteOrder::kLittle ? "little" : "big",
+              type_text(signal.type).c_str(), number_text(signal.scale).c_str(),
+              number_text(signal.offset).c_str());
+  if (!signal.unit.empty()) std::printf(" %s", signal.unit.c_str());
+  if (signal.minimum < signal.maximum) {
+    std::printf(", from %s to %s", number_text(signal.minimum).c_str(),
+                number_text(signal.maximum).c_str());
+  }
+  if (signal.is_multiplexer) std::printf(", multiplexer");
+  if (signal.multiplexed_by) std::printf("%s", selection_text(*signal.multiplexed_by).c_str());
+  std::printf("\n");
+  for (const auto& [key, label] : signal.values) {
+    std::printf("      %s = %s\n", can::value_key_text(signal, key).c_str(),
+                on_one_line(label).c_str());
+  }
+  if (!signal.comment.empty()) std::printf("      \"%s\"\n", on_one_line(signal.comment).c_str());
+}
+
 void print_readably(const can::Database& database) {
   for (const can::MessageDef& message : database.messages) {
     std::printf("%s %s, %" PRIu32 " bytes%s", id_text(message.id).c_str(), message.name.c_str(),
@@ -114,18 +175,8 @@ void print_readably(const can::Database& database) {
     if (message.j1939) std::printf(", J1939");
     if (message.cycle_ms) std::printf(", every %g ms", *message.cycle_ms);
     std::printf("\n");
-    for (const can::SignalDef& signal : message.signals) {
-      std::printf("  %s: bit %" PRIu32 ", %" PRIu32 " bits, %s endian, factor %s, offset %s",
-                  signal.name.c_str(), signal.start_bit, signal.length,
-                  signal.byte_order == can::ByteOrder::kLittle ? "little" : "big",
-                  number_text(signal.scale).c_str(), number_text(signal.offset).c_str());
-      if (!signal.unit.empty()) std::printf(" %s", signal.unit.c_str());
-      if (signal.is_multiplexer) std::printf(", multiplexer");
-      if (signal.multiplexed_by) {
-        std::printf(", selected by %s", signal.multiplexed_by->selector.c_str());
-      }
-      std::printf("\n");
-    }
+    if (!message.comment.empty()) std::printf("  \"%s\"\n", on_one_line(message.comment).c_str());
+    for (const can::SignalDef& signal : message.signals) print_signal(signal);
   }
 }
 
@@ -335,16 +386,20 @@ class Decoder {
   std::string interface_json_ = R"("")";
 };
 
-void decode(const std::vector<std::string>& dbc_paths, const std::string& log_path, bool with_raw,
-            const std::string& json_path) {
-  Decoder decoder(dbc_paths, with_raw);
+// More stands ready on standard input, or it is at its end. Where nothing does, the lines written
+// so far must not wait for what may come much later.
+bool input_waits() {
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  return ::poll(&input, 1, 0) > 0;
+}
+
+void decode_log(Decoder& decoder, const std::string& log_path, OutputFile& out) {
   std::unique_ptr<can::LogReader> log;
   try {
     log = can::LogReader::open(log_path);
   } catch (const can::LogOpenError& error) {
     throw Failure{kNoInput, error.text};
   }
-  OutputFile out(json_path);
   can::LogRecord record;
   std::string lines;
   std::uint64_t decoded = 0;
@@ -352,12 +407,13 @@ void decode(const std::vector<std::string>& dbc_paths, const std::string& log_pa
   const bool live = log_path == "-";
   while (log->next(record)) {
     if (decoder.append(record, lines)) ++decoded;
-    if (lines.size() < kBlock && !live) continue;
+    const bool hand_on = live && !input_waits();
+    if (lines.size() < kBlock && !hand_on) continue;
     out.write(lines);
+    if (hand_on) out.flush();
     lines.clear();
   }
   out.write(lines);
-  out.close();
 
   const can::LogStats& stats = log->stats();
   for (const can::BadLine& bad : stats.first_bad) {
@@ -372,6 +428,25 @@ void decode(const std::vector<std::string>& dbc_paths, const std::string& log_pa
   }
 }
 
+// One log after the other; one that cannot be used does not hide the rest.
+void decode(const std::vector<std::string>& dbc_paths, const std::vector<std::string>& log_paths,
+            bool with_raw, const std::string& json_path) {
+  Decoder decoder(dbc_paths, with_raw);
+  OutputFile out(json_path);
+  std::optional<Failure> failure;
+  for (const std::string& log_path : log_paths) {
+    try {
+      decode_log(decoder, log_path, out);
+    } catch (const Failure& found) {
+      if (found.exit_code != kNoInput && found.exit_code != kBadInput) throw;
+      if (failure) std::fprintf(stderr, "%s\n", found.text.c_str());
+      if (!failure) failure = found;
+    }
+  }
+  out.close();
+  if (failure) throw *failure;
+}
+
 }  // namespace
 
 void add_dbc(CLI::App& app) {
@@ -381,7 +456,7 @@ void add_dbc(CLI::App& app) {
   struct Options {
     std::vector<std::string> dbc_paths;
     std::string path;
-    std::string log_path = "-";
+    std::vector<std::string> log_paths{"-"};
     std::string show_json_path;
     std::string decode_json_path = "-";
     bool raw = false;
@@ -401,13 +476,13 @@ void add_dbc(CLI::App& app) {
       ->required()
       ->allow_extra_args(false);
   decode_command->add_option(
-      "LOG", options->log_path,
-      "candump, .asc, .trc or .csv log, plain, .gz or .zst; - is standard input");
+      "LOG", options->log_paths,
+      "candump, .asc, .trc or .csv logs, plain, .gz or .zst; - is standard input");
   decode_command->add_flag("--raw", options->raw, "add the raw values");
   decode_command->add_option("--json", options->decode_json_path,
                              "write to this file instead of standard output (-)");
   decode_command->callback([options] {
-    decode(options->dbc_paths, options->log_path, options->raw, options->decode_json_path);
+    decode(options->dbc_paths, options->log_paths, options->raw, options->decode_json_path);
   });
 
   CLI::App* check_command = dbc->add_subcommand("check", "list every problem of a DBC file");

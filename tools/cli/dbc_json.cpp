@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <map>
 #include <string_view>
 
@@ -138,19 +139,29 @@ class DatabaseWriter {
     json_.end_array();
   }
 
-  // Attributes defined as numbers are numbers.
+  // False, and nothing written, where not all of the text is such a number.
+  template <typename Number>
+  bool write_as(const std::string& text) {
+    Number number{};
+    const char* const end = text.data() + text.size();
+    const auto [rest, status] = std::from_chars(text.data(), end, number);
+    if (status != std::errc{} || rest != end || !std::isfinite(static_cast<double>(number))) {
+      return false;
+    }
+    json_.value(number);
+    return true;
+  }
+
+  // Attributes defined as numbers are numbers, with every digit of a whole one; what is no number
+  // that JSON has stays text.
   void write(const Attributes& attributes) {
     json_.begin_object();
     for (const auto& [name, text] : attributes) {
       json_.key(name);
       const auto definition = is_number_.find(name);
-      double number = 0.0;
-      const char* const end = text.data() + text.size();
-      const bool whole_text = definition != is_number_.end() && definition->second &&
-                              std::from_chars(text.data(), end, number).ptr == end && !text.empty();
-      if (whole_text) {
-        json_.value(number);
-      } else {
+      const bool is_number = definition != is_number_.end() && definition->second;
+      if (!is_number || !(write_as<std::uint64_t>(text) || write_as<std::int64_t>(text) ||
+                          write_as<double>(text))) {
         json_.value(text);
       }
     }

@@ -10,8 +10,10 @@
 #include <vector>
 
 #include "daemon/core/config.h"
+#include "tools/cli/log_table.h"
 #include "tools/cli/output_file.h"
 #include "tools/diagnose/diagnose.h"
+#include "tools/diagnose/html.h"
 #include "tools/diagnose/json.h"
 
 namespace beltgrip::cli {
@@ -29,10 +31,8 @@ void request_stop(int) { stop_requested = 1; }
 bool is_table(const std::string& path) { return path.ends_with(".csv"); }
 
 daemon::Config load(const Options& options) {
-  const auto all_tables = [](const std::vector<std::string>& paths) {
-    return std::all_of(paths.begin(), paths.end(), is_table);
-  };
-  const bool tables = all_tables(options.logs) && all_tables(options.held_out);
+  const bool tables = std::all_of(options.logs.begin(), options.logs.end(), is_table) &&
+                      std::all_of(options.held_out.begin(), options.held_out.end(), is_table);
   const daemon::ConfigResult result = daemon::load_config(
       options.config, tables ? daemon::ConfigScope::kVariator : daemon::ConfigScope::kSignals);
   for (const std::string& warning : result.warnings) std::fprintf(stderr, "%s\n", warning.c_str());
@@ -45,9 +45,8 @@ daemon::Config load(const Options& options) {
   return *result.config;
 }
 
-diagnose::SignalTable read(const std::string& path) {
-  if (!is_table(path))
-    throw Failure{kConfiguration, path + ": logs are not in this version, only .csv"};
+diagnose::SignalTable read(const std::string& path, const daemon::Config& config) {
+  if (!is_table(path)) return read_log(path, config);
   try {
     return diagnose::read_csv(path);
   } catch (const diagnose::TableError& error) {
@@ -64,6 +63,8 @@ void show_progress(double share, const std::string& what) {
 }
 
 void run(const Options& options) {
+  std::signal(SIGINT, request_stop);
+  std::signal(SIGTERM, request_stop);
   const daemon::Config config = load(options);
   diagnose::Request request;
   request.model = diagnose::nominal_model(config.variator);
@@ -74,15 +75,16 @@ void run(const Options& options) {
       throw Failure{error.missing_file ? kNoInput : kConfiguration, error.text};
     }
   }
-  for (const std::string& path : options.logs) request.experiments.push_back(read(path));
-  for (const std::string& path : options.held_out) request.held_out.push_back(read(path));
+  for (const std::string& path : options.logs) request.experiments.push_back(read(path, config));
+  for (const std::string& path : options.held_out) request.held_out.push_back(read(path, config));
   const auto output = [](const std::string& path) {
     return path.empty() ? nullptr : std::make_unique<OutputFile>(path);
   };
   const auto json = output(options.json);
   const auto model_out = output(options.model_out);
-  std::signal(SIGINT, request_stop);
-  std::signal(SIGTERM, request_stop);
+  const auto report = output(options.report);
+  request.with_plots = report != nullptr;
+  request.jobs = options.jobs;
   request.stop = [] { return stop_requested != 0; };
   if (isatty(STDERR_FILENO) != 0) request.progress = show_progress;
   const diagnose::Answer answer = diagnose::diagnose(std::move(request));
@@ -90,6 +92,10 @@ void run(const Options& options) {
   if (json) {
     json->write(diagnose::json_text(answer.diagnosis));
     json->close();
+  }
+  if (report) {
+    report->write(diagnose::html_text(answer.diagnosis, answer.plots));
+    report->close();
   }
   if (model_out) {
     model_out->write(diagnose::model_text(answer.extended));
@@ -108,8 +114,10 @@ void add_diagnose(CLI::App& app) {
   command->add_option("--model", options->model, "model file: what the simulation believes");
   command->add_option("--held-out", options->held_out, "experiments for the gain only");
   command->add_option("--json", options->json, "result as JSON; - for standard output");
+  command->add_option("--report", options->report, "result with plots as one HTML file");
   command->add_option("--model-out", options->model_out, "writes the extended model");
-  command->add_option("--jobs", options->jobs, "cores to use")->check(CLI::PositiveNumber);
+  command->add_option("--jobs", options->jobs, "threads; the same answer for any number")
+      ->check(CLI::Range(1, 256));
   command->callback([options] { run(*options); });
 }
 

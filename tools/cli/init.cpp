@@ -110,6 +110,18 @@ void run(const Options& options) {
     if (role > Role::kPrimaryTorque) append_role(text, role, false, databases);
   }
   text +=
+      "\n# A signal that no frame broadcasts may come from diagnostics (UDS "
+      "ReadDataByIdentifier):\n"
+      "# secondary_pressure = { uds = { request = 0x7E1, response = 0x7E9, did = 0x1101, start = "
+      "7,\n"
+      "#   length = 16, byte_order = \"big\", scale = 1.0, offset = 0.0 }, unit = \"kPa\", "
+      "period_ms "
+      "= 50 }\n"
+      "# It is taken from the answers that another tester asks for; [bus] diagnostics = \"poll\" "
+      "asks itself.\n"
+      "# On a second interface: [bus.diag] with interface = \"can1\", and bus = \"diag\" in the "
+      "role.\n";
+  text +=
       "\n# [variator], [sensors], [estimator], [experiment]: every key has a default; see the\n"
       "# documented default file. Piston area, spring and end-stop ratios are the vehicle's own.\n";
   OutputFile file(options.out);

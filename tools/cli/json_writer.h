@@ -1,5 +1,6 @@
 // JSON text, one value after the other, without a document in memory. Numbers are the shortest text
-// that reads back to the same double; NaN and infinity are null. Tools only.
+// that reads back to the same double; NaN and infinity are null. Text that is not UTF-8 (the name
+// of a file, of an interface in a log) is read as Windows-1252, for JSON is UTF-8. Tools only.
 #pragma once
 
 #include <charconv>
@@ -9,6 +10,8 @@
 #include <limits>
 #include <string>
 #include <string_view>
+
+#include "can_dbc/text_encoding.h"
 
 namespace beltgrip::cli {
 
@@ -88,6 +91,7 @@ class JsonWriter {
     return raw({buffer, static_cast<std::size_t>(end - buffer)});
   }
   void quote(std::string_view text) {
+    if (!can::is_utf8(text)) return quote(can::utf8_from_windows_1252(text));
     static constexpr char kHex[] = "0123456789abcdef";
     text_ += '"';
     for (const char c : text) {

@@ -28,6 +28,7 @@ class OutputFile {
 
   std::FILE* get() { return file_; }
   void write(std::string_view text) { std::fwrite(text.data(), 1, text.size(), file_); }
+  void flush() { std::fflush(file_); }
   // Everything is on its way, or Failure.
   void close() {
     const bool bad = std::ferror(file_) != 0;

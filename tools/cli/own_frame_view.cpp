@@ -11,6 +11,7 @@ namespace beltgrip::cli {
 namespace {
 
 constexpr std::int64_t kRowPeriod_ns = 500'000'000;
+constexpr std::int64_t kCalmPeriod_ns = 2'000'000'000;
 constexpr std::int64_t kTogether_ns = 3'000'000;
 constexpr std::uint64_t kRowsPerHeader = 50;
 constexpr std::uint8_t kMaxDelta = 3;  // frames that may be lost in a row, plus one
@@ -133,22 +134,25 @@ void BusTable::on_frame(std::int64_t t_ns, const OwnFrameView& view) {
       now_.mu_max = kind == "LowerBound" ? "at least " + fixed(view, "MuMax", 4) : "-";
     }
     now_.force = fixed(view, "MinClampForce", 0);
+  } else if (name == "BeltGripClamp") {
+    now_.asks = view.value("RequestActive") > 0.5 ? fixed(view, "SecondaryForce", 0) : "-";
   } else if (name == "BeltGripStatus") {
     now_.state = lower(view.label("State"));
   }
-  const bool due = !last_row_ns_ || t_ns - *last_row_ns_ >= kRowPeriod_ns;
+  const bool due =
+      !last_row_ns_ || t_ns - *last_row_ns_ >= (now_.calm() ? kCalmPeriod_ns : kRowPeriod_ns);
   if (!change_ns_ && (due || now_.differs(shown_))) change_ns_ = t_ns;
 }
 
 void BusTable::row(std::int64_t t_ns) {
   if (rows_++ % kRowsPerHeader == 0) {
-    std::fprintf(out_, "%11s  %-11s %-11s %7s %7s %9s  %-5s %-18s %s\n", "time", "state", "phase",
-                 "mu*", "slip %", "slope 1/%", "stop", "mu_max", "min clamp N");
+    std::fprintf(out_, "%11s  %-11s %6s  %-11s %7s %7s %9s  %-5s %-18s %s\n", "time", "state",
+                 "asks N", "phase", "mu*", "slip %", "slope 1/%", "stop", "mu_max", "min clamp N");
   }
-  std::fprintf(out_, "%9.3f s  %-11s %-11s %7s %7s %9s  %-5s %-18s %s\n",
-               static_cast<double>(t_ns) * 1e-9, now_.state.c_str(), now_.phase.c_str(),
-               now_.mu_star.c_str(), now_.sigma.c_str(), now_.slope.c_str(), now_.stop.c_str(),
-               now_.mu_max.c_str(), now_.force.c_str());
+  std::fprintf(out_, "%9.3f s  %-11s %6s  %-11s %7s %7s %9s  %-5s %-18s %s\n",
+               static_cast<double>(t_ns) * 1e-9, now_.state.c_str(), now_.asks.c_str(),
+               now_.phase.c_str(), now_.mu_star.c_str(), now_.sigma.c_str(), now_.slope.c_str(),
+               now_.stop.c_str(), now_.mu_max.c_str(), now_.force.c_str());
   std::fflush(out_);
   shown_ = now_;
   last_row_ns_ = t_ns;

@@ -47,8 +47,9 @@ class OwnFrameDecoder {
 
 std::string json_line(std::int64_t t_ns, const OwnFrameView& view);
 
-// The table: a row every half second of the bus's time, and one for a change of state, stop flag or
-// result, or of the phase before the stop. Frames that say one change together make one row.
+// The table: a row every half second of the bus's time while something goes on, every two seconds
+// else, and one for a change of state, stop flag or result, and for the peak before the stop.
+// Frames that say one change together make one row.
 class BusTable {
  public:
   explicit BusTable(std::FILE* out) : out_(out) {}
@@ -57,13 +58,15 @@ class BusTable {
 
  private:
   struct Picture {
-    std::string state = "-", phase = "-", mu_star = "-", sigma = "-", slope = "-", stop = "-",
-                mu_max = "-", force = "-";
+    std::string state = "-", asks = "-", phase = "-", mu_star = "-", sigma = "-", slope = "-",
+                stop = "-", mu_max = "-", force = "-";
     // What is worth a row of its own.
     bool differs(const Picture& other) const {
       return state != other.state || stop != other.stop || mu_max != other.mu_max ||
-             (stop == "-" && phase != other.phase);
+             (stop == "-" && phase != other.phase && (phase == "peak" || phase == "macro slip"));
     }
+    // Nothing goes on: no experiment, and none about to begin.
+    bool calm() const { return state == "inhibited" || state == "idle" || state == "cooldown"; }
   };
   void row(std::int64_t t_ns);
 

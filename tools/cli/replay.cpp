@@ -156,7 +156,7 @@ void run(const Options& options) {
           std::fprintf(stderr, "beltgrip: warning: %s\n", warning.c_str());
         }
         frames += task.result->frames;
-        if (json) json->write(json_lines(*task.result));
+        if (json) json->write(experiment_lines(*task.result) + summary_line(*task.result));
         if (text_to_stdout) std::fputs(text(*task.result).c_str(), stdout);
       });
   if (json) json->close();

@@ -9,6 +9,7 @@
 #include "tools/cli/exit_codes.h"
 #include "tools/cli/json_writer.h"
 #include "tools/sim/log_timeline.h"
+#include "tools/sim/record_port.h"
 #include "tools/sim/replay_port.h"
 
 namespace beltgrip::cli {
@@ -16,6 +17,7 @@ namespace beltgrip::cli {
 namespace {
 
 constexpr std::size_t kBadLinesShown = 3;
+constexpr double kShownInhibit_s = 0.05;
 
 std::string outcome_text(daemon::Outcome outcome) {
   return snake_case(own_label("BeltGripStatus", "Outcome", static_cast<int>(outcome)));
@@ -33,20 +35,29 @@ const char* ratio_text(estimator::EndStop end_stop) {
 // Collects the results and writes the trace as samples come.
 class Sink final : public daemon::SampleSink {
  public:
-  Sink(ReplayResult& result, std::FILE* trace) : result_(result), trace_(trace) {
+  Sink(ReplayResult& result, const daemon::Config& config, std::FILE* trace)
+      : result_(result),
+        trace_(trace),
+        counts_inhibits_(config.control == daemon::Control::kCommand),
+        period_s_(1.0 / config.estimator.sample_rate_hz) {
     for (int phase = 0; phase < 4; ++phase) {
       phases_[phase] = own_label("BeltGripSlip", "Phase", phase);
     }
     if (trace_ != nullptr) {
       std::fputs(
           "t_s,mu_star,sigma_star_percent,slip_variance,friction_slope,phase,clamp_force_N,"
-          "torque_p_Nm,macro_slip_stop\n",
+          "torque_p_Nm,macro_slip_stop,mu_max_expected,mu_max_low,mu_max_high\n",
           trace_);
     }
   }
 
   void on_report(const daemon::SampleReport& report) noexcept override {
     if (report.new_result) result_.experiments.push_back(report.result);
+    if (counts_inhibits_ && !report.in_experiment && (report.inhibits & kFeet) == 0) {
+      for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
+        if ((report.inhibits >> i & 1) != 0) result_.inhibited_s[i] += period_s_;
+      }
+    }
     if (trace_ == nullptr || !report.in_experiment || !report.curve.usable) return;
     const estimator::CurveEstimate& curve = report.curve;
     row_ = seconds_text(report.t);
@@ -58,7 +69,15 @@ class Sink final : public daemon::SampleSink {
     row_ += phases_[static_cast<std::size_t>(curve.phase)];
     append(curve.clamp_force_N);
     append(curve.torque_p_Nm);
-    row_ += report.macro_slip_stop ? ",1\n" : ",0\n";
+    row_ += report.macro_slip_stop ? ",1" : ",0";
+    for (const double value : {curve.mu_max_expected, curve.mu_max_low, curve.mu_max_high}) {
+      if (curve.mu_max_expected > 0.0) {
+        append(value);
+      } else {
+        row_ += ',';
+      }
+    }
+    row_ += '\n';
     std::fwrite(row_.data(), 1, row_.size(), trace_);
   }
 
@@ -71,8 +90,14 @@ class Sink final : public daemon::SampleSink {
     row_.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
   }
 
+  static constexpr std::uint32_t kFeet = daemon::inhibit_bit(daemon::Inhibit::kPedal) |
+                                         daemon::inhibit_bit(daemon::Inhibit::kBrake) |
+                                         daemon::inhibit_bit(daemon::Inhibit::kInputs);
+
   ReplayResult& result_;
   std::FILE* trace_;
+  bool counts_inhibits_;
+  double period_s_;
   std::string phases_[4];
   std::string row_;
 };
@@ -152,7 +177,8 @@ std::string seconds_text(std::int64_t t_ns) {
 
 std::unique_ptr<sim::LogTimeline> open_timeline(const std::vector<std::string>& paths,
                                                 const std::string& interface,
-                                                const daemon::FrameIdentifiers& own) {
+                                                const daemon::FrameIdentifiers& own,
+                                                const std::string& further_interface) {
   std::vector<std::unique_ptr<can::LogReader>> readers;
   for (const std::string& path : paths) {
     try {
@@ -163,6 +189,7 @@ std::unique_ptr<sim::LogTimeline> open_timeline(const std::vector<std::string>& 
   }
   sim::FrameSelection selection;
   selection.interface = interface;
+  selection.further_interface = further_interface;
   for (std::size_t i = 0; i < daemon::kOwnMessageCount; ++i) {
     selection.ignored.push_back(
         {daemon::own_identifier(own, static_cast<daemon::OwnMessage>(i)), false});
@@ -170,40 +197,98 @@ std::unique_ptr<sim::LogTimeline> open_timeline(const std::vector<std::string>& 
   return std::make_unique<sim::LogTimeline>(std::move(readers), std::move(selection));
 }
 
+std::string further_interface(const daemon::Config& config) {
+  return config.further_bus ? config.further_bus->interface : "";
+}
+
+namespace {
+
+void run_pipeline(daemon::Port& port, daemon::Pipeline& pipeline, const daemon::Config& config,
+                  estimator::StopReason end, ReplayResult& result, std::FILE* trace) {
+  Sink sink(result, config, trace);
+  daemon::run_loop(port, pipeline, config.estimator.sample_rate_hz, end, &sink);
+  result.frames_decoded = pipeline.counters().frames_decoded;
+  result.frames_bad = pipeline.counters().frames_bad;
+}
+
+bool is_record(const std::string& path) {
+  if (path == "-") return false;
+  try {
+    return sim::RecordPort::is_record(path);
+  } catch (const can::LogOpenError& error) {
+    throw Failure{kNoInput, error.text};
+  }
+}
+
+// What the flight recorder kept, decided again as the daemon did.
+ReplayResult replay_record(const std::string& path, const daemon::Config& config,
+                           const sim::ReplayPort::Receiver& receiver, std::FILE* trace) {
+  ReplayResult result;
+  result.log = path;
+  daemon::Pipeline pipeline(config);
+  sim::RecordPort port(path, receiver, [&](const sim::RecordedKnowledge& known) {
+    estimator::LearnedFriction learned;
+    for (std::size_t i = 0; i < learned.groups.size(); ++i) {
+      learned.groups[i].known = known.mu_max[i] > 0.0;
+      learned.groups[i].mu_max = known.mu_max[i];
+    }
+    learned.doubtful = known.doubtful;
+    learned.unwritten = known.unwritten;
+    pipeline.learn(learned);
+  });
+  run_pipeline(port, pipeline, config,
+               port.ends_with_the_daemon() ? estimator::StopReason::kShutdown
+                                           : estimator::StopReason::kTraceEnd,
+               result, trace);
+  result.frames = port.stats().frames;
+  result.lines_bad = port.stats().lines_bad;
+  result.duration_ns = port.duration();
+  describe_troubles(port.stats(), {}, result);
+  return result;
+}
+
+}  // namespace
+
+void run_daemon(daemon::Port& port, const daemon::Config& config, ReplayResult& result,
+                std::FILE* trace) {
+  daemon::Pipeline pipeline(config);
+  run_pipeline(port, pipeline, config, estimator::StopReason::kTraceEnd, result, trace);
+}
+
 ReplayResult replay(const std::vector<std::string>& paths, const std::string& interface,
                     const daemon::Config& config, const ReplayOutputs& outputs) {
   ReplayResult result;
   result.log = joined(paths);
-  const auto timeline = open_timeline(paths, interface, config.identifiers);
+  const std::string further = further_interface(config);
   sim::ReplayPort::Receiver receiver;
   std::unique_ptr<can::CandumpWriter> writer;
   if (outputs.log_out != nullptr) {
     writer = std::make_unique<can::CandumpWriter>(outputs.log_out);
-    receiver = [&](daemon::MonoTime t, const can::CanFrame& frame) {
-      writer->write(t, config.interface, frame);
+    receiver = [&](daemon::MonoTime t, const can::CanFrame& frame, std::uint8_t bus) {
+      writer->write(t, bus == 0 ? config.interface : further, frame);
     };
   }
+  if (paths.size() == 1 && interface.empty() && is_record(paths[0])) {
+    return replay_record(paths[0], config, receiver, outputs.trace);
+  }
+  const auto timeline = open_timeline(paths, interface, config.identifiers, further);
   sim::ReplayPort port(*timeline, std::move(receiver));
   const can::LogStats head = timeline->stats();
   if (head.frames == 0 || port.empty()) throw no_frames(result, head, interface);
 
-  daemon::Pipeline pipeline(config);
-  Sink sink(result, outputs.trace);
-  daemon::run_loop(port, pipeline, config.estimator.sample_rate_hz,
-                   estimator::StopReason::kTraceEnd, &sink);
+  run_daemon(port, config, result, outputs.trace);
 
   const can::LogStats stats = timeline->stats();
   const sim::TimelineCounters& counters = timeline->counters();
   result.frames = stats.frames;
-  result.frames_decoded = pipeline.counters().frames_decoded;
-  result.frames_bad = pipeline.counters().frames_bad + counters.frames_bad;
+  result.frames_bad += counters.frames_bad;
   result.lines_bad = stats.lines_bad;
   result.duration_ns = counters.last_ns - counters.first_ns;
   describe_troubles(stats, counters, result);
   return result;
 }
 
-std::string json_lines(const ReplayResult& result) {
+std::string experiment_lines(const ReplayResult& result) {
   std::string lines;
   JsonWriter json;
   for (const daemon::ExperimentResult& e : result.experiments) {
@@ -228,6 +313,7 @@ std::string json_lines(const ReplayResult& result) {
     }
     json.field("mu_max_lower_bound", inconclusive ? e.peak.mu_max : kJsonNull)
         .field("sigma_stop_percent", e.stopped ? e.sigma_stop_percent : kJsonNull)
+        .field("contradictory", e.peak.contradictory)
         .field("sigma_peak_percent", completed ? e.peak.sigma_peak_percent : kJsonNull)
         .field("samples", e.samples)
         .field("direction", direction_text(e.direction))
@@ -235,6 +321,11 @@ std::string json_lines(const ReplayResult& result) {
         .end_object();
     lines += json.take() + "\n";
   }
+  return lines;
+}
+
+std::string summary_line(const ReplayResult& result) {
+  JsonWriter json;
   json.begin_object()
       .field("type", "summary")
       .field("log", result.log)
@@ -245,7 +336,7 @@ std::string json_lines(const ReplayResult& result) {
       .key("duration_s")
       .raw(seconds_text(result.duration_ns))
       .end_object();
-  return lines + json.take() + "\n";
+  return json.take() + "\n";
 }
 
 std::string text(const ReplayResult& result) {
@@ -263,11 +354,20 @@ std::string text(const ReplayResult& result) {
       out += format("  mu_max %.4f, std %.4f, 95 %% %.4f .. %.4f, peak at %.2f %% slip\n",
                     e.peak.mu_max, e.peak.mu_max_std, e.peak.ci95_low, e.peak.ci95_high,
                     e.peak.sigma_peak_percent);
+    } else if (e.peak.contradictory) {
+      out += "  no value: its points lie on no one friction curve\n";
     } else if (e.outcome == daemon::Outcome::kInconclusive) {
       out += format("  mu_max is at least %.4f\n", e.peak.mu_max);
     }
   }
   if (result.experiments.empty()) out += "  no experiment\n";
+  std::string why;
+  for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
+    if (result.inhibited_s[i] < kShownInhibit_s) continue;
+    why += (why.empty() ? "" : ", ") + std::string(daemon::kInhibitNames[i]) +
+           format(" %.1f s", result.inhibited_s[i]);
+  }
+  if (!why.empty()) out += "  neither pedal pressed, and no experiment for: " + why + "\n";
   out += format("  %llu frames in %.1f s, %llu decoded, %llu bad; %llu bad lines\n",
                 static_cast<unsigned long long>(result.frames),
                 static_cast<double>(result.duration_ns) * 1e-9,

@@ -2,14 +2,17 @@
 // and as text. Tools only.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "daemon/core/arming.h"
 #include "daemon/core/config.h"
 #include "daemon/core/pipeline.h"
+#include "daemon/core/port.h"
 #include "tools/sim/log_timeline.h"
 
 namespace beltgrip::cli {
@@ -23,6 +26,9 @@ struct ReplayResult {
   std::uint64_t frames_bad = 0;
   std::uint64_t lines_bad = 0;
   std::int64_t duration_ns = 0;
+  // How long each daemon::Inhibit kept an experiment from beginning while the driver's feet did
+  // not, control "command".
+  std::array<double, daemon::kInhibitCount> inhibited_s{};
 };
 
 struct ReplayOutputs {
@@ -30,16 +36,26 @@ struct ReplayOutputs {
   std::FILE* log_out = nullptr;  // candump, what the daemon would have sent
 };
 
-// The logs as one timeline without BeltGrip's own frames. Throws Failure 66.
+// The logs as one timeline without BeltGrip's own frames; those of an interface named as the
+// further bus's are of that bus, all others of the first. Throws Failure 66.
 std::unique_ptr<sim::LogTimeline> open_timeline(const std::vector<std::string>& paths,
                                                 const std::string& interface,
-                                                const daemon::FrameIdentifiers& own);
+                                                const daemon::FrameIdentifiers& own,
+                                                const std::string& further_interface = "");
+// Empty where the configuration has one bus.
+std::string further_interface(const daemon::Config& config);
 
 // Throws Failure: 66 a log is missing, 65 it has no readable frame.
 ReplayResult replay(const std::vector<std::string>& paths, const std::string& interface,
                     const daemon::Config& config, const ReplayOutputs& outputs);
 
-std::string json_lines(const ReplayResult& result);
+// The daemon's loop on this port until it closes; the results go into `result`.
+void run_daemon(daemon::Port& port, const daemon::Config& config, ReplayResult& result,
+                std::FILE* trace);
+
+// A line for each experiment, and the line of the summary.
+std::string experiment_lines(const ReplayResult& result);
+std::string summary_line(const ReplayResult& result);
 std::string text(const ReplayResult& result);
 
 // "12.345" without a rounding error, whatever the origin of the stamps.

@@ -20,7 +20,7 @@ constexpr std::string_view kSuffix = ".toml";
 std::string shipped_names() {
   std::string names;
   for (const std::string_view name : sim::resource_names()) {
-    if (!name.ends_with(kSuffix) || sim::is_vehicle_scenario(sim::shipped(name))) continue;
+    if (!name.ends_with(kSuffix)) continue;
     names +=
         (names.empty() ? "" : ", ") + std::string(name.substr(0, name.size() - kSuffix.size()));
   }
@@ -62,16 +62,32 @@ void ScenarioOptions::add_to(CLI::App& command) {
 sim::Scenario ScenarioOptions::load() const {
   std::vector<sim::ScenarioLayer> layers{{kBase, std::string(sim::shipped(kBase))}};
   layers.push_back(layer_of(scenario));
-  if (sim::is_vehicle_scenario(layers.back().text)) {
-    throw Failure{kConfiguration,
-                  layers.back().source +
-                      ": plant: found \"vehicle\", which this version does not run; "
-                      "shipped are " +
-                      shipped_names()};
-  }
   for (const std::string& setting : settings) layers.push_back(sim::setting_layer(setting));
   if (!belt.empty()) layers.push_back({"--belt " + belt, "belt = \"" + belt + "\""});
   sim::ScenarioResult result = sim::parse_scenario(layers);
+  if (!result.errors.empty()) {
+    std::string text;
+    for (const std::string& error : result.errors) text += (text.empty() ? "" : "\n") + error;
+    throw Failure{kConfiguration, text};
+  }
+  return std::move(result.scenario);
+}
+
+bool ScenarioOptions::is_vehicle() const {
+  return sim::is_vehicle_scenario(layer_of(scenario).text);
+}
+
+sim::VehicleScenario ScenarioOptions::load_vehicle() const {
+  if (!belt.empty() || start_s > 0.0) {
+    throw Failure{kUsage,
+                  "--belt and --start are for the rig; a vehicle takes --set belt.mu_max=..."};
+  }
+  std::vector<sim::ScenarioLayer> layers{layer_of(scenario)};
+  for (const std::string& setting : settings) layers.push_back(sim::setting_layer(setting));
+  if (duration_s > 0.0) {
+    layers.push_back(sim::setting_layer("run.duration_s=" + std::to_string(duration_s)));
+  }
+  sim::VehicleScenarioResult result = sim::parse_vehicle_scenario(layers);
   if (!result.errors.empty()) {
     std::string text;
     for (const std::string& error : result.errors) text += (text.empty() ? "" : "\n") + error;

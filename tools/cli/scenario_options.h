@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tools/sim/scenario.h"
+#include "tools/sim/vehicle_parameters.h"
 
 namespace beltgrip::cli {
 
@@ -21,6 +22,9 @@ struct ScenarioOptions {
   void add_to(CLI::App& command);
   // Throws Failure: 66 no such scenario, 78 its content.
   sim::Scenario load() const;
+  // True for a scenario of the virtual vehicle, which load_vehicle takes instead.
+  bool is_vehicle() const;
+  sim::VehicleScenario load_vehicle() const;
   double end_s() const;
 };
 

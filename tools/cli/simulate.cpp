@@ -1,5 +1,6 @@
-// beltgrip simulate: the virtual rig as a candump log, with the DBC, the configuration that fits
-// and the truth.
+// beltgrip simulate: the virtual rig or the virtual vehicle. In virtual time with the daemon's own
+// objects on the other side, as log, DBC, fitting configuration, truth and results; or in real time
+// on a bus.
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -8,11 +9,17 @@
 #include "can_dbc/can_log.h"
 #include "tools/cli/bus.h"
 #include "tools/cli/command.h"
+#include "tools/cli/configuration.h"
+#include "tools/cli/machine_model.h"
 #include "tools/cli/output_file.h"
+#include "tools/cli/replay_run.h"
 #include "tools/cli/scenario_options.h"
+#include "tools/cli/simulate_vehicle.h"
 #include "tools/cli/verdict.h"
+#include "tools/sim/replay_port.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/rig_source.h"
+#include "tools/sim/vehicle_bus.h"
 
 namespace beltgrip::cli {
 
@@ -24,8 +31,27 @@ struct Options {
   ScenarioOptions scenario;
   std::string out_dir;
   std::string log_out;
+  std::string json;
   std::string bus;
+  std::string model;
+  int experiment = 0;
   double speed = 1.0;
+
+  // The machine that runs: the scenario with the model on it.
+  template <typename Scenario>
+  Scenario machine(Scenario given) const {
+    if (!model.empty()) apply_model(model, given);
+    given.experiment = experiment;
+    return given;
+  }
+};
+
+// What a run leaves behind beside its log.
+struct Run {
+  std::string configuration;
+  std::string_view dbc;
+  std::string truth_json, truth_text;
+  ReplayResult daemon;
 };
 
 // The next frame, with the end of a void run as Failure.
@@ -33,69 +59,155 @@ bool next_frame(sim::RigSource& source, can::StampedFrame& frame) {
   try {
     return source.next(frame);
   } catch (const sim::NonFiniteState& state) {
-    throw Failure{kInternal, "the plant's state is no longer finite at " +
-                                 std::to_string(state.t_s) + " s, seed " +
-                                 std::to_string(state.seed)};
+    fail_not_finite(state.t_s, state.seed);
   }
 }
 
-// Returns the stamp of the first frame.
-std::int64_t write_log(sim::RigSource& source, const std::string& path) {
-  OutputFile file(path);
-  can::CandumpWriter writer(file.get());
-  can::StampedFrame stamped;
-  std::optional<std::int64_t> first_ns;
-  while (next_frame(source, stamped)) {
-    if (!first_ns) first_ns = stamped.t_ns;
-    writer.write(stamped.t_ns, kInterface, stamped.frame);
+// The rig's frames as a log, written into a file as they are read.
+class RigLog final : public can::LogReader {
+ public:
+  RigLog(sim::RigSource& source, std::FILE* copy) : source_(source) {
+    if (copy != nullptr) copy_.emplace(copy);
   }
-  file.close();
-  return first_ns.value_or(0);
+  bool next(can::LogRecord& record) override {
+    can::StampedFrame stamped;
+    if (!next_frame(source_, stamped)) return false;
+    if (copy_) copy_->write(stamped.t_ns, kInterface, stamped.frame);
+    if (stats_.frames++ == 0) first_ns_ = stamped.t_ns;
+    record = {stamped.t_ns, stamped.frame, kInterface, false, {}};
+    return true;
+  }
+  const can::LogStats& stats() const override { return stats_; }
+  std::int64_t first_ns() const { return first_ns_; }
+
+ private:
+  sim::RigSource& source_;
+  std::optional<can::CandumpWriter> copy_;
+  can::LogStats stats_;
+  std::int64_t first_ns_ = 0;
+};
+
+// With results: the daemon's loop runs over the frames; else they are only written.
+Run run_rig(const Options& options, std::FILE* log, bool results) {
+  const sim::Scenario scenario = options.scenario.load();
+  const sim::Scenario machine = options.machine(scenario);
+  sim::RigSource source(machine, options.scenario.seed, options.scenario.start_s,
+                        options.scenario.end_s());
+  Run run;
+  run.configuration = sim::rig_configuration(scenario, kInterface, "vehicle.dbc");
+  run.dbc = sim::shipped("paper-rig.dbc");
+  auto reader = std::make_unique<RigLog>(source, log);
+  const RigLog& frames = *reader;
+  if (results) {
+    std::vector<std::unique_ptr<can::LogReader>> logs;
+    logs.push_back(std::move(reader));
+    sim::LogTimeline timeline(std::move(logs), {});
+    sim::ReplayPort port(timeline, {});
+    run_daemon(port, load_configuration_text(run.configuration, run.dbc, ""), run.daemon, nullptr);
+    run.daemon.log = scenario.name;
+    run.daemon.frames = timeline.stats().frames;
+    run.daemon.duration_ns = timeline.counters().last_ns - timeline.counters().first_ns;
+    run.truth_json = truth_json(make_truth(machine, options.scenario.seed,
+                                           timeline.counters().first_ns, source.simulation()));
+  } else {
+    can::LogRecord record;
+    while (reader->next(record)) {
+    }
+    run.truth_json = truth_json(
+        make_truth(machine, options.scenario.seed, frames.first_ns(), source.simulation()));
+  }
+  return run;
+}
+
+Run run_vehicle(const Options& options, std::FILE* log) {
+  const sim::VehicleScenario scenario = options.scenario.load_vehicle();
+  const sim::VehicleScenario machine = options.machine(scenario);
+  DriveResult drive = drive_with_daemon(scenario, machine, options.scenario.seed, log);
+  Run run;
+  run.configuration = sim::vehicle_configuration(scenario, kInterface, "vehicle.dbc");
+  run.dbc = sim::shipped("vehicle.dbc");
+  run.truth_json = std::move(drive.truth_json);
+  run.truth_text = std::move(drive.truth_text);
+  run.daemon = std::move(drive.daemon);
+  return run;
+}
+
+void run_on_bus(const Options& options) {
+  if (options.scenario.is_vehicle()) {
+    return drive_on_bus(options.machine(options.scenario.load_vehicle()), options.scenario.seed,
+                        options.bus, options.speed);
+  }
+  sim::RigSource source(options.machine(options.scenario.load()), options.scenario.seed,
+                        options.scenario.start_s, options.scenario.end_s());
+  const auto port = open_bus(options.bus, {}, stop_descriptor());
+  play(*port, options.bus, options.speed,
+       [&](can::StampedFrame& frame) { return next_frame(source, frame); });
 }
 
 void run(const Options& options) {
-  if (options.out_dir.empty() + options.log_out.empty() + options.bus.empty() != 2) {
+  const int places = !options.out_dir.empty() + !options.log_out.empty() + !options.bus.empty();
+  const bool to_stdout = options.log_out == "-" || options.json == "-";
+  if (places > 1 || (options.log_out == "-" && options.json == "-")) {
     throw Failure{kUsage, "simulate: give one of --out-dir, --log-out and --bus"};
   }
-  const sim::Scenario scenario = options.scenario.load();
-  sim::RigSource source(scenario, options.scenario.seed, options.scenario.start_s,
-                        options.scenario.end_s());
   if (!options.bus.empty()) {
-    const auto port = open_bus(options.bus, {}, stop_descriptor());
-    play(*port, options.bus, options.speed,
-         [&](can::StampedFrame& frame) { return next_frame(source, frame); });
-    return;
-  }
-  if (!options.log_out.empty()) {
-    write_log(source, options.log_out);
-    return;
+    if (!options.json.empty()) {
+      throw Failure{kUsage, "simulate: with --bus the results are those of the daemon there"};
+    }
+    return run_on_bus(options);
   }
   const std::filesystem::path directory = options.out_dir;
-  std::error_code error;
-  std::filesystem::create_directories(directory, error);
-  if (error) {
-    throw Failure{kCannotCreate, options.out_dir + ": cannot be created: " + error.message()};
+  if (!options.out_dir.empty()) {
+    std::error_code error;
+    std::filesystem::create_directories(directory, error);
+    if (error) {
+      throw Failure{kCannotCreate, options.out_dir + ": cannot be created: " + error.message()};
+    }
   }
-  const std::int64_t first_ns = write_log(source, (directory / "trace.log").string());
-  write_file((directory / "vehicle.dbc").string(), sim::shipped("paper-rig.dbc"));
-  write_file((directory / "beltgrip.toml").string(),
-             sim::rig_configuration(scenario, kInterface, "vehicle.dbc"));
-  write_file(
-      (directory / "truth.json").string(),
-      truth_json(make_truth(scenario, options.scenario.seed, first_ns, source.simulation())));
+  std::optional<OutputFile> log, json;
+  if (!options.out_dir.empty()) log.emplace((directory / "trace.log").string());
+  if (!options.log_out.empty()) log.emplace(options.log_out);
+  if (!options.json.empty()) json.emplace(options.json);
+  std::FILE* const log_file = log ? log->get() : nullptr;
+  // A log of the rig alone does not need the daemon, which would double its time.
+  const bool results = json || places == 0;
+  const Run run = options.scenario.is_vehicle() ? run_vehicle(options, log_file)
+                                                : run_rig(options, log_file, results);
+  if (log) log->close();
+  if (!options.out_dir.empty()) {
+    write_file((directory / "vehicle.dbc").string(), run.dbc);
+    write_file((directory / "beltgrip.toml").string(), run.configuration);
+    write_file((directory / "truth.json").string(), run.truth_json);
+  }
+  if (json) {
+    json->write(experiment_lines(run.daemon) + run.truth_json + summary_line(run.daemon));
+    json->close();
+  }
+  if (results && !to_stdout) std::fputs((text(run.daemon) + run.truth_text).c_str(), stdout);
 }
 
 }  // namespace
 
 void add_simulate(CLI::App& app) {
-  CLI::App* command =
-      app.add_subcommand("simulate", "Run a virtual variator and write its CAN traffic");
+  CLI::App* command = app.add_subcommand(
+      "simulate",
+      "Drive a virtual vehicle, or a rig, with the daemon on the other side of its bus");
   auto options = std::make_shared<Options>();
   options->scenario.add_to(*command);
   command->add_option("--out-dir", options->out_dir,
                       "Write trace.log, vehicle.dbc, beltgrip.toml and truth.json there");
   command->add_option("--log-out", options->log_out, "Write the log alone, '-': standard output");
-  command->add_option("--bus", options->bus, "Send the frames to this bus in real time");
+  command->add_option("--json", options->json,
+                      "Results and truth as JSON lines, '-': standard output");
+  command->add_option("--bus", options->bus,
+                      "In real time on this bus, for a daemon there; prints the truth at the end");
+  command->add_option("--model", options->model,
+                      "What the machine really is: a model file, on top of the scenario");
+  command
+      ->add_option("--experiment", options->experiment,
+                   "Its place among several experiments, for the wear of --model")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 100000));
   command->add_option("--speed", options->speed, "Times real time, with --bus")
       ->capture_default_str()
       ->check(CLI::Range(1e-3, 1e3));

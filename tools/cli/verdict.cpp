@@ -33,6 +33,7 @@ Truth make_truth(const sim::Scenario& scenario, std::uint64_t seed, std::int64_t
 std::string truth_json(const Truth& truth) {
   JsonWriter json;
   json.begin_object()
+      .field("type", "truth")
       .field("scenario", truth.scenario)
       .field("belt", truth.belt)
       .field("seed", truth.seed)

@@ -7,6 +7,7 @@
 #include "tools/diagnose/engine.h"
 #include "tools/diagnose/gain.h"
 #include "tools/diagnose/namer.h"
+#include "tools/diagnose/parallel.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -37,10 +38,10 @@ class Run {
   Answer run() {
     answer_.extended = request_.model;
     std::vector<ExperimentData> runs;
-    runs.reserve(request_.experiments.size());
-    for (const SignalTable& table : request_.experiments) {
-      runs.push_back(prepare(table, request_.model.variator));
-    }
+    runs.resize(request_.experiments.size());
+    in_parallel(request_.jobs, runs.size(), [&](std::size_t i) {
+      runs[i] = prepare(request_.experiments[i], request_.model.variator);
+    });
     out().experiments = static_cast<int>(runs.size());
     for (const ExperimentData& run : runs) {
       out().samples += run.valid_count;
@@ -58,9 +59,13 @@ class Run {
     }
     progress(0.1, "fit");
     Engine engine(make_campaign(std::move(runs), request_.model));
-    Naming naming = name_effects(engine, stop());
+    Naming naming = name_effects(engine, stop(), request_.jobs);
     progress(0.8, "gain");
     fill(engine, naming);
+    if (request_.with_plots) {
+      answer_.plots = make_plots(engine.campaign(), naming.nominal, naming.hypothesis.state,
+                                 request_.experiments);
+    }
     progress(1.0, "done");
     return std::move(answer_);
   }
@@ -103,37 +108,47 @@ class Run {
   }
 
   // Two machines cannot be one model: end-stop ratios that differ by more than any belt slips.
+  // Looked at where the clamp force is highest, and drive and overrun each for itself: a belt slips
+  // one way or the other by a percent even there.
   void check_same_machine(const std::vector<ExperimentData>& runs) {
     for (const int stop : {kOverdriveStop, kLowStop}) {
-      double low = std::numeric_limits<double>::infinity(), high = 0.0;
-      std::string low_name, high_name;
-      for (const ExperimentData& run : runs) {
-        double largest = 0.0;
-        for (int k = 0; k < run.size(); ++k) {
-          if (!run.valid[static_cast<std::size_t>(k)] ||
-              run.stop[static_cast<std::size_t>(k)] != stop) {
-            continue;
-          }
-          largest = std::max(largest, run.omega_s.value[k] / run.omega_p.value[k]);
-        }
-        if (largest == 0.0) continue;
-        if (largest < low) low = largest, low_name = run.name;
-        if (largest > high) high = largest, high_name = run.name;
-      }
-      if (high > 1.03 * low && std::isfinite(low)) {
-        std::string note = low_name;
-        note.append(" and ").append(high_name).append(": end-stop ratios ").append(text_of(low));
-        note.append(" and ").append(text_of(high)).append(" cannot be of one machine");
-        out().notes.push_back(std::move(note));
-        different_machines_ = true;
-      }
+      for (const double direction : {1.0, -1.0}) check_same_ratio(runs, stop, direction);
     }
+  }
+
+  void check_same_ratio(const std::vector<ExperimentData>& runs, int stop, double direction) {
+    double low = std::numeric_limits<double>::infinity(), high = 0.0;
+    std::string low_name, high_name;
+    for (const ExperimentData& run : runs) {
+      double highest_Pa = -std::numeric_limits<double>::infinity(), ratio = 0.0;
+      for (int k = 0; k < run.size(); ++k) {
+        if (!run.valid[static_cast<std::size_t>(k)] ||
+            run.stop[static_cast<std::size_t>(k)] != stop ||
+            run.torque.value[k] * direction < 0.0 || run.pressure.value[k] < highest_Pa) {
+          continue;
+        }
+        highest_Pa = run.pressure.value[k];
+        ratio = run.omega_s.value[k] / run.omega_p.value[k];
+      }
+      if (ratio == 0.0) continue;
+      if (ratio < low) low = ratio, low_name = run.name;
+      if (ratio > high) high = ratio, high_name = run.name;
+    }
+    if (high <= 1.03 * low || !std::isfinite(low)) return;
+    std::string note = low_name;
+    note.append(" and ").append(high_name).append(": end-stop ratios ").append(text_of(low));
+    note.append(" and ").append(text_of(high)).append(" cannot be of one machine");
+    out().notes.push_back(std::move(note));
+    different_machines_ = true;
   }
 
   void fill(Engine& engine, const Naming& naming) {
     const Campaign& campaign = engine.campaign();
     const ModelState& extended = naming.hypothesis.state;
     out().complete = !stop()();
+    if (!out().complete) {
+      out().notes.emplace_back("stopped before the end: what is not named here may be there");
+    }
     fill_machine(engine, naming);
     fill_baseline(engine, naming);
     fill_not_identifiable(engine, naming);
@@ -157,11 +172,24 @@ class Run {
       }
       Campaign held_out = campaign;
       held_out.runs = std::move(runs);
+      held_out.slip_noise_share = estimate_slip_noise_shares(held_out, naming.nominal);
       gain = held_out_gain(held_out, naming.nominal, extended);
+    }
+    for (const int slot : naming.not_confirmed) {
+      out().notes.push_back(campaign.slots[static_cast<std::size_t>(slot)].label() +
+                            ": fits, but does not help to predict experiments left out of the "
+                            "fit; not named");
+    }
+    // What does not help on the experiments that the user has set aside is no finding either.
+    const bool refuted =
+        !request_.held_out.empty() && !gain.signals.empty() && !slots.empty() && !gain.proven();
+    if (refuted) {
+      out().notes.push_back(
+          "what was found does not help to predict the held-out experiments; not named");
     }
     out().held_out = gain.signals;
     out().mu_max = gain.mu_max;
-    fill_findings(engine, naming, gain);
+    fill_findings(engine, refuted ? std::vector<Accepted>() : naming.accepted, naming, gain);
     if (naming.unknown) {
       out().unexplained =
           Unexplained{naming.unknown->acts_on, {naming.unknown->depends_on}, naming.unknown->share};
@@ -171,8 +199,14 @@ class Run {
                                              : Verdict::kExplained;
     propose(engine, naming);
     answer_.extended = request_.model;
-    store_machine(extended.nuisance, answer_.extended);
-    store_effects(campaign.slots, campaign.switched_on + extended.effects, extended.nuisance,
+    const ModelState& stored = refuted ? naming.nominal : extended;
+    store_machine(stored.nuisance, answer_.extended);
+    for (const Ripple& ripple : naming.ripples) {
+      if (ripple.found) {
+        answer_.extended.effects["speed_ripple"].parameters[ripple.shaft] = ripple.amplitude;
+      }
+    }
+    store_effects(campaign.slots, campaign.switched_on + stored.effects, stored.nuisance,
                   answer_.extended);
   }
 
@@ -220,17 +254,14 @@ class Run {
     }
   }
 
-  void fill_findings(const Engine& engine, const Naming& naming, const Gain& gain) {
+  void fill_findings(const Engine& engine, const std::vector<Accepted>& accepted,
+                     const Naming& naming, const Gain& gain) {
     const Campaign& campaign = engine.campaign();
-    for (const Accepted& each : naming.accepted) {
+    for (const Accepted& each : accepted) {
       const Slot& slot = campaign.slots[static_cast<std::size_t>(each.slot)];
       const auto& h = naming.hypothesis;
-      const auto at = std::find(h.slots.begin(), h.slots.end(), each.slot) - h.slots.begin();
-      const auto column = static_cast<Eigen::Index>(engine.active_nuisances().size()) + at;
       const double value = h.state.effects[each.slot];
-      const double sigma = std::sqrt(std::max(h.fit.covariance(column, column), 0.0)) *
-                           engine.scale(kNuisanceCount + each.slot);
-      const double half = quantile_975(h.degrees[static_cast<std::size_t>(at)]) * sigma;
+      const double half = quantile_975(each.degrees) * each.sigma;
       const auto found = std::find_if(out().findings.begin(), out().findings.end(),
                                       [&](const Finding& f) { return f.effect == slot.row->id; });
       Finding& finding = found == out().findings.end() ? out().findings.emplace_back() : *found;
@@ -252,7 +283,26 @@ class Run {
           finding.aliases.push_back(id);
         }
       }
+      if (finding.effect == "torque_delay" && finding.aliases.empty()) {
+        finding.aliases.emplace_back("channel_skew");  // of the torque: the same thing
+      }
       finding.gain = gain.signals;
+      if (gain.mu_max) {  // relative error of the friction at the peak
+        finding.gain["mu_max"] = {gain.mu_max->before, gain.mu_max->after, gain.mu_max->low,
+                                  gain.mu_max->high};
+      }
+    }
+    for (const Ripple& ripple : naming.ripples) {
+      if (!ripple.found) continue;
+      const auto found = std::find_if(out().findings.begin(), out().findings.end(),
+                                      [](const Finding& f) { return f.effect == "speed_ripple"; });
+      Finding& finding = found == out().findings.end() ? out().findings.emplace_back() : *found;
+      finding.effect = "speed_ripple";
+      finding.probability = 1.0;
+      finding.equation = "omega_measured = omega_true (1 + a sin(phi + phi0))";
+      finding.acts_on = "speed";
+      finding.parameters[ripple.shaft] = {ripple.amplitude, ripple.amplitude - 1.96 * ripple.sigma,
+                                          ripple.amplitude + 1.96 * ripple.sigma};
     }
     for (Finding& finding : out().findings) {
       if (finding.aliases.empty()) finding.separate_by.clear();

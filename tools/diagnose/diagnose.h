@@ -7,6 +7,7 @@
 
 #include "tools/diagnose/diagnosis.h"
 #include "tools/diagnose/model_file.h"
+#include "tools/diagnose/plots.h"
 #include "tools/diagnose/signal_table.h"
 
 namespace beltgrip::diagnose {
@@ -15,6 +16,8 @@ struct Request {
   std::vector<SignalTable> experiments;  // in the order in which they were made
   std::vector<SignalTable> held_out;     // empty: experiments are held out in turn
   ModelFile model;
+  bool with_plots = false;
+  int jobs = 1;                // threads; the answer is the same for every number
   std::function<bool()> stop;  // true: end with what is known
   std::function<void(double share, const std::string& what)> progress;
 };
@@ -22,6 +25,7 @@ struct Request {
 struct Answer {
   Diagnosis diagnosis;
   ModelFile extended;  // the model with what was found
+  Plots plots;
 };
 
 Answer diagnose(Request request);

@@ -2,8 +2,10 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <limits>
+
+#include "tools/diagnose/parallel.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -12,6 +14,8 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 constexpr double kSaturatedPrecision = 50.0;
+constexpr std::array<double, 3> kCoarseness{30.0, 8.0, 2.0};
+constexpr int kAttempts = 10;       // to find a step that gains, each shorter than the last
 constexpr double kSizePrior = 3.0;  // one sigma of an effect's size, in usual sizes
 
 bool stop_used(const Campaign& campaign, int stop) {
@@ -57,6 +61,9 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model)
   out.nuisances = nuisances_of(model);
   out.slots = make_slots(out.runs);
   out.switched_on = slot_values(model, out.slots);
+  if (const auto ripple = model.effects.find("speed_ripple"); ripple != model.effects.end()) {
+    out.known_ripples = ripple->second.parameters;
+  }
   for (const ExperimentData& run : out.runs) {
     out.has_balance |= run.valid_count > 0 && run.torque_s.present;
     out.has_tracking |= run.valid_count > 0 && run.command.present;
@@ -121,8 +128,9 @@ std::vector<int> Engine::columns_of(const std::vector<int>& parameters) const {
   return out;
 }
 
-Engine::Optimum Engine::minimise(const std::vector<int>& parameters, const ModelState& start,
-                                 const Whitening& whitening, const Scatter& scatter, int iterations,
+Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int>& parameters,
+                                 const ModelState& start, const Whitening& whitening,
+                                 const Scatter& scatter, int iterations,
                                  int scatter_iterations) const {
   VectorXd scales(static_cast<Index>(parameters.size()));
   for (Index j = 0; j < scales.size(); ++j) {
@@ -132,9 +140,9 @@ Engine::Optimum Engine::minimise(const std::vector<int>& parameters, const Model
   for (std::size_t i = 0; i < columns.size(); ++i) columns[i] = static_cast<int>(i);
   const auto summaries_at = [&](const ModelState& state, const std::vector<int>& wanted) {
     std::vector<Summary> out;
-    for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
-      if (campaign_.runs[e].valid_count == 0) continue;
-      out.push_back(summarise(campaign_, static_cast<int>(e), state, wanted, scales, whitening));
+    for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+      if (campaign.runs[e].valid_count == 0) continue;
+      out.push_back(summarise(campaign, static_cast<int>(e), state, wanted, scales, whitening));
     }
     return out;
   };
@@ -160,7 +168,7 @@ Engine::Optimum Engine::minimise(const std::vector<int>& parameters, const Model
     const Prior here = prior(parameters, best.state);
     double gained = 0.0;
     bool moved = false;
-    for (int attempt = 0; attempt < 7 && !moved; ++attempt) {
+    for (int attempt = 0; attempt < kAttempts && !moved; ++attempt) {
       Prior damped = here;
       damped.precision += damping * diagonal;
       damped.pull = here.pull.cwiseProduct(here.precision).cwiseQuotient(damped.precision);
@@ -169,7 +177,7 @@ Engine::Optimum Engine::minimise(const std::vector<int>& parameters, const Model
       move(parameters, step.step, 1.0, next);
       gained = standing(next, summaries_at(next, {}), best.fit.scatter) - best.objective;
       moved = gained > 0.0;
-      damping = std::clamp(moved ? 0.1 * damping : 10.0 * damping, 1e-8, 1e4);
+      damping = std::clamp(moved ? 0.1 * damping : 10.0 * damping, 1e-5, 1e6);
       if (moved) best.state = next;
     }
     if (!moved) break;
@@ -182,29 +190,85 @@ Engine::Optimum Engine::minimise(const std::vector<int>& parameters, const Model
   return best;
 }
 
-void Engine::fit_machine() {
-  campaign_.noise = estimate_noise_levels(campaign_, state_);
+void Engine::fit_machine(int jobs) {
+  const NoiseLevels measured = estimate_noise_levels(campaign_, state_);
+  campaign_.noise = measured;
+  campaign_.slip_noise_share = estimate_slip_noise_shares(campaign_, state_);
+  for (const double coarseness : kCoarseness) {
+    coarse_.push_back(campaign_);
+    coarse_.back().noise = measured.times(coarseness);
+  }
   const ModelState start = state_;
-  ModelState best = start;
-  double best_objective = -std::numeric_limits<double>::infinity();
-  for (const double peak : {0.012, 0.02, 0.035}) {
-    state_ = start;
-    state_.nuisance[kLnPeakSlipOverdrive] = std::log(peak);
-    state_.nuisance[kLnPeakSlipLow] = std::log(1.4 * peak);
-    Whitening whitening = identity_whitening(campaign_);
-    Optimum optimum;
-    for (int round = 0; round < 4; ++round) {  // outliers of the last round
-      optimum = minimise(nuisances_, state_, whitening, default_scatter(), 6, 0);
-      state_ = optimum.state;
-      reweigh(campaign_, state_, whitening);
+  const double ln_mu_seen = ln_mu_reached();
+  struct Attempt {
+    ModelState first, last;
+    Whitening whitening;
+    double objective = 0.0;
+  };
+  constexpr std::array kPeaks{0.012, 0.02, 0.035};
+  std::array<Attempt, kPeaks.size()> attempts;
+  in_parallel(jobs, attempts.size(), [&](std::size_t i) {
+    Attempt& attempt = attempts[i];
+    ModelState state = start;
+    state.nuisance[kLnMuMax] = ln_mu_seen;
+    state.nuisance[kLnPeakSlipOverdrive] = std::log(kPeaks[i]);
+    state.nuisance[kLnPeakSlipLow] = std::log(1.4 * kPeaks[i]);
+    attempt.first = state;
+    // From a coarse look to the sharp one: far from the optimum every misfit is beyond all noise.
+    Whitening& whitening = attempt.whitening;
+    whitening = identity_whitening(campaign_);
+    for (const Campaign& coarse : coarse_) {
+      state = minimise(coarse, nuisances_, state, whitening, default_scatter(), 8, 0).state;
+      reweigh(coarse, state, whitening);
     }
-    if (optimum.objective > best_objective) {
-      best_objective = optimum.objective;
-      best = state_;
-      whitening_ = whitening;
+    for (const int iterations : {8, 6}) {
+      state =
+          minimise(campaign_, nuisances_, state, whitening, default_scatter(), iterations, 0).state;
+      reweigh(campaign_, state, whitening);
+    }
+    // The same measure for every start: no weights, scatter between experiments counted.
+    attempt.last = state;
+    attempt.objective = minimise(coarse_.back(), nuisances_, state, identity_whitening(campaign_),
+                                 default_scatter(), 0, 0)
+                            .objective;
+  });
+  const Attempt& best = *std::max_element(
+      attempts.begin(), attempts.end(),
+      [](const Attempt& a, const Attempt& b) { return a.objective < b.objective; });
+  state_ = best.last;
+  first_ = best.first;
+  whitening_ = best.whitening;
+}
+
+Hypothesis Engine::refine_from_afar(const std::vector<int>& slots) const {
+  const std::vector<int> parameters = with_nuisances(slots);
+  ModelState state = first_;
+  const Whitening whitening = identity_whitening(campaign_);
+  for (const Campaign& coarse : coarse_) {
+    state = minimise(coarse, parameters, state, whitening, default_scatter(), 8, 0).state;
+  }
+  return refine_from(state, slots, 8);
+}
+
+// Friction that the data reach: what is left above belongs to single samples.
+double Engine::ln_mu_reached() const {
+  std::vector<double> seen;
+  for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
+    const ExperimentData& data = campaign_.runs[e];
+    if (data.valid_count == 0) continue;
+    const Quantities q = evaluate(data, static_cast<int>(e), campaign_.variator, state_.nuisance,
+                                  Effects{&campaign_.slots, campaign_.switched_on});
+    for (int k = 0; k < data.size(); ++k) {
+      if (data.valid[static_cast<std::size_t>(k)]) {
+        seen.push_back(std::abs(q.belt_torque[k]) / q.capacity[k]);
+      }
     }
   }
-  state_ = best;
+  const double nominal = state_.nuisance[kLnMuMax];
+  if (seen.empty()) return nominal;
+  const auto at = seen.begin() + static_cast<std::ptrdiff_t>(seen.size() * 97 / 100);
+  std::nth_element(seen.begin(), at, seen.end());
+  return nominal + std::log(std::clamp(*at, 0.2, 5.0));
 }
 
 void Engine::update_noise() {
@@ -221,14 +285,17 @@ void Engine::update_noise() {
     all.precision[j] = kSaturatedPrecision;
     all.pull[j] = 0.0;
   }
-  for (int pass = 0; pass < 2; ++pass) {
-    whitening_ = fit_whitening(campaign_, state_, summary_parameters_, scales, all, whitening_);
+  std::vector<RawColumns> raw;
+  raw.reserve(campaign_.runs.size());
+  for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
+    raw.push_back(
+        raw_columns(campaign_, static_cast<int>(e), state_, summary_parameters_, scales, true));
   }
+  for (int pass = 0; pass < 2; ++pass) whitening_ = fit_whitening(campaign_, raw, all, whitening_);
   summaries_.clear();
   for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
     if (campaign_.runs[e].valid_count == 0) continue;
-    summaries_.push_back(
-        summarise(campaign_, static_cast<int>(e), state_, summary_parameters_, scales, whitening_));
+    summaries_.push_back(summary_of(campaign_, static_cast<int>(e), raw[e], whitening_));
   }
   const std::vector<int> parameters = with_nuisances(accepted_);
   base_ = fit_linear(summaries_, columns_of(parameters), prior(parameters, state_),
@@ -248,6 +315,13 @@ std::vector<Score> Engine::screen() const {
   const std::vector<int> base = with_nuisances(accepted_);
   const std::vector<int> base_columns = columns_of(base);
   const Prior base_prior = prior(base, state_);
+  std::vector<int> curve;
+  for (const int i : nuisances_) {
+    if (i <= kEndOfShapes) curve.push_back(i);
+  }
+  const std::vector<int> curve_columns = columns_of(curve);
+  const auto curve_size = static_cast<Index>(curve.size());
+  const Prior any_curve{VectorXd::Zero(curve_size), VectorXd::Constant(curve_size, 1e-3)};
   for (int slot = 0; slot < static_cast<int>(campaign_.slots.size()); ++slot) {
     if (std::find(accepted_.begin(), accepted_.end(), slot) != accepted_.end()) continue;
     std::vector<int> parameters = base;
@@ -261,6 +335,9 @@ std::vector<Score> Engine::screen() const {
     double energy = 0.0;
     for (const Summary& each : summaries_) energy += each.aa(columns.back(), columns.back());
     score.absorbed = energy > 0.0 ? 1.0 - info.without_scatter / energy : 1.0;
+    const Information beside_curve =
+        information_on(summaries_, curve_columns, any_curve, columns.back(), fit.scatter);
+    score.in_curve = energy > 0.0 ? 1.0 - beside_curve.without_scatter / energy : 1.0;
     const double unit = scale(kNuisanceCount + slot);
     const auto last = fit.step.size() - 1;
     score.value = fit.step[last] * unit;
@@ -273,16 +350,18 @@ std::vector<Score> Engine::screen() const {
   return out;
 }
 
-double Engine::linear_gain(const std::vector<int>& slots) const {
+Engine::Replacement Engine::add(const std::vector<int>& slots) const {
   const std::vector<int> parameters = with_nuisances(slots);
   const Fit fit =
       fit_linear(summaries_, columns_of(parameters), prior(parameters, state_), base_.scatter, 3);
-  return 2.0 * (fit.log_likelihood - base_.log_likelihood);
+  Replacement out{2.0 * (fit.log_likelihood - base_.log_likelihood), state_};
+  move(parameters, fit.step, 1.0, out.state);
+  return out;
 }
 
-Engine::Replacement Engine::replace(const std::vector<int>& slots, int instead_of) const {
-  const int column = columns_of({kNuisanceCount + instead_of}).front();
-  const double back = -state_.effects[instead_of] / scale(kNuisanceCount + instead_of);
+std::vector<Summary> Engine::summaries_without(int slot) const {
+  const int column = columns_of({kNuisanceCount + slot}).front();
+  const double back = -state_.effects[slot] / scale(kNuisanceCount + slot);
   std::vector<Summary> moved = summaries_;
   for (Summary& each : moved) {  // the residual's column after the step back
     const auto last = each.aa.rows() - 1;
@@ -294,9 +373,13 @@ Engine::Replacement Engine::replace(const std::vector<int>& slots, int instead_o
     each.aa(last, last) = power;
     each.ua.col(last) += back * each.ua.col(column);
   }
+  return moved;
+}
+
+Engine::Replacement Engine::replace(const std::vector<int>& slots, int instead_of) const {
   const std::vector<int> parameters = with_nuisances(slots);
-  const Fit fit =
-      fit_linear(moved, columns_of(parameters), prior(parameters, state_), base_.scatter, 3);
+  const Fit fit = fit_linear(summaries_without(instead_of), columns_of(parameters),
+                             prior(parameters, state_), base_.scatter, 3);
   Replacement out{2.0 * (fit.log_likelihood - base_.log_likelihood), state_};
   out.state.effects[instead_of] = 0.0;
   move(parameters, fit.step, 1.0, out.state);
@@ -338,7 +421,8 @@ Hypothesis Engine::refine_from(const ModelState& from, const std::vector<int>& s
   }
   std::vector<int> columns(parameters.size());
   for (std::size_t i = 0; i < columns.size(); ++i) columns[i] = static_cast<int>(i);
-  const Optimum optimum = minimise(parameters, start, whitening_, base_.scatter, iterations, 6);
+  const Optimum optimum =
+      minimise(campaign_, parameters, start, whitening_, base_.scatter, iterations, 6);
   const ModelState& best = optimum.state;
   const Fit& fit = optimum.fit;
   const std::vector<Summary>& summaries = optimum.summaries;
@@ -370,28 +454,14 @@ void Engine::accept(const Hypothesis& hypothesis) {
   state_ = hypothesis.state;
 }
 
-double Engine::left_out_gain(const std::vector<int>& slots) const {
-  const auto density = [&](const std::vector<int>& set) {
+double Engine::left_out_gain(int without) const {
+  const auto density = [&](const std::vector<Summary>& summaries, const std::vector<int>& set) {
     const std::vector<int> parameters = with_nuisances(set);
-    const std::vector<int> columns = columns_of(parameters);
-    const Prior here = prior(parameters, state_);
-    double total = 0.0;
-    for (std::size_t e = 0; e < summaries_.size(); ++e) {
-      std::vector<Summary> others = summaries_;
-      const std::vector<Summary> left_out{others[e]};
-      others.erase(others.begin() + static_cast<std::ptrdiff_t>(e));
-      const Fit fit = fit_linear(others, columns, here, base_.scatter, 0);
-      // Predictive: the others' posterior as the prior of the one left out; its gain in evidence.
-      std::vector<Summary> all = others;
-      all.push_back(left_out[0]);
-      const Fit with = fit_linear(all, columns, here, base_.scatter, 0);
-      const double ln_det = fit.covariance.ldlt().vectorD().array().max(1e-300).log().sum() -
-                            with.covariance.ldlt().vectorD().array().max(1e-300).log().sum();
-      total += with.log_likelihood - fit.log_likelihood - 0.5 * ln_det;
-    }
-    return total;
+    return left_out_density(summaries, columns_of(parameters), prior(parameters, state_));
   };
-  return density(slots) - density(accepted_);
+  std::vector<int> fewer = accepted_;
+  std::erase(fewer, without);
+  return density(summaries_, accepted_) - density(summaries_without(without), fewer);
 }
 
 }  // namespace beltgrip::diagnose

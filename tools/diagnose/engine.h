@@ -27,6 +27,7 @@ struct Score {
   double value = 0.0;     // linear estimate
   double sigma = 0.0;     // its one sigma
   double absorbed = 0.0;  // share of the column's energy that the machine's constants explain
+  double in_curve = 0.0;  // that the friction curve alone could explain, however it runs
 };
 
 class Engine {
@@ -41,7 +42,7 @@ class Engine {
   const std::vector<int>& active_nuisances() const { return nuisances_; }
 
   // Constants of the nominal machine from the data: robust, from several starts.
-  void fit_machine();
+  void fit_machine(int jobs = 1);
   // Noise model and matrices at the present state; call after fit_machine and accept.
   void update_noise();
   // All slots one at a time on top of the accepted ones.
@@ -50,18 +51,22 @@ class Engine {
   Hypothesis refine(const std::vector<int>& slots, int iterations = 5) const;
   Hypothesis refine_from(const ModelState& start, const std::vector<int>& slots,
                          int iterations = 5) const;
-  // Gain of twice the log likelihood of a set over the accepted one, linear.
-  double linear_gain(const std::vector<int>& slots) const;
-  // The same for `slots` in place of the accepted one `instead_of`, whose size goes back to zero.
+  // The same from far away: coarse noise first, the machine's constants from where fit_machine
+  // began.
+  Hypothesis refine_from_afar(const std::vector<int>& slots) const;
+  // Gain of twice the log likelihood of a set over the accepted one, linear, and its state.
+  // Of `slots` in place of the accepted one `instead_of`, whose size goes back to zero.
   struct Replacement {
     double gain = 0.0;
     ModelState state;  // of the linear fit: a start for refine_from
   };
+  Replacement add(const std::vector<int>& slots) const;
   Replacement replace(const std::vector<int>& slots, int instead_of) const;
   // Makes the hypothesis the present state.
   void accept(const Hypothesis& hypothesis);
-  // Sum of log predictive densities of left-out experiments, relative to the accepted hypothesis.
-  double left_out_gain(const std::vector<int>& slots) const;
+  // By how much the accepted effects predict experiments that were left out of the fit better than
+  // the same set without one of them: sum over experiments of the log predictive density.
+  double left_out_gain(int without) const;
 
   double scale(int parameter) const;
   Prior prior(const std::vector<int>& parameters, const ModelState& at) const;
@@ -80,13 +85,18 @@ class Engine {
     std::vector<Summary> summaries;
   };
   // Levenberg-Marquardt on the marginal likelihood, scatter re-estimated on the way.
-  Optimum minimise(const std::vector<int>& parameters, const ModelState& start,
-                   const Whitening& whitening, const Scatter& scatter, int iterations,
-                   int scatter_iterations) const;
+  Optimum minimise(const Campaign& campaign, const std::vector<int>& parameters,
+                   const ModelState& start, const Whitening& whitening, const Scatter& scatter,
+                   int iterations, int scatter_iterations) const;
   std::vector<int> columns_of(const std::vector<int>& parameters) const;
+  // The matrices with the size of one accepted effect put back to zero.
+  std::vector<Summary> summaries_without(int slot) const;
+  double ln_mu_reached() const;
 
   Campaign campaign_;
+  std::vector<Campaign> coarse_;  // the same with more noise, falling
   ModelState state_;
+  ModelState first_;  // where the best fit of the machine alone began
   std::vector<int> accepted_;
   std::vector<int> nuisances_;
   Whitening whitening_;

@@ -37,6 +37,7 @@ GridSignal to_grid(const Channel& channel, double start_s, int n, double dt_s) {
   out.slope = ArrayXd::Zero(n);
   if (channel.t_s.size() < 3) return out;
   const double period_s = median_period_s(channel);
+  out.period_s = period_s;
   const double sigma_s = std::max(kKernelSigma_s, 0.7 * (dt_s - kGrid_s + kKernelSigma_s));
   const double half_s = 3.0 * sigma_s;
   const double gap_s = std::max(0.25, 3.5 * period_s);
@@ -107,26 +108,29 @@ void add_slow(GridSignal& signal, double dt_s) {
   }
 }
 
-// Samples that sit on the channel's largest or smallest value for half a second and more while the
-// channel moves elsewhere.
+// Where a third and more of the channel's samples sit on its largest or smallest value for half a
+// second while the channel moves elsewhere: noise takes a clipped signal off its bound now and
+// then.
 std::vector<bool> saturated_samples(const Channel& channel, double start_s, int n, double dt_s) {
+  constexpr double kWindow_s = 0.5, kAround_s = 0.5, kShare = 0.33;
+  constexpr std::size_t kCountMin = 5;
   std::vector<bool> out(static_cast<std::size_t>(n), false);
   if (channel.value.size() < 10) return out;
   const auto [low, high] = std::minmax_element(channel.value.begin(), channel.value.end());
   if (*low == *high) return out;
   for (const double bound : {*low, *high}) {
-    std::size_t i = 0;
-    while (i < channel.value.size()) {
-      std::size_t end = i;
-      while (end < channel.value.size() && channel.value[end] == bound) ++end;
-      if (end > i + 5 && channel.t_s[end - 1] - channel.t_s[i] >= 0.5) {
-        const int from = static_cast<int>((channel.t_s[i] - start_s) / dt_s) - 1;
-        const int to = static_cast<int>((channel.t_s[end - 1] - start_s) / dt_s) + 1;
-        for (int k = std::max(0, from); k <= std::min(n - 1, to); ++k) {
-          out[static_cast<std::size_t>(k)] = true;
-        }
+    std::size_t begin = 0, hits = 0;
+    for (std::size_t end = 0; end < channel.value.size(); ++end) {
+      if (channel.value[end] == bound) ++hits;
+      for (; channel.t_s[begin] < channel.t_s[end] - kWindow_s; ++begin) {
+        if (channel.value[begin] == bound) --hits;
       }
-      i = std::max(end, i + 1);
+      const auto count = static_cast<double>(end - begin + 1);
+      if (hits < kCountMin || static_cast<double>(hits) < kShare * count) continue;
+      const auto at = [&](double t_s) { return static_cast<int>((t_s - start_s) / dt_s); };
+      const int from = std::max(0, at(channel.t_s[begin] - kAround_s));
+      const int to = std::min(n - 1, at(channel.t_s[end] + kAround_s));
+      for (int k = from; k <= to; ++k) out[static_cast<std::size_t>(k)] = true;
     }
   }
   return out;
@@ -214,6 +218,9 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
   data.pressure_p = on_grid(Role::kPrimaryPressure);
   data.command = on_grid(Role::kSecondaryPressureCommand);
   data.temperature = on_grid(Role::kOilTemperature);
+
+  data.line_p = order_line(speed);
+  data.line_s = order_line(table[Role::kSecondarySpeed]);
 
   const std::vector<bool> saturated =
       saturated_samples(table[Role::kSecondaryPressure], start_s, n, data.dt_s);

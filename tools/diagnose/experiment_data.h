@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "estimator/parameters.h"
+#include "tools/diagnose/order_lines.h"
 #include "tools/diagnose/signal_table.h"
 
 namespace beltgrip::diagnose {
@@ -21,6 +22,7 @@ struct GridSignal {
   Eigen::ArrayXd slope;       // per second, of the same fit
   Eigen::ArrayXd slow;        // smoother copy: what a shift, lag or play changes is taken from it,
   Eigen::ArrayXd slow_slope;  // else such an effect would win by averaging the channel's noise
+  double period_s = 0.0;      // median time between the channel's samples
   bool present = false;
 };
 
@@ -29,6 +31,7 @@ struct ExperimentData {
   double dt_s = 0.1;
   Eigen::ArrayXd t_s;  // from the first sample of the experiment
   GridSignal omega_p, omega_s, pressure, torque, torque_s, pressure_p, command, temperature;
+  OrderLine line_p, line_s;  // once per revolution, primary and secondary speed
   bool torque_is_engine = false;
   std::vector<int> stop;              // EndStopIndex per sample
   std::vector<bool> valid;            // may carry a conclusion

@@ -13,44 +13,7 @@ using Eigen::VectorXd;
 
 constexpr int kDraws = 2000;
 constexpr double kBelow = 0.7, kAbout = 0.5;  // slip over slip at the peak
-
-// Parameters of the fit to all experiments but one, by one linear step from the fit to all.
-std::vector<ModelState> left_out_states(const Engine& engine, const ModelState& state,
-                                        const std::vector<int>& slots) {
-  const Campaign& campaign = engine.campaign();
-  const std::vector<int> parameters = engine.with_nuisances(slots);
-  VectorXd scales(static_cast<Index>(parameters.size()));
-  std::vector<int> columns;
-  for (Index j = 0; j < scales.size(); ++j) {
-    scales[j] = engine.scale(parameters[static_cast<std::size_t>(j)]);
-    columns.push_back(static_cast<int>(j));
-  }
-  std::vector<Summary> summaries;
-  summaries.reserve(campaign.runs.size());
-  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
-    summaries.push_back(
-        summarise(campaign, static_cast<int>(e), state, parameters, scales, engine.whitening()));
-  }
-  const Prior prior = engine.prior(parameters, state);
-  std::vector<Summary> used;
-  for (const Summary& each : summaries) {
-    if (each.samples > 0) used.push_back(each);
-  }
-  const Scatter scatter = fit_linear(used, columns, prior, default_scatter(), 10).scatter;
-  std::vector<ModelState> out;
-  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
-    std::vector<Summary> others;
-    for (std::size_t i = 0; i < summaries.size(); ++i) {
-      if (i != e && summaries[i].samples > 0) others.push_back(summaries[i]);
-    }
-    ModelState without = state;
-    if (!others.empty()) {
-      engine.move(parameters, fit_linear(others, columns, prior, scatter, 0).step, 1.0, without);
-    }
-    out.push_back(std::move(without));
-  }
-  return out;
-}
+constexpr double kStepMax = 0.5;  // in tolerances: what one experiment may move the fit by
 
 double rms(const SignalErrors::Sum& sum) {
   return sum.count > 0.0 ? std::sqrt(sum.squares / sum.count) : 0.0;
@@ -69,7 +32,11 @@ Gain compare(const std::vector<SignalErrors>& before, const std::vector<SignalEr
   std::map<std::string, std::vector<std::size_t>> holders;
   for (std::size_t e = 0; e < before.size(); ++e) {
     for (const auto& [name, sum] : before[e].signal) {
-      if (sum.count > 0.0) holders[name].push_back(e);
+      // What one of the two cannot judge says nothing of the other.
+      const auto other = after[e].signal.find(name);
+      if (sum.count > 0.0 && other != after[e].signal.end() && other->second.count > 0.0) {
+        holders[name].push_back(e);
+      }
     }
   }
   for (const auto& [name, runs] : holders) {
@@ -135,6 +102,67 @@ std::string torque_name(const Campaign& campaign) {
 
 }  // namespace
 
+bool Gain::proven() const {
+  constexpr double kWorse = 1.1;
+  bool better = false;
+  for (const auto& [name, signal] : signals) {
+    better |= signal.low > 0.0;
+    if (signal.high < 0.0 && signal.after > kWorse * signal.before) return false;
+  }
+  return better;
+}
+
+LeftOut leave_one_out(const Engine& engine, const ModelState& state,
+                      const std::vector<int>& slots) {
+  const Campaign& campaign = engine.campaign();
+  const std::vector<int> parameters = engine.with_nuisances(slots);
+  VectorXd scales(static_cast<Index>(parameters.size()));
+  std::vector<int> columns;
+  for (Index j = 0; j < scales.size(); ++j) {
+    scales[j] = engine.scale(parameters[static_cast<std::size_t>(j)]);
+    columns.push_back(static_cast<int>(j));
+  }
+  std::vector<Summary> summaries;
+  summaries.reserve(campaign.runs.size());
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    summaries.push_back(
+        summarise(campaign, static_cast<int>(e), state, parameters, scales, engine.whitening()));
+  }
+  const Prior prior = engine.prior(parameters, state);
+  std::vector<Summary> used;
+  for (const Summary& each : summaries) {
+    if (each.samples > 0) used.push_back(each);
+  }
+  const Scatter scatter = fit_linear(used, columns, prior, default_scatter(), 10).scatter;
+  LeftOut out;
+  std::vector<VectorXd> sizes;  // of the slots, scaled
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    std::vector<Summary> others;
+    for (std::size_t i = 0; i < summaries.size(); ++i) {
+      if (i != e && summaries[i].samples > 0) others.push_back(summaries[i]);
+    }
+    ModelState without = state;
+    if (!others.empty()) {
+      const VectorXd step = fit_linear(others, columns, prior, scatter, 0).step;
+      if (summaries[e].samples > 0) sizes.push_back(step.tail(static_cast<Index>(slots.size())));
+      const double largest = step.cwiseAbs().maxCoeff();
+      engine.move(parameters, step, std::min(1.0, kStepMax / std::max(largest, 1e-12)), without);
+    }
+    out.states.push_back(std::move(without));
+  }
+  const auto n = static_cast<double>(sizes.size());
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    const auto j = static_cast<Index>(i);
+    double mean = 0.0, squares = 0.0;
+    for (const VectorXd& each : sizes) mean += each[j] / n;
+    for (const VectorXd& each : sizes) squares += (each[j] - mean) * (each[j] - mean);
+    out.spread.push_back(n > 1.0 ? std::sqrt((n - 1.0) / n * squares) *
+                                       engine.scale(kNuisanceCount + slots[i])
+                                 : 0.0);
+  }
+  return out;
+}
+
 SignalErrors signal_errors(const Campaign& campaign, int run, const ModelState& state) {
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   SignalErrors out;
@@ -142,7 +170,7 @@ SignalErrors signal_errors(const Campaign& campaign, int run, const ModelState& 
   const Residuals at = residuals_of(campaign, run, state);
   auto& speed = out.signal["secondary_speed"];
   auto& torque = out.signal[torque_name(campaign)];
-  const double slip_sigma = campaign.noise.slip, torque_sigma = campaign.noise.torque_Nm;
+  const double slip_sigma = campaign.slip_noise(run), torque_sigma = campaign.noise.torque_Nm;
   for (int k = 0; k < data.size(); ++k) {
     if (!data.valid[static_cast<std::size_t>(k)]) continue;
     const double x = std::abs(at.foot[k]);
@@ -163,9 +191,9 @@ SignalErrors signal_errors(const Campaign& campaign, int run, const ModelState& 
       out.ln_mu_sum += distance / at.model_Nm[k];
       out.ln_mu_count += 1.0;
     }
-    if (campaign.has_balance && data.torque_s.present) {
+    if (at.balance_weight[k] > 0.0 && data.torque_s.present) {
       const double ratio = data.omega_s.value[k] / data.omega_p.value[k];
-      const double error = at.value[kBalanceResidual][k] * campaign.noise.balance_Nm / ratio;
+      const double error = at.value[kBalanceResidual][k] / at.balance_weight[k] / ratio;
       auto& sum = out.signal["secondary_torque"];
       sum.squares += error * error;
       sum.count += 1.0;
@@ -182,7 +210,7 @@ SignalErrors signal_errors(const Campaign& campaign, int run, const ModelState& 
 
 std::map<std::string, double> noise_floors(const Campaign& campaign, const ModelState& state) {
   std::map<std::string, double> out;
-  double omega_s = 0.0, ratio = 0.0, count = 0.0, leverage = 0.0;
+  double omega_s = 0.0, balance = 0.0, balance_count = 0.0, count = 0.0, leverage = 0.0;
   for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
     const ExperimentData& data = campaign.runs[e];
     if (data.valid_count == 0) continue;
@@ -190,7 +218,12 @@ std::map<std::string, double> noise_floors(const Campaign& campaign, const Model
     for (int k = 0; k < data.size(); ++k) {
       if (!data.valid[static_cast<std::size_t>(k)]) continue;
       omega_s += data.omega_s.value[k];
-      ratio += data.omega_s.value[k] / data.omega_p.value[k];
+      if (campaign.has_balance && at.balance_weight[k] > 0.0) {
+        const double noise_Nm =
+            data.omega_p.value[k] / data.omega_s.value[k] / at.balance_weight[k];
+        balance += noise_Nm * noise_Nm;
+        balance_count += 1.0;
+      }
       leverage += 1.0 / (at.weight[k] * at.weight[k]);
       count += 1.0;
     }
@@ -199,7 +232,7 @@ std::map<std::string, double> noise_floors(const Campaign& campaign, const Model
   out["secondary_speed"] = omega_s / count * campaign.noise.slip;
   out[torque_name(campaign)] = std::sqrt(leverage / count);
   if (campaign.has_balance) {
-    out["secondary_torque"] = campaign.noise.balance_Nm / (ratio / count);
+    out["secondary_torque"] = std::sqrt(balance / std::max(balance_count, 1.0));
   }
   if (campaign.has_tracking) out["secondary_pressure"] = campaign.noise.tracking_Pa;
   return out;
@@ -208,9 +241,9 @@ std::map<std::string, double> noise_floors(const Campaign& campaign, const Model
 Gain left_out_gain(const Engine& engine, const ModelState& nominal, const ModelState& extended,
                    const std::vector<int>& slots) {
   const Campaign& campaign = engine.campaign();
-  const std::vector<ModelState> before = left_out_states(engine, nominal, {});
+  const std::vector<ModelState> before = leave_one_out(engine, nominal, {}).states;
   const std::vector<ModelState> after =
-      slots.empty() ? before : left_out_states(engine, extended, slots);
+      slots.empty() ? before : leave_one_out(engine, extended, slots).states;
   std::vector<SignalErrors> errors_before, errors_after;
   for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
     errors_before.push_back(signal_errors(campaign, static_cast<int>(e), before[e]));

@@ -31,7 +31,16 @@ std::map<std::string, double> noise_floors(const Campaign& campaign, const Model
 struct Gain {
   std::map<std::string, BeforeAfter> signals;
   std::optional<MuMaxError> mu_max;
+  // One signal is predicted better beyond chance, and none clearly worse.
+  bool proven() const;
 };
+
+// The machine as all experiments but one say it is, by one linear step from the fit to all.
+struct LeftOut {
+  std::vector<ModelState> states;  // per experiment left out
+  std::vector<double> spread;      // per slot asked for: jackknife one sigma of its size
+};
+LeftOut leave_one_out(const Engine& engine, const ModelState& state, const std::vector<int>& slots);
 
 // Every experiment predicted by a machine (nominal, and with the effects) that was fitted to the
 // others.

@@ -50,22 +50,35 @@ std::array<ResidualColumns, kRandomEffects> random_columns(const Campaign& campa
   return out;
 }
 
-// y filtered in place over the valid samples, segment by segment.
+// The prediction errors of the valid samples, segment by segment, in units of their sigma.
 void whiten(const ExperimentData& data, const Whitening::Filter& filter, const ArrayXd& in,
             Eigen::Ref<VectorXd> out) {
+  const int full = static_cast<int>(filter.coefficient.size()) - 1;
   Index row = 0;
-  int since = 0;
-  for (int k = 0; k < data.size(); ++k) {
+  for (int k = 0; k < data.size();) {
     if (!data.valid[static_cast<std::size_t>(k)]) {
-      since = 0;
+      ++k;
       continue;
     }
-    const int order = std::min(since, static_cast<int>(filter.coefficient.size()) - 1);
-    const VectorXd& a = filter.coefficient[static_cast<std::size_t>(order)];
-    double e = in[k];
-    for (int i = 0; i < order; ++i) e -= a[i] * in[k - 1 - i];
-    out[row++] = e / filter.sigma[static_cast<std::size_t>(order)];
-    ++since;
+    int end = k;
+    while (end < data.size() && data.valid[static_cast<std::size_t>(end)]) ++end;
+    const int warm = std::min(full, end - k);
+    for (int order = 0; order < warm; ++order) {
+      const VectorXd& a = filter.coefficient[static_cast<std::size_t>(order)];
+      double e = in[k + order];
+      for (int i = 0; i < order; ++i) e -= a[i] * in[k + order - 1 - i];
+      out[row++] = e / filter.sigma[static_cast<std::size_t>(order)];
+    }
+    if (const Index rest = end - k - warm; rest > 0) {
+      auto block = out.segment(row, rest);
+      block = in.segment(k + warm, rest);
+      const VectorXd& a = filter.coefficient.back();
+      for (int i = 0; i < full; ++i)
+        block.noalias() -= a[i] * in.segment(k + warm - 1 - i, rest).matrix();
+      block /= filter.sigma.back();
+      row += rest;
+    }
+    k = end;
   }
 }
 
@@ -93,8 +106,6 @@ Whitening::Filter levinson(const std::vector<double>& covariance) {
   return out;
 }
 
-int valid_samples(const ExperimentData& data) { return data.valid_count; }
-
 }  // namespace
 
 Scatter default_scatter() {
@@ -121,73 +132,93 @@ Whitening identity_whitening(const Campaign& campaign) {
 
 namespace {
 
-struct Design {
-  MatrixXd columns;  // rows x (parameters + residual + random effects)
-  int rows_per_kind = 0;
-  std::vector<int> kinds;
-};
+std::vector<int> kinds_of(const Campaign& campaign) {
+  std::vector<int> kinds{kFrictionResidual};
+  if (campaign.has_balance) kinds.push_back(kBalanceResidual);
+  if (campaign.has_tracking) kinds.push_back(kTrackingResidual);
+  return kinds;
+}
 
-Design design_of(const Campaign& campaign, int run, const ModelState& state,
-                 const std::vector<int>& parameters, const VectorXd& scale,
-                 const Whitening& whitening, const ExtraColumns& extra) {
+// Rows: valid samples, kind after kind.
+MatrixXd whitened(const Campaign& campaign, int run, const RawColumns& raw,
+                  const Whitening& whitening) {
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
-  Design out;
-  out.rows_per_kind = valid_samples(data);
-  out.kinds = {kFrictionResidual};
-  if (campaign.has_balance) out.kinds.push_back(kBalanceResidual);
-  if (campaign.has_tracking) out.kinds.push_back(kTrackingResidual);
-  const auto own = static_cast<Index>(parameters.size());
-  Index n = own;
-  const Index rows = out.rows_per_kind * static_cast<Index>(out.kinds.size());
+  const std::vector<int> kinds = kinds_of(campaign);
+  const Index rows = data.valid_count;
+  MatrixXd out(rows * static_cast<Index>(kinds.size()), static_cast<Index>(raw.columns.size()));
   if (rows == 0) return out;
-  const Residuals at = residuals_of(campaign, run, state);
-  std::vector<ResidualColumns> further;
-  if (extra) further = extra(run, at);
-  n += static_cast<Index>(further.size());
-  out.columns.resize(rows, n + 1 + kRandomEffects);
-  const auto put = [&](Index column, const ResidualColumns& values, double factor) {
-    for (std::size_t i = 0; i < out.kinds.size(); ++i) {
-      const auto kind = static_cast<std::size_t>(out.kinds[i]);
-      auto block = out.columns.col(column).segment(static_cast<Index>(i) * out.rows_per_kind,
-                                                   out.rows_per_kind);
-      whiten(data, whitening.filter[kind], values[kind], block);
-      block.array() *= whitening.weight[static_cast<std::size_t>(run)][kind] * factor;
+  const auto& weight = whitening.weight[static_cast<std::size_t>(run)];
+  for (Index j = 0; j < out.cols(); ++j) {
+    for (std::size_t i = 0; i < kinds.size(); ++i) {
+      const auto kind = static_cast<std::size_t>(kinds[i]);
+      auto block = out.col(j).segment(static_cast<Index>(i) * rows, rows);
+      whiten(data, whitening.filter[kind], raw.columns[static_cast<std::size_t>(j)][kind], block);
+      block.array() *= weight[kind];
     }
     if (campaign.has_balance && whitening.cross != 0.0) {
       const double clean = std::sqrt(1.0 - whitening.cross * whitening.cross);
-      auto friction = out.columns.col(column).segment(0, out.rows_per_kind);
-      const auto balance = out.columns.col(column).segment(out.rows_per_kind, out.rows_per_kind);
-      friction = (friction - whitening.cross * balance) / clean;
+      auto friction = out.col(j).segment(0, rows);
+      friction = (friction - whitening.cross * out.col(j).segment(rows, rows)) / clean;
     }
-  };
-  for (Index j = 0; j < own; ++j) {
-    const int parameter = parameters[static_cast<std::size_t>(j)];
-    put(j, derivative(campaign, run, state, at, parameter), scale[j]);
   }
-  for (Index j = own; j < n; ++j) put(j, further[static_cast<std::size_t>(j - own)], 1.0);
-  put(n, at.value, 1.0);
-  const auto random = random_columns(campaign, run, state, at);
-  for (int i = 0; i < kRandomEffects; ++i) put(n + 1 + i, random[static_cast<std::size_t>(i)], 1.0);
   return out;
 }
 
 }  // namespace
 
+RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& state,
+                       const std::vector<int>& parameters, const VectorXd& scale, bool with_random,
+                       const ExtraColumns& extra) {
+  RawColumns out;
+  out.with_random = with_random;
+  const Residuals at = residuals_of(campaign, run, state, with_random || !parameters.empty());
+  for (std::size_t j = 0; j < parameters.size(); ++j) {
+    ResidualColumns column = derivative(campaign, run, state, at, parameters[j]);
+    for (ArrayXd& each : column) each *= scale[static_cast<Index>(j)];
+    out.columns.push_back(std::move(column));
+  }
+  if (extra) {
+    for (ResidualColumns& column : extra(run, at)) out.columns.push_back(std::move(column));
+  }
+  out.columns.push_back(at.value);
+  if (with_random) {
+    for (ResidualColumns& column : random_columns(campaign, run, state, at)) {
+      out.columns.push_back(std::move(column));
+    }
+  }
+  return out;
+}
+
+Summary summary_of(const Campaign& campaign, int run, const RawColumns& raw,
+                   const Whitening& whitening) {
+  if (campaign.runs[static_cast<std::size_t>(run)].valid_count == 0) {
+    const auto count =
+        static_cast<Index>(raw.columns.size()) - (raw.with_random ? kRandomEffects : 0);
+    return {MatrixXd::Zero(count, count), MatrixXd::Zero(kRandomEffects, count),
+            MatrixXd::Zero(kRandomEffects, kRandomEffects), 0};
+  }
+  const MatrixXd all = whitened(campaign, run, raw, whitening);
+  const Index n = all.cols() - (raw.with_random ? kRandomEffects : 0);
+  const MatrixXd& kept = raw.with_random ? all : whitening.random[static_cast<std::size_t>(run)];
+  const auto columns = all.leftCols(n);
+  const auto random = kept.rightCols(kRandomEffects);
+  Summary out;
+  out.aa = MatrixXd::Zero(n, n);
+  out.aa.selfadjointView<Eigen::Lower>().rankUpdate(columns.transpose());
+  out.aa = MatrixXd(out.aa.selfadjointView<Eigen::Lower>());
+  out.ua = random.transpose() * columns;
+  out.uu = random.transpose() * random;
+  out.samples = static_cast<int>(all.rows());
+  return out;
+}
+
 Summary summarise(const Campaign& campaign, int run, const ModelState& state,
                   const std::vector<int>& parameters, const VectorXd& scale,
                   const Whitening& whitening, const ExtraColumns& extra) {
-  const Design design = design_of(campaign, run, state, parameters, scale, whitening, extra);
-  const Index all = design.columns.cols();
-  const Index n = all - kRandomEffects;
-  MatrixXd product = MatrixXd::Zero(all, all);
-  product.selfadjointView<Eigen::Lower>().rankUpdate(design.columns.transpose());
-  product = product.selfadjointView<Eigen::Lower>();
-  Summary out;
-  out.aa = product.topLeftCorner(n, n);
-  out.ua = product.bottomLeftCorner(kRandomEffects, n);
-  out.uu = product.bottomRightCorner(kRandomEffects, kRandomEffects);
-  out.samples = static_cast<int>(design.columns.rows());
-  return out;
+  return summary_of(
+      campaign, run,
+      raw_columns(campaign, run, state, parameters, scale, whitening.random.empty(), extra),
+      whitening);
 }
 
 Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& columns,
@@ -256,6 +287,24 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
   return fit;
 }
 
+double left_out_density(const std::vector<Summary>& summaries, const std::vector<int>& columns,
+                        const Prior& prior) {
+  constexpr int kScatterIterations = 6;
+  double total = 0.0;
+  for (std::size_t e = 0; e < summaries.size(); ++e) {
+    std::vector<Summary> runs = summaries;
+    runs.erase(runs.begin() + static_cast<std::ptrdiff_t>(e));
+    const Fit others = fit_linear(runs, columns, prior, default_scatter(), kScatterIterations);
+    // The others' posterior as the prior of the one left out; its gain in evidence.
+    runs.push_back(summaries[e]);
+    const Fit all = fit_linear(runs, columns, prior, others.scatter, 0);
+    const double ln_det = others.covariance.ldlt().vectorD().array().max(1e-300).log().sum() -
+                          all.covariance.ldlt().vectorD().array().max(1e-300).log().sum();
+    total += all.log_likelihood - others.log_likelihood - 0.5 * ln_det;
+  }
+  return total;
+}
+
 Information information_on(const std::vector<Summary>& summaries, const std::vector<int>& others,
                            const Prior& prior, int column, const Scatter& scatter) {
   const auto n = static_cast<Index>(others.size());
@@ -277,19 +326,15 @@ Information information_on(const std::vector<Summary>& summaries, const std::vec
   return {perpendicular(true), perpendicular(false)};
 }
 
-Whitening fit_whitening(const Campaign& campaign, const ModelState& state,
-                        const std::vector<int>& parameters, const VectorXd& scale,
+Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>& raw,
                         const Prior& prior, const Whitening& before) {
   std::vector<Summary> summaries;
-  std::vector<Design> designs;
-  Whitening plain = identity_whitening(campaign);
-  plain.weight = before.weight;
   const auto runs = campaign.runs.size();
   summaries.reserve(runs);
   for (std::size_t e = 0; e < runs; ++e) {
-    summaries.push_back(summarise(campaign, static_cast<int>(e), state, parameters, scale, before));
+    summaries.push_back(summary_of(campaign, static_cast<int>(e), raw[e], before));
   }
-  std::vector<int> all(parameters.size());
+  std::vector<int> all(static_cast<std::size_t>(prior.pull.size()));
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
   const Fit fit = fit_linear(summaries, all, prior, default_scatter(), 4);
   VectorXd full(fit.step.size() + 1);
@@ -307,27 +352,28 @@ Whitening fit_whitening(const Campaign& campaign, const ModelState& state,
     covariance[q].assign(Whitening::kOrder + 1, 0.0);
     count[q].assign(Whitening::kOrder + 1, 0.0);
   }
-  std::vector<int> kinds;
+  const std::vector<int> kinds = kinds_of(campaign);
+  const Whitening plain = out;
   for (std::size_t e = 0; e < runs; ++e) {
     const ExperimentData& data = campaign.runs[e];
-    const Design design = design_of(campaign, static_cast<int>(e), state, parameters, scale,
-                                    identity_whitening(campaign), {});
-    if (design.columns.rows() == 0) continue;
-    kinds = design.kinds;
+    const Index rows = data.valid_count;
+    if (rows == 0) continue;
+    const MatrixXd columns = whitened(campaign, static_cast<int>(e), raw[e], plain);
     const VectorXd u = -(summaries[e].uu + inverse).llt().solve(summaries[e].ua * full);
-    VectorXd weights(design.columns.cols());
+    VectorXd weights(columns.cols());
     weights << full, u;
-    const VectorXd left = design.columns * weights;
-    for (std::size_t i = 0; i < design.kinds.size(); ++i) {
-      const auto q = static_cast<std::size_t>(design.kinds[i]);
-      const auto block =
-          left.segment(static_cast<Index>(i) * design.rows_per_kind, design.rows_per_kind);
+    const VectorXd left = columns * weights;
+    for (std::size_t i = 0; i < kinds.size(); ++i) {
+      const auto q = static_cast<std::size_t>(kinds[i]);
+      const auto block = left.segment(static_cast<Index>(i) * rows, rows);
       rest[q][e].assign(block.data(), block.data() + block.size());
       // Clipped: a few outliers must not make the noise look white.
-      std::vector<double> size(rest[q][e]);
-      for (double& v : size) v = std::abs(v);
+      std::vector<double> size;
+      for (const double v : rest[q][e]) {
+        if (v != 0.0) size.push_back(std::abs(v));
+      }
       std::sort(size.begin(), size.end());
-      const double bound = 4.0 * 1.4826 * size[size.size() / 2] + 1e-12;
+      const double bound = (size.empty() ? 0.0 : 4.0 * 1.4826 * size[size.size() / 2]) + 1e-12;
       Index row = 0;
       std::vector<Index> row_of(static_cast<std::size_t>(data.size()), -1);
       for (int k = 0; k < data.size(); ++k) {
@@ -341,7 +387,8 @@ Whitening fit_whitening(const Campaign& campaign, const ModelState& state,
           if (b < 0) break;
           covariance[q][static_cast<std::size_t>(lag)] +=
               std::clamp(block[a], -bound, bound) * std::clamp(block[b], -bound, bound);
-          count[q][static_cast<std::size_t>(lag)] += 1.0;
+          // A sample that this residual does not use is exactly zero.
+          if (block[a] != 0.0) count[q][static_cast<std::size_t>(lag)] += 1.0;
         }
       }
     }
@@ -382,6 +429,11 @@ Whitening fit_whitening(const Campaign& campaign, const ModelState& state,
   }
   if (power_friction > 0.0 && power_balance > 0.0) {
     out.cross = std::clamp(cross / std::sqrt(power_friction * power_balance), -0.95, 0.95);
+  }
+  for (std::size_t e = 0; e < runs; ++e) {
+    RawColumns random;
+    random.columns.assign(raw[e].columns.end() - kRandomEffects, raw[e].columns.end());
+    out.random.push_back(whitened(campaign, static_cast<int>(e), random, out));
   }
   return out;
 }

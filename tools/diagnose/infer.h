@@ -17,7 +17,7 @@ inline constexpr int kRandomEffects = 6;
 // Prediction-error filter per residual: order p from the data, lower orders for the first samples
 // of a segment. Weights: Huber, per sample, fixed for all hypotheses.
 struct Whitening {
-  static constexpr int kOrder = 8;
+  static constexpr int kOrder = 6;
   struct Filter {
     std::vector<Eigen::VectorXd> coefficient;  // [order] -> a_1..a_order
     std::vector<double> sigma;                 // innovation, per order
@@ -25,6 +25,9 @@ struct Whitening {
   std::array<Filter, kResidualKinds> filter;
   double cross = 0.0;  // correlation of the whitened friction and balance residuals
   std::vector<std::array<Eigen::ArrayXd, kResidualKinds>> weight;  // per experiment
+  // Columns of the random effects per experiment, whitened; the same for all hypotheses. Empty:
+  // from the state at hand.
+  std::vector<Eigen::MatrixXd> random;
 };
 
 // Whitened normal equations of one experiment. Columns: parameters asked for, then the residual.
@@ -60,6 +63,11 @@ struct Fit {
 Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& columns,
                const Prior& prior, const Scatter& start, int scatter_iterations);
 
+// Sum over experiments of the log predictive density of each, by a fit to the others; their scatter
+// too.
+double left_out_density(const std::vector<Summary>& summaries, const std::vector<int>& columns,
+                        const Prior& prior);
+
 // Information on one column given the others, with the scatter and without: its loss tells how much
 // of the evidence lies between experiments.
 struct Information {
@@ -76,15 +84,26 @@ Whitening identity_whitening(const Campaign& campaign);
 // Further columns of one experiment, behind the parameters.
 using ExtraColumns = std::function<std::vector<ResidualColumns>(int run, const Residuals& at)>;
 
-// Columns of one experiment, whitened: parameters, further columns, residual; and random effects.
+// Columns of one experiment on the grid: parameters (scaled), further columns, residual, and with
+// with_random the random effects.
+struct RawColumns {
+  std::vector<ResidualColumns> columns;
+  bool with_random = false;
+};
+RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& state,
+                       const std::vector<int>& parameters, const Eigen::VectorXd& scale,
+                       bool with_random, const ExtraColumns& extra = {});
+Summary summary_of(const Campaign& campaign, int run, const RawColumns& raw,
+                   const Whitening& whitening);
+// Both at once.
 Summary summarise(const Campaign& campaign, int run, const ModelState& state,
                   const std::vector<int>& parameters, const Eigen::VectorXd& scale,
                   const Whitening& whitening, const ExtraColumns& extra = {});
 
 // Filters, weights and the cross correlation from the residual that is left after the best linear
-// fit of everything (parameters with the prior), so that no effect leaks into the noise.
-Whitening fit_whitening(const Campaign& campaign, const ModelState& state,
-                        const std::vector<int>& parameters, const Eigen::VectorXd& scale,
+// fit of everything (parameters with the prior), so that no effect leaks into the noise. raw: with
+// random effects, one per experiment.
+Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>& raw,
                         const Prior& prior, const Whitening& before);
 
 // Two-sided p-value of Student's t, and the chi-square(1) value with the same p-value.

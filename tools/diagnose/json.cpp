@@ -127,10 +127,24 @@ std::string json_text(const Diagnosis& d) {
   return json.take() + "\n";
 }
 
+std::string headline(const Diagnosis& d) {
+  std::string what;
+  switch (d.verdict) {
+    case Verdict::kNothingWrong:
+      what = "nothing wrong";
+      break;
+    case Verdict::kExplained:
+      what = "explained";
+      break;
+    case Verdict::kUnexplained:
+      what = "unexplained";
+  }
+  return what + " (" + std::to_string(d.experiments) + " experiments, " + number(0.1 * d.samples) +
+         " s usable)" + (d.complete ? "" : ", stopped before the end");
+}
+
 std::string plain_text(const Diagnosis& d) {
-  std::string out = "verdict: " + std::string(verdict_text(d.verdict)) + " (" +
-                    std::to_string(d.experiments) + " experiments, " + number(0.1 * d.samples) +
-                    " s usable)" + (d.complete ? "" : ", stopped before the end") + "\n";
+  std::string out = "verdict: " + headline(d) + "\n";
   for (const auto& [name, signal] : d.baseline) {
     out += "  " + name + ": the simulation is off by " + number(signal.rmse) + " rms, noise " +
            number(signal.noise_floor) + "\n";

@@ -7,5 +7,6 @@
 
 namespace beltgrip::diagnose {
 std::string json_text(const Diagnosis& diagnosis);
+std::string headline(const Diagnosis& diagnosis);  // the verdict in one line
 std::string plain_text(const Diagnosis& diagnosis);
 }  // namespace beltgrip::diagnose

@@ -1,39 +1,20 @@
-// The model file: what the simulation believes of the machine, and the effects switched on. TOML:
-// [variator] as in the configuration, [friction], [driveline], [effects.ID]. Start-up and tools
-// only.
+// Between the model file and what a diagnosis fits: constants of the machine and sizes of effects.
+// Tools only.
 #pragma once
 
-#include <map>
-#include <string>
 #include <vector>
 
-#include "estimator/parameters.h"
+#include "daemon/core/config_model.h"
 #include "tools/diagnose/effects/effect.h"
 
 namespace beltgrip::diagnose {
 
-struct ModelEffect {
-  std::map<std::string, double> parameters;  // as in the contract, by name
-  std::string role;                          // channel_skew
-};
-
-struct ModelFile {
-  estimator::VariatorParameters variator;
-  std::map<std::string, double> friction;   // nominal curve: names of [friction]
-  std::map<std::string, double> driveline;  // losses, deformation: names of [driveline]
-  std::map<std::string, ModelEffect> effects;
-  std::vector<std::string> comments;  // written at the top, one line each; not read
-};
-
-struct ModelError {
-  bool missing_file = false;
-  std::string text;  // one line: file, line, key, found, expected
-};
-
-// Keys that the file leaves out keep the values of `base`. Throws ModelError.
-ModelFile read_model(const std::string& path, const ModelFile& base);
-ModelFile parse_model(const std::string& text, const std::string& name, const ModelFile& base);
-std::string model_text(const ModelFile& model);
+using daemon::model_text;
+using daemon::ModelEffect;
+using daemon::ModelError;
+using daemon::ModelFile;
+using daemon::parse_model;
+using daemon::read_model;
 
 // The nominal machine without any file: [friction] and [driveline] with their defaults.
 ModelFile nominal_model(const estimator::VariatorParameters& variator);

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <set>
 
+#include "tools/diagnose/gain.h"
+#include "tools/diagnose/parallel.h"
 #include "tools/diagnose/unknown.h"
 
 namespace beltgrip::diagnose {
@@ -14,12 +16,27 @@ namespace {
 // Chance of a name on data without an effect, and of an unknown cause.
 constexpr double kFalseName = 0.005;
 constexpr double kFalseUnknown = 0.005;
-constexpr int kRefined = 14;  // candidates refitted per step
+constexpr int kRefined = 9;           // candidates refitted per step
+constexpr std::size_t kFromAfar = 5;  // of these, from afar
+constexpr double kPlain = 2.0;        // times the threshold: no chance
+constexpr double kFar = 1000.0;       // gain of a candidate: the machine alone is far from the data
+constexpr double kNearMax = 400.0;
+constexpr double kNear = 40.0;  // linear loss within which a refit may still reach the best
 constexpr int kEffectsMax = 3;
+constexpr int kStepsMax = 4;
+constexpr int kSettling = 20;        // steps of a fit whose effects are settled
+constexpr int kGroupDegrees = 3;     // of a group of score_groups
 constexpr double kClassOdds = 20.0;  // worse by more: told apart
 // A further cause must matter beside those found: below this share of their evidence it is the
 // difference between the found effect's equation and the machine.
 constexpr double kShareOfFirst = 0.02;
+// More: in these experiments the effect is no other thing than a friction curve that runs
+// otherwise.
+constexpr double kInCurveMax = 0.998;
+constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
+constexpr double kDisagreement = 1e-3;  // p of a size that experiments do not agree on
+constexpr double kLeftOutMin = 0.0;     // of the log predictive density
+constexpr double kRippleMin = 3e-5;     // of the speed: less is of no consequence for slip
 
 std::string_view id_of(const Engine& engine, int slot) {
   return engine.campaign().slots[static_cast<std::size_t>(slot)].row->id;
@@ -38,12 +55,42 @@ std::vector<int> shortlist(const std::vector<Score>& scores, int count) {
   std::vector<int> out;
   for (std::size_t i = 0; i < scores.size() && static_cast<int>(out.size()) < count; ++i) {
     for (const Score* score : {&by_gain[i], &by_chi2[i]}) {
-      if (score->gain > 4.0 && std::find(out.begin(), out.end(), score->slot) == out.end()) {
+      if (score->gain > 4.0 && score->in_curve < kInCurveMax &&
+          std::find(out.begin(), out.end(), score->slot) == out.end()) {
         out.push_back(score->slot);
       }
     }
   }
   return out;
+}
+
+// Time between the samples of what a slot shifts in time; 0: it shifts nothing.
+double sample_period_s(const Campaign& campaign, const Slot& slot) {
+  if (slot.row->unit != "s") return 0.0;
+  double period_s = 0.0;
+  for (const ExperimentData& run : campaign.runs) {
+    const GridSignal& channel = slot.row->id == "torque_delay"   ? run.torque
+                                : slot.role == "primary_speed"   ? run.omega_p
+                                : slot.role == "secondary_speed" ? run.omega_s
+                                : slot.role == "command"         ? run.command
+                                                                 : run.pressure;
+    period_s = std::max(period_s, channel.period_s);
+  }
+  return period_s;
+}
+
+// A size that no machine has is one where the data do not hold the fit; one far below the usual is
+// of no consequence, however sure; one below the time between two samples is the sampling's own.
+bool credible(const Engine& engine, const Hypothesis& h) {
+  return std::all_of(h.slots.begin(), h.slots.end(), [&](int slot) {
+    const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
+    const EffectRow& row = *which.row;
+    const double size = h.state.effects[slot];
+    const double share = std::abs(size) / row.typical;
+    if (std::abs(size) < sample_period_s(engine.campaign(), which)) return false;
+    return share > kOfConsequence && share < kBelievable && size < row.high &&
+           (size > row.low || row.low == 0.0);
+  });
 }
 
 double ln_sum(const std::vector<double>& ln_values) {
@@ -53,8 +100,29 @@ double ln_sum(const std::vector<double>& ln_values) {
   return top + std::log(sum);
 }
 
+// The group that explains what the best hypothesis cannot, if there is one. An effect's own
+// dependence is no other cause: there its equation only has another shape.
+std::optional<UnknownGroup> better_group(const Engine& engine, const Hypothesis& best, double gain,
+                                         double threshold) {
+  const double certainty = *std::min_element(best.chi2.begin(), best.chi2.end());
+  for (const UnknownGroup& group : score_groups(engine)) {  // by gain, falling
+    if (group.gain < gain + 2.0 * (kGroupDegrees - 1) + threshold + kShareOfFirst * gain) break;
+    if (group.chi2 < std::max(threshold, certainty) || group.size < 1.0 ||
+        group.left_out_gain <= kLeftOutMin) {
+      continue;
+    }
+    const bool own = std::any_of(best.slots.begin(), best.slots.end(), [&](int slot) {
+      const EffectRow& row = *engine.campaign().slots[static_cast<std::size_t>(slot)].row;
+      return row.acts_on == group.acts_on &&
+             row.depends_on.find(group.depends_on) != std::string_view::npos;
+    });
+    if (!own) return group;
+  }
+  return std::nullopt;
+}
+
 // Every accepted slot against every other slot in its place.
-void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& stop) {
+void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& stop, int jobs) {
   const std::vector<int>& set = engine.accepted();
   naming.accepted.clear();
   naming.hypothesis = engine.refine(set);
@@ -63,6 +131,7 @@ void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& s
     Accepted out;
     out.slot = set[j];
     out.chi2 = whole.chi2[j];
+    out.left_out_gain = engine.left_out_gain(out.slot);
     std::vector<int> others = set;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(j));
     std::vector<std::pair<Engine::Replacement, int>> ranked;
@@ -75,9 +144,21 @@ void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& s
     std::map<std::string_view, std::vector<double>> evidence;
     evidence[id_of(engine, out.slot)].push_back(whole.log_evidence);
     const Hypothesis without = engine.refine_from(engine.replace(others, out.slot).state, others);
-    for (std::size_t i = 0; i < ranked.size() && i < kRefined && !stop(); ++i) {
-      const Hypothesis other =
-          engine.refine_from(ranked[i].first.state, plus(others, ranked[i].second));
+    const double loss = std::max(0.0, whole.log_likelihood - without.log_likelihood) * 2.0;
+    std::size_t near = 0;
+    while (near < ranked.size() && near < kRefined &&
+           -ranked[near].first.gain <= std::clamp(0.4 * loss, kNear, kNearMax)) {
+      ++near;
+    }
+    std::vector<std::optional<Hypothesis>> rivals(near);
+    in_parallel(jobs, near, [&](std::size_t i) {
+      if (stop()) return;
+      rivals[i] = engine.refine_from(ranked[i].first.state, plus(others, ranked[i].second));
+    });
+    for (std::size_t i = 0; i < near; ++i) {
+      const std::optional<Hypothesis>& rival = rivals[i];
+      if (!rival) continue;
+      const Hypothesis& other = *rival;
       evidence[id_of(engine, ranked[i].second)].push_back(other.log_evidence);
       if (id_of(engine, ranked[i].second) != id_of(engine, out.slot) &&
           other.log_evidence > whole.log_evidence - std::log(kClassOdds)) {
@@ -86,12 +167,95 @@ void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& s
     }
     std::vector<double> all{without.log_evidence};
     for (const auto& [id, values] : evidence) all.push_back(ln_sum(values));
+    out.ln_odds = whole.log_evidence - without.log_evidence;
     out.probability = std::exp(ln_sum(evidence[id_of(engine, out.slot)]) - ln_sum(all));
     naming.accepted.push_back(out);
   }
 }
 
+// Sizes' uncertainty: from the noise, or from how the size changes when an experiment is left out,
+// whichever is larger.
+void find_intervals(const Engine& engine, Naming& naming) {
+  const Hypothesis& h = naming.hypothesis;
+  const LeftOut left_out = leave_one_out(engine, h.state, h.slots);
+  const auto between = std::max(1.0, static_cast<double>(engine.summaries().size()) - 1.0);
+  for (Accepted& each : naming.accepted) {
+    const auto at = static_cast<std::size_t>(std::find(h.slots.begin(), h.slots.end(), each.slot) -
+                                             h.slots.begin());
+    const auto column = static_cast<Eigen::Index>(engine.active_nuisances().size() + at);
+    each.sigma = std::sqrt(std::max(h.fit.covariance(column, column), 0.0)) *
+                 engine.scale(kNuisanceCount + each.slot);
+    each.degrees = h.degrees[at];
+    if (left_out.spread[at] > each.sigma) {
+      each.sigma = left_out.spread[at];
+      each.degrees = std::min(each.degrees, between);
+    }
+  }
+}
+
+// What the experiments do not agree on, or what is better left out, is no finding.
+void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& stop, int jobs) {
+  while (!naming.accepted.empty() && !stop()) {
+    const auto doubtful =
+        std::find_if(naming.accepted.begin(), naming.accepted.end(), [&](const Accepted& each) {
+          const double size = naming.hypothesis.state.effects[each.slot];
+          return each.ln_odds < std::log(kClassOdds) ||
+                 student_p(size / each.sigma, each.degrees) > kDisagreement;
+        });
+    if (doubtful == naming.accepted.end()) return;
+    naming.not_confirmed.push_back(doubtful->slot);
+    std::vector<int> fewer = engine.accepted();
+    std::erase(fewer, doubtful->slot);
+    engine.accept(engine.refine(fewer));
+    engine.update_noise();
+    find_classes(engine, naming, stop, jobs);
+    find_intervals(engine, naming);
+  }
+}
+
+// An effect that does not help to predict experiments left out of the fit is none.
+void drop_unconfirmed(Engine& engine, Naming& naming) {
+  if (engine.summaries().size() < 3) return;
+  for (;;) {
+    const std::vector<int>& set = engine.accepted();
+    const auto worst = std::min_element(set.begin(), set.end(), [&](int a, int b) {
+      return engine.left_out_gain(a) < engine.left_out_gain(b);
+    });
+    if (worst == set.end()) return;
+    const Hypothesis whole = engine.refine(set, 3);
+    const bool helps = engine.left_out_gain(*worst) > kLeftOutMin &&
+                       left_out_gain(engine, naming.nominal, whole.state, set).proven();
+    if (helps) return;
+    naming.not_confirmed.push_back(*worst);
+    std::vector<int> fewer = set;
+    std::erase(fewer, *worst);
+    engine.accept(engine.refine(fewer));
+    engine.update_noise();
+  }
+}
+
 }  // namespace
+
+std::vector<Ripple> find_ripples(const Campaign& campaign, double threshold) {
+  OrderLine primary, secondary;
+  for (const ExperimentData& run : campaign.runs) {
+    primary.add(run.line_p);
+    secondary.add(run.line_s);
+  }
+  std::vector<Ripple> out;
+  for (const auto& [shaft, line] : {std::pair{"primary", primary}, {"secondary", secondary}}) {
+    // Sums of exponential variables have heavier tails than the normal: three times the bound.
+    // What the model knows of is no news, unless it is of another size.
+    const auto known = campaign.known_ripples.find(shaft);
+    const bool is_known = known != campaign.known_ripples.end();
+    const double beyond = line.amplitude() - (is_known ? known->second : 0.0);
+    const double sigmas = beyond / std::max(line.amplitude_sigma(), 1e-12);
+    const double chi2 = is_known ? sigmas * sigmas : line.chi2();
+    out.push_back({shaft, line.amplitude(), line.amplitude_sigma(), chi2,
+                   chi2 > 3.0 * threshold && std::abs(beyond) > kRippleMin});
+  }
+  return out;
+}
 
 double chance_threshold(int candidates, double probability) {
   const double target = probability / std::max(candidates, 1);
@@ -103,10 +267,11 @@ double chance_threshold(int candidates, double probability) {
   return low;
 }
 
-Naming name_effects(Engine& engine, const std::function<bool()>& stop) {
+Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs) {
   Naming out;
   out.threshold = chance_threshold(static_cast<int>(engine.campaign().slots.size()), kFalseName);
-  engine.fit_machine();
+  out.ripples = find_ripples(engine.campaign(), out.threshold);
+  engine.fit_machine(jobs);
   engine.update_noise();
   for (int i = 0; i < 2; ++i) {
     engine.accept(engine.refine({}));
@@ -115,19 +280,36 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop) {
   out.nominal = engine.state();
   out.nominal_groups = score_groups(engine);
   double first_gain = 0.0;
-  while (static_cast<int>(engine.accepted().size()) < kEffectsMax && !stop()) {
+  // A member may be dropped again: the number of steps is bounded, not only that of effects.
+  for (int step = 0; step < kStepsMax && !stop(); ++step) {
+    if (static_cast<int>(engine.accepted().size()) >= kEffectsMax) break;
     const std::vector<Score> scores = engine.screen();
     out.last_screen = scores;
     const std::vector<int> set = engine.accepted();
     const Hypothesis base = engine.refine(set, 3);
+    // So far from the data, the linear says little of where an effect would lead.
+    const bool far = std::any_of(scores.begin(), scores.end(),
+                                 [](const Score& score) { return score.gain > kFar; });
     Hypothesis best;
     bool found = false;
-    const auto consider = [&](const std::vector<int>& candidate) {
-      Hypothesis h = engine.refine(candidate);
+    // From the linear estimate, and where that leaves the range of the linear, from the present.
+    const auto fitted = [&](const std::vector<int>& candidate, bool afar) {
+      Hypothesis h = engine.refine_from(engine.add(candidate).state, candidate);
+      if (h.log_likelihood < base.log_likelihood) h = engine.refine(candidate);
+      if (afar) {
+        if (Hypothesis other = engine.refine_from_afar(candidate);
+            other.log_likelihood > h.log_likelihood) {
+          h = std::move(other);
+        }
+      }
+      return h;
+    };
+    const auto consider = [&](Hypothesis h) {
       const double gain = 2.0 * (h.log_likelihood - base.log_likelihood);
       for (const double chi2 : h.chi2) {
         if (!(chi2 > out.threshold)) return;
       }
+      if (!credible(engine, h)) return;
       if (gain < out.threshold || (first_gain > 0.0 && gain < kShareOfFirst * first_gain)) return;
       if (!found || h.log_evidence > best.log_evidence) {
         best = std::move(h);
@@ -135,10 +317,21 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop) {
       }
     };
     const std::vector<int> candidates = shortlist(scores, kRefined);
-    for (const int slot : candidates) {
-      if (stop()) break;
-      consider(plus(set, slot));
-    }
+    const auto consider_all = [&](bool from_afar) {
+      std::vector<std::optional<Hypothesis>> fits(candidates.size());
+      in_parallel(jobs, candidates.size(), [&](std::size_t i) {
+        if (!stop()) fits[i] = fitted(plus(set, candidates[i]), from_afar && i < kFromAfar);
+      });
+      for (std::optional<Hypothesis>& fit : fits) {
+        if (fit) consider(std::move(*fit));
+      }
+    };
+    consider_all(far);
+    // Something is there, but no way leads to it from here.
+    const bool plain = std::any_of(scores.begin(), scores.end(), [&](const Score& score) {
+      return score.chi2 > kPlain * out.threshold && score.in_curve < kInCurveMax;
+    });
+    if (!found && !far && plain) consider_all(true);
     if (!found) break;
     // A pair whose sum a third effect imitates: all pairs, linear, on the present matrices.
     if (set.empty()) {
@@ -147,21 +340,27 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop) {
         for (std::size_t b = a + 1; b < candidates.size(); ++b) {
           if (id_of(engine, candidates[a]) == id_of(engine, candidates[b])) continue;
           const std::vector<int> pair{candidates[a], candidates[b]};
-          pairs.emplace_back(engine.linear_gain(pair), pair);
+          pairs.emplace_back(engine.add(pair).gain, pair);
         }
       }
       std::sort(pairs.rbegin(), pairs.rend());
       const double single = 2.0 * (best.log_likelihood - base.log_likelihood);
       for (std::size_t i = 0; i < pairs.size() && i < 3 && !stop(); ++i) {
         if (pairs[i].first < single + out.threshold + kShareOfFirst * single) break;
-        consider(pairs[i].second);
+        consider(fitted(pairs[i].second, false));
       }
     }
     const double gain = 2.0 * (best.log_likelihood - base.log_likelihood);
+    // A smooth dependence on a recorded variable that explains clearly more than any name is no
+    // effect of the library: a name would be wrong, and so would those built on it.
+    if (const auto better = better_group(engine, best, gain, out.threshold)) {
+      out.unknown = better;
+      break;
+    }
     first_gain = std::max(first_gain, gain);
     engine.accept(best);
     engine.update_noise();
-    engine.accept(engine.refine(engine.accepted()));
+    engine.accept(engine.refine(engine.accepted(), kSettling));
     engine.update_noise();
     // Members that the others have made superfluous.
     bool removed = true;
@@ -180,20 +379,35 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop) {
     }
   }
   if (!stop()) out.last_screen = engine.screen();
-  find_classes(engine, out, stop);
+  drop_unconfirmed(engine, out);
+  find_classes(engine, out, stop, jobs);
+  find_intervals(engine, out);
+  drop_doubtful(engine, out, stop, jobs);
   if (stop()) return out;
 
-  // What is left: any cause?
-  const std::vector<UnknownGroup> groups = score_groups(engine);
-  const double bound = chance_threshold(static_cast<int>(groups.size()), kFalseUnknown);
-  for (const UnknownGroup& group : groups) {
-    if (group.chi2 > bound && group.gain > bound && group.gain > kShareOfFirst * first_gain &&
-        group.size > 1.0) {
-      out.unknown = group;
-      break;
+  if (out.unknown) return out;
+
+  // What is left: any cause? An effect that it makes superfluous was only its shadow.
+  for (;;) {
+    const std::vector<UnknownGroup> groups = score_groups(engine);
+    const double bound = chance_threshold(static_cast<int>(groups.size()), kFalseUnknown);
+    const auto left = std::find_if(groups.begin(), groups.end(), [&](const UnknownGroup& group) {
+      return group.chi2 > bound && group.gain > bound && group.gain > kShareOfFirst * first_gain &&
+             group.size > 1.0 && group.left_out_gain > kLeftOutMin;
+    });
+    if (left == groups.end()) return out;
+    out.unknown = *left;
+    const std::vector<int> set = engine.accepted();
+    std::vector<int> kept;
+    for (std::size_t i = 0; i < set.size(); ++i) {
+      if (left->accepted_chi2[i] > out.threshold) kept.push_back(set[i]);
     }
+    if (kept.size() == set.size() || stop()) return out;
+    engine.accept(engine.refine(kept));
+    engine.update_noise();
+    find_classes(engine, out, stop, jobs);
+    find_intervals(engine, out);
   }
-  return out;
 }
 
 }  // namespace beltgrip::diagnose

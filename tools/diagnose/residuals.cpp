@@ -8,6 +8,8 @@ namespace {
 
 using Eigen::ArrayXd;
 
+constexpr int kBalanceStep = 5;  // samples of the slow copies, nearly independent of each other
+
 Quantities quantities(const Campaign& campaign, const ExperimentData& data, int run,
                       const ModelState& state) {
   return evaluate(data, run, campaign.variator, state.nuisance,
@@ -33,9 +35,35 @@ double robust_sigma(std::vector<double>& values) {
   return 1.4826 * *middle;
 }
 
+// The foot point of what stands in the regressors: of the misfit in torque, the clamp force takes
+// its share.
+void move_to_foot(const Quantities& q, const ExperimentData& data,
+                  const estimator::VariatorParameters& variator, const ArrayXd& force_share,
+                  Residuals& out) {
+  out.slip = q.slip;
+  out.force_N = q.force_N;
+  out.ratio = q.ratio;
+  out.clean_Nm = out.model_Nm;
+  out.clean = data;
+  for (int k = 0; k < data.size(); ++k) {
+    if (!data.valid[static_cast<std::size_t>(k)]) continue;
+    const double off_Nm = q.belt_torque[k] - out.model_Nm[k];
+    const double force_Nm = off_Nm * force_share[k];
+    if (out.model_Nm[k] != 0.0) {
+      const double relative = std::clamp(force_Nm / out.model_Nm[k], -0.2, 0.2);
+      out.clean.pressure.value[k] += relative * q.force_N[k] / variator.secondary_piston_area_m2;
+      out.force_N[k] *= 1.0 + relative;
+      out.clean_Nm[k] *= 1.0 + relative;
+    }
+    out.clean.torque.value[k] -= off_Nm - (out.clean_Nm[k] - out.model_Nm[k]);
+  }
+  if (q.balance.size() > 0) out.output_torque = out.clean_Nm / q.ratio;
+}
+
 }  // namespace
 
-Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state) {
+Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state,
+                       bool for_derivatives) {
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   const Quantities q = quantities(campaign, data, run, state);
   const auto curve = shapes(state.nuisance, q);
@@ -46,13 +74,18 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
   out.slope = ArrayXd::Zero(n);
   out.model_Nm = ArrayXd::Zero(n);
   out.weight = ArrayXd::Zero(n);
-  const double slip_variance = campaign.noise.slip * campaign.noise.slip;
-  const double torque_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
+  const double slip_variance = campaign.slip_noise(run) * campaign.slip_noise(run);
+  const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
+  // Share of the misfit that is the clamp force's: its noise comes with the torque it carries.
+  ArrayXd force_share = ArrayXd::Zero(n);
   for (int k = 0; k < n; ++k) {
     if (!data.valid[static_cast<std::size_t>(k)]) continue;
     const auto stop = static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)]);
     const double peak = std::exp(q.ln_peak_slip[stop]);
     const double capacity = q.capacity[k];
+    const double carried_Nm = q.belt_torque[k] * campaign.noise.force_N / q.force_N[k];
+    const double torque_variance = sensor_variance + carried_Nm * carried_Nm;
+    force_share[k] = carried_Nm * carried_Nm / torque_variance;
     double x = q.slip[k] / peak;
     double model = 0.0, slope = 0.0;
     // Foot point: Gauss-Newton, halved while the distance would grow.
@@ -84,7 +117,7 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
         at(x);
         break;
       }
-      if (std::abs(x - before) < 1e-7) break;
+      if (std::abs(x - before) < 1e-5) break;  // the distance is flat there
     }
     out.foot[k] = x;
     out.slope[k] = slope;
@@ -94,31 +127,23 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
         (q.belt_torque[k] - model - slope * (q.slip[k] - x * peak)) * out.weight[k];
   }
   out.capacity = q.capacity;
-  out.clean = data;
+  if (for_derivatives) move_to_foot(q, data, campaign.variator, force_share, out);
+  out.balance_weight = ArrayXd::Zero(n);
   for (int k = 0; k < n; ++k) {
-    if (!data.valid[static_cast<std::size_t>(k)]) continue;
-    const double off_Nm = q.belt_torque[k] - out.model_Nm[k];
-    out.clean.torque.value[k] -= off_Nm;
-    if (q.balance.size() > 0) {
-      out.clean.torque_s.value[k] += (q.balance[k] - off_Nm) / q.ratio[k];
+    const auto i = static_cast<std::size_t>(k);
+    if (data.valid[i] && k % kBalanceStep == 0) {
+      out.balance_weight[k] =
+          1.0 / campaign.noise.balance_Nm[static_cast<std::size_t>(data.stop[i])];
     }
   }
-  const auto masked = [&](const ArrayXd& values, double scale) {
-    ArrayXd r = ArrayXd::Zero(n);
-    for (int k = 0; k < n; ++k) {
-      if (data.valid[static_cast<std::size_t>(k)]) r[k] = values[k] * scale;
-    }
-    return r;
+  const auto masked = [&](const ArrayXd& values, const ArrayXd& scale) -> ArrayXd {
+    if (values.size() == 0) return ArrayXd::Zero(n);
+    return (out.weight > 0.0).select(values * scale, 0.0);
   };
-  if (campaign.has_balance) {
-    out.value[kBalanceResidual] = q.balance.size() > 0
-                                      ? masked(q.balance, 1.0 / campaign.noise.balance_Nm)
-                                      : ArrayXd::Zero(n);
-  }
+  if (campaign.has_balance) out.value[kBalanceResidual] = masked(q.balance, out.balance_weight);
   if (campaign.has_tracking) {
-    out.value[kTrackingResidual] = q.tracking.size() > 0
-                                       ? masked(q.tracking, 1.0 / campaign.noise.tracking_Pa)
-                                       : ArrayXd::Zero(n);
+    out.value[kTrackingResidual] =
+        masked(q.tracking, ArrayXd::Constant(n, 1.0 / campaign.noise.tracking_Pa));
   }
   return out;
 }
@@ -130,20 +155,33 @@ ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
   ArrayXd friction = ArrayXd::Zero(n);
   if (change.torque.size() > 0) friction += change.torque;
   if (change.slip.size() > 0) friction -= at.slope * change.slip;
-  if (change.ln_capacity.size() > 0) friction -= at.model_Nm * change.ln_capacity;
+  if (change.ln_capacity.size() > 0) friction -= at.clean_Nm * change.ln_capacity;
   out[kFrictionResidual] = (at.weight > 0.0).select(friction * at.weight, 0.0);
-  const auto other = [&](const ArrayXd& values, double sigma) -> ArrayXd {
+  const auto other = [&](const ArrayXd& values, const auto& scale) -> ArrayXd {
     if (values.size() == 0) return ArrayXd::Zero(n);
-    return (at.weight > 0.0).select(values / sigma, 0.0);
+    return (at.weight > 0.0).select(values * scale, 0.0);
   };
   if (campaign.has_balance) {
-    out[kBalanceResidual] = other(change.balance, campaign.noise.balance_Nm);
+    out[kBalanceResidual] = other(change.balance, at.balance_weight);
   }
   if (campaign.has_tracking) {
-    out[kTrackingResidual] = other(change.tracking, campaign.noise.tracking_Pa);
+    out[kTrackingResidual] = other(change.tracking, 1.0 / campaign.noise.tracking_Pa);
   }
   return out;
 }
+
+namespace {
+bool energy_acts(const Campaign& campaign, const ModelState& state) {
+  for (std::size_t i = 0; i < campaign.slots.size(); ++i) {
+    const auto j = static_cast<Eigen::Index>(i);
+    if (campaign.slots[i].row->parameter == "per_kJ" &&
+        state.effects[j] + campaign.switched_on[j] != 0.0) {
+      return true;
+    }
+  }
+  return false;
+}
+}  // namespace
 
 ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& state,
                            const Residuals& at, int parameter) {
@@ -174,6 +212,38 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
       const double peak = std::exp(state.nuisance[parameter]);
       return per_stop(stop, [&](int k) { return -at.slope[k] * at.foot[k] * peak; });
     }
+    default:
+      break;
+  }
+  // A change of ln(r_g): slip and, through the torque out, balance.
+  const auto ratio_change = [&](const ArrayXd& ln_ratio) {
+    change.slip = (1.0 - at.slip) * ln_ratio;
+    if (at.output_torque.size() > 0) change.balance = -at.ratio * at.output_torque * ln_ratio;
+    return propagate(campaign, at, change);
+  };
+  const auto torque_change = [&](const ArrayXd& torque) {
+    change.torque = torque;
+    change.balance = torque;
+    return propagate(campaign, at, change);
+  };
+  // With slip energy at work, whatever moves the slip moves the friction: by differences, below.
+  switch (energy_acts(campaign, state) ? -1 : parameter) {
+    case kDeformationPerkN:
+      return ratio_change(-1e-3 * at.force_N);
+    case kLossConstant_Nm:
+      return torque_change(ArrayXd::Constant(n, -1.0));
+    case kLossPerSpeed_Nms:
+      return torque_change(-data.omega_p.value);
+    case kLnRatioOverdrive:
+    case kLnRatioLow: {
+      const int stop = parameter == kLnRatioLow ? kLowStop : kOverdriveStop;
+      ArrayXd here(n);
+      for (int k = 0; k < n; ++k) here[k] = data.stop[static_cast<std::size_t>(k)] == stop;
+      return ratio_change(here);
+    }
+    case kSecondaryInertia_kgm2:
+      change.balance = -at.ratio * data.omega_s.slow_slope;
+      return propagate(campaign, at, change);
     default:
       break;
   }
@@ -217,32 +287,61 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
 }
 
 NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& state) {
-  std::vector<double> slip, torque, balance, tracking;
+  std::vector<double> slip, torque, tracking, force;
+  std::array<std::vector<double>, kStops> balance;
   for (int run = 0; run < static_cast<int>(campaign.runs.size()); ++run) {
     const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
     const Quantities q = quantities(campaign, data, run, state);
-    const auto collect = [&](const ArrayXd& y, std::vector<double>& into) {
+    const auto collect = [&](const ArrayXd& y, std::vector<double>& into, int stop = kNoStop) {
       if (y.size() == 0) return;
       // Second differences over two samples: neighbours share samples of the local fit.
-      for (int k = 4; k + 4 < data.size(); k += 2) {
-        const auto at = static_cast<std::size_t>(k);
-        if (!data.valid[at - 4] || !data.valid[at + 4]) {
-          continue;
-        }
-        into.push_back((y[k - 4] - 2.0 * y[k] + y[k + 4]) / std::sqrt(6.0));
+      const int apart = stop == kNoStop ? 4 : 2 * kBalanceStep;
+      for (int k = apart; k + apart < data.size(); k += 2) {
+        const int first = k - apart, last = k + apart;
+        const auto before = static_cast<std::size_t>(first);
+        const auto after = static_cast<std::size_t>(last);
+        if (!data.valid[before] || !data.valid[after]) continue;
+        if (stop != kNoStop && data.stop[before] != stop) continue;
+        into.push_back((y[k - apart] - 2.0 * y[k] + y[k + apart]) / std::sqrt(6.0));
       }
     };
     collect(q.slip, slip);
     collect(q.belt_torque, torque);
-    collect(q.balance, balance);
+    for (const int stop : {kOverdriveStop, kLowStop}) {
+      collect(q.balance, balance[static_cast<std::size_t>(stop)], stop);
+    }
     collect(q.tracking, tracking);
+    collect(q.force_N, force);
   }
   NoiseLevels out;
   out.slip = std::max(robust_sigma(slip), 2e-6);
   out.torque_Nm = std::max(robust_sigma(torque), 2e-3);
-  out.balance_Nm = std::max(robust_sigma(balance), 2e-3);
+  for (std::size_t stop = 0; stop < kStops; ++stop) {
+    out.balance_Nm[stop] = std::max(robust_sigma(balance[stop]), 2e-3);
+  }
+  out.force_N = std::max(robust_sigma(force), 0.2);
   out.tracking_Pa = std::max(robust_sigma(tracking), 20.0);
   return out;
+}
+
+std::vector<double> estimate_slip_noise_shares(const Campaign& campaign, const ModelState& state) {
+  constexpr double kLeast = 0.3, kMost = 5.0;
+  std::vector<double> sigma;
+  for (int run = 0; run < static_cast<int>(campaign.runs.size()); ++run) {
+    const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+    const Quantities q = quantities(campaign, data, run, state);
+    std::vector<double> slip;
+    for (int k = 4; k + 4 < data.size(); ++k) {
+      if (!data.valid[static_cast<std::size_t>(k - 4)] ||
+          !data.valid[static_cast<std::size_t>(k) + 4]) {
+        continue;
+      }
+      slip.push_back((q.slip[k - 4] - 2.0 * q.slip[k] + q.slip[k + 4]) / std::sqrt(6.0));
+    }
+    const double here = robust_sigma(slip);
+    sigma.push_back(here > 0.0 ? std::clamp(here / campaign.noise.slip, kLeast, kMost) : 1.0);
+  }
+  return sigma;
 }
 
 }  // namespace beltgrip::diagnose

@@ -7,6 +7,8 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "tools/diagnose/effects/effect.h"
@@ -21,8 +23,16 @@ enum ResidualKind : int { kFrictionResidual, kBalanceResidual, kTrackingResidual
 struct NoiseLevels {
   double slip = 1e-4;
   double torque_Nm = 0.1;
-  double balance_Nm = 0.1;
+  std::array<double, kStops> balance_Nm{0.1, 0.1};  // the secondary side counts by the ratio
   double tracking_Pa = 1e3;
+  double force_N = 1.0;
+  NoiseLevels times(double factor) const {
+    return {slip * factor,
+            torque_Nm * factor,
+            {balance_Nm[0] * factor, balance_Nm[1] * factor},
+            tracking_Pa * factor,
+            force_N * factor};
+  }
 };
 
 struct ModelState {
@@ -37,7 +47,13 @@ struct Campaign {
   NuisanceTable nuisances;
   std::vector<Slot> slots;
   Eigen::VectorXd switched_on;  // sizes that the model file gives; states come on top
+  std::map<std::string, double> known_ripples;  // of the model file, by shaft
   NoiseLevels noise;
+  std::vector<double> slip_noise_share;  // per experiment: its noise of slip over noise.slip
+  double slip_noise(int run) const {
+    const auto i = static_cast<std::size_t>(run);
+    return noise.slip * (i < slip_noise_share.size() ? slip_noise_share[i] : 1.0);
+  }
   bool has_balance = false;
   bool has_tracking = false;
 };
@@ -45,15 +61,20 @@ struct Campaign {
 // Residuals of one experiment and what their derivatives need.
 struct Residuals {
   std::array<Eigen::ArrayXd, kResidualKinds> value;  // empty where the kind does not exist
-  Eigen::ArrayXd foot;      // x = slip / slip at the peak, of the foot point
-  Eigen::ArrayXd slope;     // dT/d(slip) there
-  Eigen::ArrayXd model_Nm;  // curve at the foot point
-  Eigen::ArrayXd weight;    // 1 / (noise of the distance)
+  Eigen::ArrayXd foot;            // x = slip / slip at the peak, of the foot point
+  Eigen::ArrayXd slope;           // dT/d(slip) there
+  Eigen::ArrayXd model_Nm;        // curve at the foot point, at the measured clamp force
+  Eigen::ArrayXd clean_Nm;        // the same at the clamp force of the foot point
+  Eigen::ArrayXd weight;          // 1 / (noise of the distance)
+  Eigen::ArrayXd balance_weight;  // 1 / (noise of the balance)
   Eigen::ArrayXd capacity;
-  ExperimentData clean;  // torques at the foot point: their noise must not enter a regressor
+  Eigen::ArrayXd slip, force_N, ratio, output_torque;  // force and output torque at the foot point
+  ExperimentData clean;  // torques and pressure at the foot point: no noise in a regressor
 };
 
-Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state);
+// for_derivatives: with what derivative() needs.
+Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state,
+                       bool for_derivatives = true);
 
 // d(residual)/d(parameter). Parameters are numbered: nuisances first, then slots.
 using ResidualColumns = std::array<Eigen::ArrayXd, kResidualKinds>;
@@ -68,5 +89,7 @@ ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
                           const QuantityChange& change);
 
 NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& state);
+// A speed sensor's noise counts the more, the slower its shaft turns.
+std::vector<double> estimate_slip_noise_shares(const Campaign& campaign, const ModelState& state);
 
 }  // namespace beltgrip::diagnose

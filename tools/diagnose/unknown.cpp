@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <optional>
 
 namespace beltgrip::diagnose {
 namespace {
@@ -50,6 +51,9 @@ constexpr std::array<const char*, 3> kActsOn{"friction", "ratio", "torque"};
 // Size of one unit of a column, and the size that begins to matter: less is the difference between
 // one friction law and another.
 constexpr std::array<double, 3> kUnit{0.05, 2e-3, 2.0};  // share, share, Nm
+constexpr double kAnyConstant = 1e-3;  // precision: of a constant that is not known at all
+constexpr double kOwnShareMin = 0.01;
+constexpr double kLooked = 8.0;  // below this a group is no candidate
 constexpr std::array<double, 3> kMatters{5e-3, 2e-4, 0.2};
 
 // The curve's own abscissa is torque over capacity: against torque only friction is looked at.
@@ -130,6 +134,7 @@ std::vector<UnknownGroup> score_groups(const Engine& engine) {
   for (std::size_t i = 0; i < base.size(); ++i) base[i] = static_cast<int>(i);
   const Prior base_prior = engine.prior(parameters, engine.state());
   const Fit none = fit_linear(summaries, base, base_prior, default_scatter(), 15);
+  std::optional<double> none_left_out;
   for (std::size_t v = 0; v < used.size(); ++v) {
     for (std::size_t injection = 0; injection < kActsOn.size(); ++injection) {
       if (!sensible(used[v]->name, injection)) continue;
@@ -184,9 +189,29 @@ std::vector<UnknownGroup> score_groups(const Engine& engine) {
             total.bottomRightCorner(3, 3) -
             cross.transpose() * total.topLeftCorner(n, n).ldlt().solve(cross);
       }
+      // What the machine's constants could as well be, whatever their usual values, is no cause.
+      MatrixXd plain = MatrixXd::Zero(n + 3, n + 3);
+      for (const Summary& each : summaries) plain += each.aa(columns, columns);
+      for (Index j = 0; j < n; ++j) plain(j, j) += kAnyConstant;
+      const VectorXd mixed = plain.topRightCorner(n, 3) * direction;
+      const double energy = direction.dot(plain.bottomRightCorner(3, 3) * direction);
+      const double own = energy - mixed.dot(plain.topLeftCorner(n, n).ldlt().solve(mixed));
+      if (own < kOwnShareMin * energy) continue;
       const double degrees =
           engine.degrees(direction.dot(with * direction), direction.dot(without * direction));
       group.chi2 = chi2_of_f(wald / 3.0, 3.0, degrees);
+      for (std::size_t i = 0; i < engine.accepted().size(); ++i) {
+        const auto j = static_cast<Index>(engine.active_nuisances().size() + i);
+        const int slot = engine.accepted()[i];
+        const double size =
+            engine.state().effects[slot] / engine.scale(kNuisanceCount + slot) + fit.step[j];
+        group.accepted_chi2.push_back(size * size / std::max(fit.covariance(j, j), 1e-300));
+      }
+      if (group.chi2 > kLooked && group.gain > kLooked && group.size > 1.0) {
+        if (!none_left_out) none_left_out = left_out_density(summaries, base, base_prior);
+        group.left_out_gain =
+            left_out_density(summaries, columns, prior) - none_left_out.value_or(0.0);
+      }
       out.push_back(group);
     }
   }

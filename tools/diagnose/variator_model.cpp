@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "tools/diagnose/effects/effect.h"
 
@@ -17,24 +18,32 @@ NuisanceTable default_nuisances() {
       {"ln_mu_max", std::log(0.1), 0.4, 1e-3},
       {"ln_peak_slip_overdrive", std::log(0.02), 0.5, 1e-3},
       {"ln_peak_slip_low", std::log(0.03), 0.5, 1e-3},
-      {"shape_1_overdrive", 0.0, 0.08, 1e-3},
-      {"shape_2_overdrive", 0.0, 0.12, 1e-3},
-      {"shape_3_overdrive", 0.0, 0.12, 1e-3},
-      {"shape_4_overdrive", 0.0, 0.08, 1e-3},
-      {"shape_5_overdrive", 0.0, 0.05, 1e-3},
-      {"shape_6_overdrive", 0.0, 0.05, 1e-3},
-      {"shape_7_overdrive", 0.0, 0.1, 1e-3},
-      {"shape_8_overdrive", 0.0, 0.15, 1e-3},
-      {"shape_9_overdrive", 0.0, 0.2, 1e-3},
-      {"shape_1_low", 0.0, 0.08, 1e-3},
-      {"shape_2_low", 0.0, 0.12, 1e-3},
-      {"shape_3_low", 0.0, 0.12, 1e-3},
-      {"shape_4_low", 0.0, 0.08, 1e-3},
-      {"shape_5_low", 0.0, 0.05, 1e-3},
-      {"shape_6_low", 0.0, 0.05, 1e-3},
-      {"shape_7_low", 0.0, 0.1, 1e-3},
-      {"shape_8_low", 0.0, 0.15, 1e-3},
-      {"shape_9_low", 0.0, 0.2, 1e-3},
+      {"shape_1_overdrive", 0.0, 0.05, 1e-3},
+      {"shape_2_overdrive", 0.0, 0.08, 1e-3},
+      {"shape_3_overdrive", 0.0, 0.1, 1e-3},
+      {"shape_4_overdrive", 0.0, 0.1, 1e-3},
+      {"shape_5_overdrive", 0.0, 0.1, 1e-3},
+      {"shape_6_overdrive", 0.0, 0.08, 1e-3},
+      {"shape_7_overdrive", 0.0, 0.06, 1e-3},
+      {"shape_8_overdrive", 0.0, 0.03, 1e-3},
+      {"shape_9_overdrive", 0.0, 0.03, 1e-3},
+      {"shape_10_overdrive", 0.0, 0.05, 1e-3},
+      {"shape_11_overdrive", 0.0, 0.08, 1e-3},
+      {"shape_12_overdrive", 0.0, 0.12, 1e-3},
+      {"shape_13_overdrive", 0.0, 0.2, 1e-3},
+      {"shape_1_low", 0.0, 0.05, 1e-3},
+      {"shape_2_low", 0.0, 0.08, 1e-3},
+      {"shape_3_low", 0.0, 0.1, 1e-3},
+      {"shape_4_low", 0.0, 0.1, 1e-3},
+      {"shape_5_low", 0.0, 0.1, 1e-3},
+      {"shape_6_low", 0.0, 0.08, 1e-3},
+      {"shape_7_low", 0.0, 0.06, 1e-3},
+      {"shape_8_low", 0.0, 0.03, 1e-3},
+      {"shape_9_low", 0.0, 0.03, 1e-3},
+      {"shape_10_low", 0.0, 0.05, 1e-3},
+      {"shape_11_low", 0.0, 0.08, 1e-3},
+      {"shape_12_low", 0.0, 0.12, 1e-3},
+      {"shape_13_low", 0.0, 0.2, 1e-3},
       {"deformation_per_kN", 1.0e-3, 0.7e-3, 1e-5},
       {"loss_constant_Nm", 0.5, 0.75, 1e-2},
       {"loss_per_rad_s_Nm", 5e-3, 5e-3, 1e-4},
@@ -52,12 +61,16 @@ constexpr double kBend = 1.3;
 
 // Ends of the intervals of the cubic: 0, the knots below the peak, the peak, the knots beyond it.
 constexpr int kEnds = kShapeKnots + 2;
-constexpr int kPeakEnd = 6;
-constexpr std::array<double, kEnds> kEnd{0.0, 0.12, 0.25, 0.4, 0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.2};
-constexpr int end_of_knot(int knot) { return knot + 1 < kPeakEnd ? knot + 1 : knot + 2; }
-static_assert(kEnd[static_cast<std::size_t>(end_of_knot(4))] == kShapeKnot[4]);
-static_assert(kEnd[static_cast<std::size_t>(end_of_knot(kShapeKnots - 1))] ==
-              kShapeKnot[kShapeKnots - 1]);
+constexpr int kPeakEnd = kKnotsBelowPeak + 1;
+constexpr int end_of_knot(int knot) { return knot < kKnotsBelowPeak ? knot + 1 : knot + 2; }
+constexpr std::array<double, kEnds> kEnd = [] {
+  std::array<double, kEnds> ends{};
+  for (int i = 0; i < kShapeKnots; ++i) {
+    ends[static_cast<std::size_t>(end_of_knot(i))] = kShapeKnot[static_cast<std::size_t>(i)];
+  }
+  ends[kPeakEnd] = 1.0;
+  return ends;
+}();
 
 using Cubics = std::array<std::array<double, 4>, kShapeKnots + 1>;
 
@@ -110,6 +123,41 @@ double fall_function(double x) {
   return beyond <= 0.0 ? 0.0 : -beyond * beyond / (0.3 + beyond);
 }
 
+namespace {
+
+CurveShape::Point nominal_formula(double size) {
+  static const double kStiffness = std::tan(std::numbers::pi / (2.0 * kBend));
+  const double angle = kBend * std::atan(kStiffness * size);
+  return {std::sin(angle),
+          std::cos(angle) * kBend * kStiffness / (1.0 + kStiffness * kStiffness * size * size)};
+}
+
+// The same from a table, cubic between its points (error below 1e-7): it is evaluated millions of
+// times.
+CurveShape::Point nominal_curve(double size) {
+  constexpr int kPerUnit = 64, kUnits = 4;
+  static const std::vector<CurveShape::Point> kTable = [] {
+    std::vector<CurveShape::Point> table;
+    for (int i = 0; i <= kPerUnit * kUnits; ++i) {
+      table.push_back(nominal_formula(static_cast<double>(i) / kPerUnit));
+    }
+    return table;
+  }();
+  if (!(size < kUnits)) return nominal_formula(size);
+  const double at = size * kPerUnit;
+  const auto i = static_cast<std::size_t>(at);
+  const double u = at - static_cast<double>(i), v = 1.0 - u;
+  const CurveShape::Point &a = kTable[i], &b = kTable[i + 1];
+  constexpr double h = 1.0 / kPerUnit;
+  const double rise = b.value - a.value;
+  return {v * v * (1.0 + 2.0 * u) * a.value + u * u * (1.0 + 2.0 * v) * b.value +
+              u * v * h * (v * a.slope - u * b.slope),
+          6.0 * u * v * rise * kPerUnit + v * (1.0 - 3.0 * u) * a.slope +
+              u * (1.0 - 3.0 * v) * b.slope};
+}
+
+}  // namespace
+
 CurveShape::CurveShape(std::span<const double, kShapeKnots> departure, double fall) : fall_(fall) {
   std::array<double, kEnds> y{};
   for (int i = 0; i < kShapeKnots; ++i) {
@@ -120,10 +168,7 @@ CurveShape::CurveShape(std::span<const double, kShapeKnots> departure, double fa
 
 CurveShape::Point CurveShape::evaluate(double x) const {
   const double size = std::abs(x);
-  static const double kStiffness = std::tan(std::numbers::pi / (2.0 * kBend));
-  const double angle = kBend * std::atan(kStiffness * size);
-  Point out{std::sin(angle),
-            std::cos(angle) * kBend * kStiffness / (1.0 + kStiffness * kStiffness * size * size)};
+  Point out = nominal_curve(size);
   const std::size_t j = interval_of(size);
   const double u = std::min(size, kEnd.back()) - kEnd[j];
   const auto& c = cubic_[j];
@@ -192,13 +237,17 @@ Quantities evaluate(const ExperimentData& run, int experiment,
   q.capacity = (2.0 / std::cos(variator.half_wedge_angle_rad)) * radius * c.force_N.max(50.0) *
                (nuisance[kLnMuMax] + c.ln_friction).exp();
   if (run.torque_s.present) {
-    q.balance = c.belt_torque -
-                ratio * (run.torque_s.value + nuisance[kSecondaryInertia_kgm2] * run.omega_s.slope);
+    // From the slow copies of all three channels: the inertia's share would else be fitted to the
+    // noise of the speed's slope.
+    q.balance =
+        c.belt_torque + run.torque.slow - run.torque.value -
+        ratio * (run.torque_s.slow + nuisance[kSecondaryInertia_kgm2] * run.omega_s.slow_slope);
   }
   if (run.command.present) {
     q.tracking =
         run.pressure.value - (1.0 + nuisance[kCommandGain]) * c.track - nuisance[kCommandOffset_Pa];
   }
+  q.force_N = std::move(c.force_N);
   q.belt_torque = std::move(c.belt_torque);
   q.ln_peak_slip = c.ln_peak_slip;
   q.fall = c.fall;

@@ -19,9 +19,10 @@ namespace beltgrip::diagnose {
 
 // Where the friction curve may depart from the nominal one: x = slip / slip at the peak; at 0 and 1
 // it may not, beyond the last knot it stays.
-inline constexpr int kShapeKnots = 9;
-inline constexpr std::array<double, kShapeKnots> kShapeKnot{0.12, 0.25, 0.4, 0.6, 0.8,
-                                                            1.3,  1.7,  2.3, 3.2};
+inline constexpr int kShapeKnots = 13;
+inline constexpr int kKnotsBelowPeak = 8;
+inline constexpr std::array<double, kShapeKnots> kShapeKnot{0.06, 0.12, 0.2, 0.3, 0.42, 0.56, 0.72,
+                                                            0.88, 1.12, 1.3, 1.6, 2.1,  3.0};
 
 // Constants of the nominal machine that a measurement has to find before anything else can be
 // judged. Each has a nominal value and a tolerance (one sigma) of what is still the nominal
@@ -70,7 +71,7 @@ struct Context {
 
 // What the residuals are made of.
 struct Quantities {
-  Eigen::ArrayXd slip, belt_torque, capacity, ratio, balance, tracking;
+  Eigen::ArrayXd slip, belt_torque, capacity, force_N, ratio, balance, tracking;
   std::array<double, kStops> ln_peak_slip{}, fall{};
 };
 

@@ -39,6 +39,7 @@ enum class FaultKind : std::uint8_t {
   kSignalDelay,         // by size s
   kSignalNotAvailable,  // all ones
   kSignalResolution,    // steps of size (SI)
+  kSignalsSwapped,      // each shaft's speed in the other's place (V10)
   // Frames (rows E, B); channel names the message, "" = every message
   kFrameSilent,
   kFrameLoss,       // share size is lost
@@ -48,6 +49,11 @@ enum class FaultKind : std::uint8_t {
   kFrameJitter,     // by up to size s
   kFrameRepeat,     // the last one again instead of a new one
   kFrameDouble,     // each twice
+  kFrameOld,        // valid, but as it was size s before (E7)
+  kFrameSlow,       // size periods apart
+  kFrameInserted,   // as often again, with values, counter and CRC as they should be (E11)
+  kCounterFrozen,   // the counter stands, the values move (E6)
+  kFrameStranger,   // another message's payload under this identifier (E8)
   // Bus and port (row B); size as named
   kBusOff,
   kBusPassive,
@@ -56,6 +62,8 @@ enum class FaultKind : std::uint8_t {
   kSendLost,       // sent frames vanish without echo
   kEchoLost,       // sent frames arrive, echoes do not
   kForeignFrames,  // another node sends BeltGripClamp requests of size N
+  kFrameFlood,     // size frames of a foreign identifier within 10 ms (B10)
+  kStampBack,      // receive stamps lie size s in the past (T2)
   kLoopLate,       // the daemon is not run for size s (T3, T4, B11)
   kDaemonDies      // the daemon is gone from here on (G5)
 };

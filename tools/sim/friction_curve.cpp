@@ -1,5 +1,6 @@
 #include "tools/sim/friction_curve.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -7,9 +8,11 @@ namespace beltgrip::sim {
 
 namespace {
 
-constexpr double kSteepness = 2.2;    // of the rise: tanh(2.2) = 0.976
-constexpr double kShape = 1.3;        // C of the magic formula
-constexpr double kFloorOfFall = 0.5;  // share of the peak that stays at any slip
+constexpr double kSteepness = 2.2;                  // of the rise: tanh(2.2) = 0.976
+constexpr double kShape = 1.3;                      // C of the magic formula
+constexpr double kSecondLower = 0.01, kDip = 0.03;  // shares, of two_peaks
+constexpr double kDropWithin = 1e-3;                // of slip
+constexpr double kFloorOfFall = 0.5;                // share of the peak that stays at any slip
 
 FrictionPoint rise(double mu_scale, double peak_slip, double slip) {
   const double t = std::tanh(kSteepness * slip / peak_slip);
@@ -28,14 +31,28 @@ FrictionPoint magnitude(const FrictionCurve& curve, double slip) {
       return {curve.mu_max * std::sin(angle),
               curve.mu_max * std::cos(angle) * kShape * b / (1.0 + b * b * slip * slip)};
     }
+    case CurveShape::kTwoPeaks:
+      if (slip > peak_slip && slip < 2.0 * peak_slip) {
+        const double t = slip / peak_slip - 1.0;
+        const double angle = 2.0 * std::numbers::pi * t;
+        return {
+            curve.mu_max * (1.0 - kSecondLower * t - 0.5 * kDip * (1.0 - std::cos(angle))),
+            curve.mu_max / peak_slip * (-kSecondLower - std::numbers::pi * kDip * std::sin(angle))};
+      }
+      break;
     case CurveShape::kTanhFall:
       break;
   }
   if (slip <= peak_slip) return rise(curve.mu_max / std::tanh(kSteepness), peak_slip, slip);
   const double fall = 100.0 * curve.fall_per_percent;
-  const double mu = curve.mu_max - fall * (slip - peak_slip);
+  const bool two = curve.shape == CurveShape::kTwoPeaks;
+  const double from = two ? 2.0 * peak_slip : peak_slip;
+  const double top = two ? curve.mu_max * (1.0 - kSecondLower) : curve.mu_max;
+  const double drop = curve.mu_max * curve.fall_at_once / kDropWithin;
+  const bool drops = slip - from < kDropWithin;
+  const double mu = top - fall * (slip - from) - drop * std::min(slip - from, kDropWithin);
   const double floor = kFloorOfFall * curve.mu_max;
-  return mu > floor ? FrictionPoint{mu, -fall} : FrictionPoint{floor, 0.0};
+  return mu > floor ? FrictionPoint{mu, -fall - (drops ? drop : 0.0)} : FrictionPoint{floor, 0.0};
 }
 
 }  // namespace

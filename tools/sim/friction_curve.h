@@ -5,18 +5,22 @@
 //   ends
 //                  at half the peak. A kink at the peak: the hard case for a local fit.
 //   magic_formula  D sin(C atan(B s)), smooth at the peak; C = 1.3, B puts the peak at s_pk.
+//                  fall_at_once drops by that share within 0.1 % of slip beyond the peak.
+//   two_peaks      as tanh_fall to the peak, a dip of 3 % and a second peak 1 % lower at twice its
+//                  slip, then the linear fall.
 //   saturating     mu_pk tanh(2.2 s / s_pk): rises for ever, has no peak.
 #pragma once
 
 namespace beltgrip::sim {
 
-enum class CurveShape { kTanhFall, kMagicFormula, kSaturating };
+enum class CurveShape { kTanhFall, kMagicFormula, kSaturating, kTwoPeaks };
 
 struct FrictionCurve {
   CurveShape shape = CurveShape::kTanhFall;
   double mu_max = 0.105;
   double peak_slip_percent = 2.0;
-  double fall_per_percent = 1.5e-3;  // tanh_fall only: mu lost per percent of slip beyond the peak
+  double fall_per_percent = 1.5e-3;  // tanh_fall, two_peaks: mu lost per percent beyond the peak
+  double fall_at_once = 0.0;         // tanh_fall only: share
 };
 
 struct FrictionPoint {

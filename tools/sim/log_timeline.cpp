@@ -64,6 +64,8 @@ class LogTimeline::Source {
       }
       frame.t_ns = record.t_ns;
       frame.frame = record.frame;
+      frame.bus =
+          !selection_.further_interface.empty() && record.interface == selection_.further_interface;
       return true;
     }
     return false;

@@ -1,7 +1,7 @@
-// One or several logs as one timeline: merged by stamp, frames of one interface or of all, stamps
-// made monotonic. A single stamp that leaps ahead of its successor marks a garbled line: the frame
-// is dropped and counted. Where the stamps of a log step back, or ahead by more than ten minutes,
-// its clock was set: time goes on without the step. Memory flat. Tools only.
+// One or several logs as one timeline: merged by stamp, frames of one interface or of all, of one
+// bus or two, stamps made monotonic. A single stamp that leaps ahead of its successor marks a
+// garbled line: the frame is dropped and counted. Where the stamps of a log step back, or ahead by
+// more than ten minutes, its clock was set: time goes on without the step. Memory flat. Tools only.
 #pragma once
 
 #include <cstdint>
@@ -24,6 +24,7 @@ struct TimelineCounters {
 
 struct FrameSelection {
   std::string interface;            // empty: all
+  std::string further_interface;    // its frames are of bus 1, all others of bus 0; empty: none
   std::vector<can::CanId> ignored;  // BeltGrip's own frames are no input
 };
 

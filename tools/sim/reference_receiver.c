@@ -17,14 +17,17 @@ static bool crc_right(const uint8_t* data) {
   return crc == data[0];
 }
 
-static void end_request(struct beltgrip_receiver* receiver) {
+static void end_request(struct beltgrip_receiver* receiver, uint32_t now_us) {
   receiver->active = false;
   receiver->may_start = false;
+  receiver->pause = true;
+  receiver->ended_us = now_us;
 }
 
-static void check_timeout(struct beltgrip_receiver* receiver, uint32_t now_us) {
+static void check_time(struct beltgrip_receiver* receiver, uint32_t now_us) {
+  if (receiver->pause && now_us - receiver->ended_us >= BELTGRIP_PAUSE_US) receiver->pause = false;
   if (receiver->active && now_us - receiver->last_valid_us > BELTGRIP_TIMEOUT_US) {
-    end_request(receiver);
+    end_request(receiver, now_us);
   }
 }
 
@@ -35,7 +38,7 @@ void beltgrip_receiver_init(struct beltgrip_receiver* receiver) {
 
 bool beltgrip_receiver_frame(struct beltgrip_receiver* receiver, const uint8_t* data,
                              unsigned length, uint32_t now_us) {
-  check_timeout(receiver, now_us);
+  check_time(receiver, now_us);
   if (length != kLength || !crc_right(data)) return false;
   const uint8_t counter = data[1] & 0x0Fu;
   const bool asks = data[2] == 1u;
@@ -50,11 +53,12 @@ bool beltgrip_receiver_frame(struct beltgrip_receiver* receiver, const uint8_t* 
   receiver->synchronised = true;
   receiver->last_counter = counter;
   if (!asks) {
-    receiver->active = false;
+    if (receiver->active) end_request(receiver, now_us);
     receiver->may_start = true;
     return in_sequence;
   }
-  if (!in_sequence || !(receiver->active || receiver->may_start)) return false;
+  const bool may_start = receiver->may_start && !receiver->pause;
+  if (!in_sequence || !(receiver->active || may_start)) return false;
   receiver->active = true;
   receiver->last_valid_us = now_us;
   receiver->force_N = force_N;
@@ -64,8 +68,8 @@ bool beltgrip_receiver_frame(struct beltgrip_receiver* receiver, const uint8_t* 
 double beltgrip_receiver_force(struct beltgrip_receiver* receiver,
                                const struct beltgrip_limits* limits, double own_force_N,
                                bool permitted, uint32_t now_us) {
-  check_timeout(receiver, now_us);
-  if (receiver->active && !permitted) end_request(receiver);
+  check_time(receiver, now_us);
+  if (receiver->active && !permitted) end_request(receiver, now_us);
   double force_N = own_force_N;
   if (receiver->active) {
     const double start_N = receiver->lowered ? receiver->applied_N : own_force_N;

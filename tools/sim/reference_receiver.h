@@ -10,8 +10,9 @@
  * - An inactive frame with a right CRC ends a request at once, whatever its counter: letting go
  *   needs no proof.
  * - No valid active frame for BELTGRIP_TIMEOUT_US: the request is over.
- * - A request that is over stays over until an inactive frame has been seen: an old or stuck active
- *   frame cannot start one.
+ * - A request that is over stays over until an inactive frame has been seen, and for
+ *   BELTGRIP_PAUSE_US: an old or stuck active frame cannot start one, nor can a second sender take
+ *   the place of one that has just fallen silent.
  * - The controller decides: without its permission, and below its own floor, nothing is obeyed.
  */
 #ifndef BELTGRIP_REFERENCE_RECEIVER_H
@@ -25,12 +26,15 @@ extern "C" {
 #endif
 
 #define BELTGRIP_TIMEOUT_US 50000u
+#define BELTGRIP_PAUSE_US 1000000u
 #define BELTGRIP_MAX_DELTA 3u /* two frames in a row may be lost */
 
 struct beltgrip_receiver {
   bool synchronised;      /* last_counter is known */
   uint8_t last_counter;   /* of the last frame with a right CRC */
   bool may_start;         /* an inactive frame came since the last request */
+  bool pause;             /* a request ended less than BELTGRIP_PAUSE_US ago */
+  uint32_t ended_us;      /* when */
   bool active;            /* a request stands */
   uint32_t last_valid_us; /* instant of the last valid active frame */
   uint16_t force_N;       /* what it asks */

@@ -11,8 +11,6 @@ namespace beltgrip::sim {
 
 namespace {
 
-constexpr double kOilTemperature_degC = 80.0;
-
 struct ChannelRow {
   std::string_view signal;  // name in the DBC
   double (*value)(const RigSignals&);
@@ -33,7 +31,7 @@ const ChannelRow kChannels[] = {
      &Scenario::pressure_noise_Pa, &Scenario::pressure_bias_Pa},
     {"SecondaryPressureCommand", [](const RigSignals& s) { return s.pressure_command_Pa; }, nullptr,
      nullptr},
-    {"OilTemperature", [](const RigSignals&) { return kOilTemperature_degC; }, nullptr, nullptr},
+    {"OilTemperature", [](const RigSignals& s) { return s.oil_degC; }, nullptr, nullptr},
     {"ExperimentActive",
      [](const RigSignals& s) { return s.mode == RigMode::kLowering ? 1.0 : 0.0; }, nullptr,
      nullptr},
@@ -52,6 +50,7 @@ RigBus::RigBus(const can::Database& dbc, const Scenario& scenario, std::uint64_t
     channels_.push_back({row.value, row.noise ? scenario.*row.noise : 0.0,
                          row.bias ? scenario.*row.bias : 0.0, Random(seed, row.signal)});
   }
+  add_errors(scenario.effects, scenario.step_s);
   for (const can::MessageDef& definition : dbc.messages) {
     Message message;
     message.id = definition.id;
@@ -80,9 +79,56 @@ RigBus::RigBus(const can::Database& dbc, const Scenario& scenario, std::uint64_t
   }
 }
 
+// What a model file says of the measuring chain. A channel that leads makes all others lag.
+void RigBus::add_errors(const estimator::MachineEffects& effects, double step_s) {
+  const double lead_s =
+      std::max({0.0, -effects.primary_speed_delay_s, -effects.secondary_speed_delay_s,
+                -effects.torque_delay_s, -effects.pressure_delay_s});
+  std::size_t longest = 0;
+  for (std::size_t i = 0; i < channels_.size(); ++i) {
+    Channel& channel = channels_[i];
+    const std::string_view name = kChannels[i].signal;
+    double delay_s = lead_s;
+    if (name == "PrimarySpeed") {
+      channel.gain = effects.primary_speed_scale;
+      channel.ripple = effects.primary_ripple;
+      channel.angle = &RigSignals::angle_p_rad;
+      delay_s += effects.primary_speed_delay_s;
+    } else if (name == "SecondarySpeed") {
+      channel.gain = effects.secondary_speed_scale;
+      channel.ripple = effects.secondary_ripple;
+      channel.angle = &RigSignals::angle_s_rad;
+      delay_s += effects.secondary_speed_delay_s;
+    } else if (name == "PrimaryTorque") {
+      channel.gain = effects.torque_gain;
+      channel.bias += effects.torque_bias_Nm;
+      delay_s += effects.torque_delay_s;
+    } else if (name == "SecondaryPressure") {
+      channel.gain = effects.pressure_gain;
+      channel.bias += effects.pressure_offset_Pa;
+      delay_s += effects.pressure_delay_s;
+    }
+    channel.delay_steps = static_cast<std::size_t>(std::lround(delay_s / step_s));
+    longest = std::max(longest, channel.delay_steps);
+  }
+  past_.resize(longest + 1);
+}
+
+double RigBus::measure(Channel& channel) const {
+  const RigSignals& then =
+      past_[(now_ + past_.size() - std::min(channel.delay_steps, past_.size() - 1)) % past_.size()];
+  double value = channel.value(then) * (1.0 + channel.gain);
+  if (channel.ripple != 0.0) value *= 1.0 + channel.ripple * std::sin(then.*channel.angle);
+  return value + channel.bias +
+         (channel.noise > 0.0 ? channel.noise * channel.random.normal() : 0.0);
+}
+
 void RigBus::sample(std::int64_t now_ns, std::int64_t step_ns, const RigSignals& signals,
                     std::vector<can::StampedFrame>& out) {
   const auto first = static_cast<std::ptrdiff_t>(out.size());
+  if (now_ns == 0) std::fill(past_.begin(), past_.end(), signals);
+  now_ = (now_ + 1) % past_.size();
+  past_[now_] = signals;
   for (Message& message : messages_) {
     if (message.next_ns >= now_ns + step_ns) continue;
     message.next_ns += message.period_ns;
@@ -95,8 +141,7 @@ void RigBus::sample(std::int64_t now_ns, std::int64_t step_ns, const RigSignals&
     const std::span<std::uint8_t> payload(stamped.frame.data.data(), message.length);
     for (const Signal& signal : message.signals) {
       Channel& channel = channels_[signal.channel];
-      const double value = channel.value(signals) + channel.bias +
-                           (channel.noise > 0.0 ? channel.noise * channel.random.normal() : 0.0);
+      const double value = measure(channel);
       signal.codec.encode(payload, (value - signal.to_unit_shift) * signal.to_unit_factor);
     }
     if (message.has_counter) {

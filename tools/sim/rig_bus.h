@@ -45,8 +45,17 @@ class RigBus {
     double noise = 0.0;
     double bias = 0.0;
     Random random;
+    double gain = 0.0;
+    std::size_t delay_steps = 0;
+    double ripple = 0.0;
+    double RigSignals::*angle = nullptr;
   };
 
+  void add_errors(const estimator::MachineEffects& effects, double step_s);
+  double measure(Channel& channel) const;
+
+  std::vector<RigSignals> past_;  // a ring of steps, for delays
+  std::size_t now_ = 0;
   std::vector<Channel> channels_;
   std::vector<Message> messages_;
   Random jitter_;

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+
+#include "tools/sim/friction_factor.h"
 
 namespace beltgrip::sim {
 
@@ -16,19 +19,56 @@ RigSimulation::RigSimulation(const Scenario& scenario)
       step_s_(static_cast<double>(step_ns_) * 1e-9),
       command_force_N_(scenario.start_force_N),
       clamp_force_N_(scenario.start_force_N),
+      clamping_(scenario.effects, step_s_),
+      belt_force_N_(scenario.start_force_N),
+      reference_force_N_(scenario.start_force_N),
       cycles_left_(std::round(scenario.cycles)) {
-  plant_.settle(scenario.primary_speed_rad_s, scenario.primary_torque_Nm, clamp_force_N_);
-  load_torque_Nm_ = plant_.balancing_load_Nm(scenario.primary_torque_Nm, clamp_force_N_);
-  controller_torque_Nm_ = scenario.primary_torque_Nm;
+  signals_.oil_degC = scenario.oil_degC;
+  signals_.omega_p_rad_s = scenario.primary_speed_rad_s;
+  signals_.omega_s_rad_s = scenario.primary_speed_rad_s * scenario.variator.ratio;
+  signals_.torque_p_Nm = scenario.primary_torque_Nm;
+  act(true);
+  plant_.settle(scenario.primary_speed_rad_s, scenario.primary_torque_Nm, belt_force_N_);
+  load_torque_Nm_ = plant_.balancing_load_Nm(scenario.primary_torque_Nm, belt_force_N_);
+  controller_torque_Nm_ = scenario.primary_torque_Nm + loss_Nm(0.0);
   signals_.omega_p_rad_s = plant_.state().omega_p_rad_s;
   signals_.omega_s_rad_s = plant_.state().omega_s_rad_s;
-  signals_.torque_p_Nm = scenario.primary_torque_Nm;
+  signals_.torque_p_Nm = controller_torque_Nm_;
   signals_.torque_s_Nm = load_torque_Nm_;
   signals_.pressure_Pa = signals_.pressure_command_Pa = pressure_Pa(clamp_force_N_);
 }
 
 double RigSimulation::pressure_Pa(double clamp_force_N) const {
   return (clamp_force_N - scenario_.secondary_spring_force_N) / scenario_.secondary_piston_area_m2;
+}
+
+// Between the torque flange and the belt.
+double RigSimulation::loss_Nm(double acceleration_rad_s2) const {
+  const estimator::MachineEffects& e = scenario_.effects;
+  return e.loss_constant_Nm + e.loss_per_kN_Nm * 1e-3 * belt_force_N_ +
+         e.loss_per_rad_s_Nm * plant_.state().omega_p_rad_s + e.inertia_kg_m2 * acceleration_rad_s2;
+}
+
+// What else acts on force, ratio and friction, from the state before this step.
+void RigSimulation::act(bool begin) {
+  constexpr double kCreepMax = 0.2;
+  const estimator::MachineEffects& e = scenario_.effects;
+  belt_force_N_ = clamping_.step(clamp_force_N_, signals_.omega_s_rad_s);
+  if (begin) reference_force_N_ = belt_force_N_;
+  const double kN = 1e-3 * belt_force_N_;
+  const bool low = scenario_.variator.ratio < 1.0;
+  // The primary force counts as constant: F_p / F_s grows as the clamp force falls.
+  const double lost = (low ? 1.0 : -1.0) * std::log(reference_force_N_ / belt_force_N_);
+  crept_ =
+      std::clamp(crept_ + e.creep_rate * signals_.omega_p_rad_s * lost * step_s_, 0.0, kCreepMax);
+  const double ratio = (1.0 + (low ? e.end_stop_low : e.end_stop_overdrive)) *
+                       (1.0 - e.deformation_per_kN * kN - e.deformation_per_kN2 * kN * kN) *
+                       (1.0 - e.tilt_per_Nm * signals_.torque_p_Nm) *
+                       std::exp(low ? crept_ : -crept_);
+  friction_factor_ = friction_factor(
+      e, {signals_.oil_degC, signals_.omega_p_rad_s, belt_force_N_, low ? 1.0 : 0.0,
+          static_cast<double>(now_ns_) * 1e-9, slip_energy_kJ_, scenario_.experiment});
+  plant_.set_factors(ratio, friction_factor_);
 }
 
 double RigSimulation::sigma_star() const {
@@ -50,7 +90,7 @@ void RigSimulation::operate() {
         enter(RigMode::kLowering);
         noticed_s_.reset();
         truth_.push_back({});
-        truth_.back().mu_max = scenario_.friction().mu_max;
+        truth_.back().mu_max = friction_factor_ * scenario_.friction().mu_max;
         truth_.back().start_s = now_s;
       }
       break;
@@ -85,8 +125,9 @@ void RigSimulation::observe(double slip_before, double sigma_star_before) {
   if (signals_.mode != RigMode::kLowering) return;
   ExperimentTruth& truth = truth_.back();
   const double peak_slip = scenario_.friction().peak_slip_percent / 100.0;
-  const double slip = std::abs(plant_.output(clamp_force_N_).slip);
+  const double slip = std::abs(plant_.output(belt_force_N_).slip);
   const double sigma = std::abs(sigma_star());
+  if (!truth.peak_s) truth.mu_max = friction_factor_ * scenario_.friction().mu_max;
   const bool has_peak = scenario_.friction().shape != CurveShape::kSaturating;
   if (has_peak && !truth.peak_s && slip >= peak_slip) {
     const double share = (peak_slip - slip_before) / std::max(slip - slip_before, 1e-12);
@@ -94,7 +135,7 @@ void RigSimulation::observe(double slip_before, double sigma_star_before) {
     truth.slip_peak_percent = scenario_.friction().peak_slip_percent;
     truth.sigma_star_peak_percent =
         100.0 * (sigma_star_before + share * (sigma - sigma_star_before));
-    truth.clamp_force_peak_N = clamp_force_N_;
+    truth.clamp_force_peak_N = belt_force_N_;
   }
   truth.sigma_star_max_percent = std::max(truth.sigma_star_max_percent, 100.0 * sigma);
   if (!noticed_s_ && 100.0 * sigma >= scenario_.operator_slip_percent) {
@@ -109,14 +150,16 @@ void RigSimulation::step() {
       scenario_.actuator_lag_s > 0.0 ? -std::expm1(-step_s_ / scenario_.actuator_lag_s) : 1.0;
   clamp_force_N_ += share * (command_force_N_ - clamp_force_N_);
 
-  const double slip_before = std::abs(plant_.output(clamp_force_N_).slip);
+  act(false);
+  const double slip_before = std::abs(plant_.output(belt_force_N_).slip);
   const double sigma_star_before = std::abs(sigma_star());
   const double omega_p_before = plant_.state().omega_p_rad_s;
   const double error_rad_s = scenario_.primary_speed_rad_s - omega_p_before;
   controller_torque_Nm_ += scenario_.speed_controller_Nm * error_rad_s * step_s_;
   PlantInput input;
-  input.clamp_force_N = clamp_force_N_;
-  input.drive_torque_Nm = controller_torque_Nm_ + scenario_.speed_controller_Nm_s * error_rad_s;
+  input.clamp_force_N = belt_force_N_;
+  input.drive_torque_Nm =
+      controller_torque_Nm_ + scenario_.speed_controller_Nm_s * error_rad_s - loss_Nm(0.0);
   input.drive_torque_slope_Nm_s = -scenario_.speed_controller_Nm_s;
   input.load_torque_Nm = load_torque_Nm_;
   plant_.step(input, step_s_);
@@ -126,7 +169,15 @@ void RigSimulation::step() {
   signals_.omega_p_rad_s = state.omega_p_rad_s;
   signals_.omega_s_rad_s = state.omega_s_rad_s;
   // The flange sits between the machine's rotor and the pulley; the rotor holds the inertia.
-  signals_.torque_p_Nm = plant_.output(clamp_force_N_).torque_p_Nm;
+  const PlantOutput belt = plant_.output(belt_force_N_);
+  const double acceleration = (state.omega_p_rad_s - omega_p_before) / step_s_;
+  signals_.torque_p_Nm = belt.torque_p_Nm + loss_Nm(acceleration);
+  slip_energy_kJ_ += 1e-3 * std::abs(belt.torque_p_Nm * belt.slip) * state.omega_p_rad_s * step_s_;
+  const auto turned = [&](double angle, double omega) {
+    return std::fmod(angle + omega * step_s_, 2.0 * std::numbers::pi);
+  };
+  signals_.angle_p_rad = turned(signals_.angle_p_rad, state.omega_p_rad_s);
+  signals_.angle_s_rad = turned(signals_.angle_s_rad, state.omega_s_rad_s);
   signals_.torque_s_Nm = load_torque_Nm_;
   signals_.pressure_Pa = pressure_Pa(clamp_force_N_);
   signals_.pressure_command_Pa = pressure_Pa(command_force_N_);

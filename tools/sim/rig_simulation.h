@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "tools/sim/clamp_effects.h"
 #include "tools/sim/scenario.h"
 #include "tools/sim/variator_plant.h"
 
@@ -27,6 +28,9 @@ struct RigSignals {
   double torque_s_Nm = 0.0;  // flange between secondary pulley and load machine
   double pressure_Pa = 0.0;
   double pressure_command_Pa = 0.0;
+  double oil_degC = 0.0;
+  double angle_p_rad = 0.0;  // of the shafts
+  double angle_s_rad = 0.0;
   RigMode mode = RigMode::kHold;
 };
 
@@ -60,6 +64,8 @@ class RigSimulation {
   void observe(double slip_before, double sigma_star_before);
   double sigma_star() const;
   double pressure_Pa(double clamp_force_N) const;
+  double loss_Nm(double acceleration_rad_s2) const;
+  void act(bool begin);
 
   Scenario scenario_;
   VariatorPlant plant_;
@@ -69,7 +75,13 @@ class RigSimulation {
   double load_torque_Nm_ = 0.0;
   double controller_torque_Nm_ = 0.0;  // integral part
   double command_force_N_;
-  double clamp_force_N_;
+  double clamp_force_N_;  // as the pressure tells it
+  ClampEffects clamping_;
+  double belt_force_N_;       // as the belt feels it
+  double reference_force_N_;  // at the start, for the creep of the ratio
+  double crept_ = 0.0;        // share of the ratio
+  double friction_factor_ = 1.0;
+  double slip_energy_kJ_ = 0.0;
   double mode_since_s_ = 0.0;
   std::optional<double> noticed_s_;
   double cycles_left_;

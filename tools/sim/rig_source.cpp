@@ -44,6 +44,7 @@ std::string rig_configuration(const Scenario& scenario, const std::string& inter
                               const std::string& dbc_file) {
   const auto& v = scenario.variator;
   const auto radii = estimator::running_radii(v.ratio, v.belt_length_m, v.centre_distance_m);
+  const char* const stop = v.ratio < 1.0 ? "low" : "overdrive";
   char text[1600];
   std::snprintf(
       text, sizeof text,
@@ -58,12 +59,14 @@ std::string rig_configuration(const Scenario& scenario, const std::string& inter
       "secondary_speed    = \"RIG_Speed.SecondarySpeed\"\n"
       "secondary_pressure = \"RIG_Pressure.SecondaryPressure\"\n"
       "primary_torque     = \"RIG_Torque.PrimaryTorque\"      # a torque flange: measured\n"
+      "secondary_torque   = \"RIG_Torque.SecondaryTorque\"\n"
+      "oil_temperature    = \"RIG_State.OilTemperature\"\n"
       "experiment_active  = \"RIG_State.ExperimentActive\"\n"
       "\n"
       "[variator]\n"
       "half_wedge_angle_deg       = %.6g\n"
-      "ratio_overdrive            = %.6g\n"
-      "primary_radius_overdrive_m = %.4f\n"
+      "ratio_%s = %.6g\n"
+      "primary_radius_%s_m = %.4f\n"
       "secondary_piston_area_m2   = %.6g\n"
       "secondary_spring_force_N   = %.6g\n"
       "\n"
@@ -73,11 +76,11 @@ std::string rig_configuration(const Scenario& scenario, const std::string& inter
       "[experiment]\n"
       "trigger = \"%s\"\n"
       "control = \"observe\"\n"
-      "ratio   = \"overdrive\"\n",
+      "ratio   = \"%s\"\n",
       scenario.name.c_str(), interface.c_str(), dbc_file.c_str(),
-      v.half_wedge_angle_rad * 180.0 / std::numbers::pi, v.ratio, radii.primary_m,
+      v.half_wedge_angle_rad * 180.0 / std::numbers::pi, stop, v.ratio, stop, radii.primary_m,
       scenario.secondary_piston_area_m2, scenario.secondary_spring_force_N,
-      scenario.cycles > 1.5 ? "signal" : "always");
+      scenario.cycles > 1.5 ? "signal" : "always", stop);
   return text;
 }
 

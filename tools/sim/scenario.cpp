@@ -73,6 +73,7 @@ const NumberKey kNumbers[] = {
     {"run.duration_s", &Scenario::duration_s, 0.1, 1e6, "a duration"},
     {"run.step_s", &Scenario::step_s, 1e-5, 1e-3, "at least 1 kHz"},
     {"run.cycles", &Scenario::cycles, 1.0, 1e6, "a number of experiments"},
+    {"run.oil_degC", &Scenario::oil_degC, -40.0, 150.0, "oil that flows and does not burn"},
     {"sensors.primary_speed_noise_rad_s", &Scenario::primary_speed_noise_rad_s, 0.0, 100.0, kNoise},
     {"sensors.secondary_speed_noise_rad_s", &Scenario::secondary_speed_noise_rad_s, 0.0, 100.0,
      kNoise},
@@ -110,7 +111,8 @@ constexpr Choice<OperatorAction> kActions[] = {{"restore", OperatorAction::kRest
                                                {"none", OperatorAction::kNone}};
 constexpr Choice<CurveShape> kShapes[] = {{"tanh_fall", CurveShape::kTanhFall},
                                           {"magic_formula", CurveShape::kMagicFormula},
-                                          {"saturating", CurveShape::kSaturating}};
+                                          {"saturating", CurveShape::kSaturating},
+                                          {"two_peaks", CurveShape::kTwoPeaks}};
 
 std::string number_text(double value) {
   char buffer[32];

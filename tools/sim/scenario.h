@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/machine_effects.h"
 #include "tools/sim/friction_curve.h"
 #include "tools/sim/variator_plant.h"
 
@@ -42,6 +43,7 @@ struct Scenario {
   double duration_s = 0.0;
   double step_s = 0.0;
   double cycles = 0.0;
+  double oil_degC = 0.0;
 
   double primary_speed_noise_rad_s = 0.0;
   double secondary_speed_noise_rad_s = 0.0;
@@ -51,6 +53,10 @@ struct Scenario {
   double pressure_bias_Pa = 0.0;
   double frame_delay_s = 0.0;
   double frame_jitter_s = 0.0;
+
+  // What the machine and its sensors have beyond the above; a model file says it.
+  estimator::MachineEffects effects;
+  int experiment = 0;  // its place among several, for wear
 
   const FrictionCurve& friction() const { return belts.at(belt); }
 };

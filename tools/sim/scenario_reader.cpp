@@ -11,6 +11,7 @@ namespace beltgrip::sim {
 namespace {
 
 std::string found_text(const toml::node& node) {
+  if (const auto* number = node.as_floating_point()) return number_text(number->get());
   std::ostringstream out;
   node.visit([&out](const auto& value) { out << value; });
   std::string text = out.str();

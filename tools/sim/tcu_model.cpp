@@ -21,6 +21,7 @@ constexpr double kRatioGain = 3.0;  // ln(force ratio) per ln(ratio error)
 constexpr double kRatioIntegral_1_s = 1.5;
 constexpr double kRatioRate_1_s = 0.6;  // ln(ratio target) per second
 constexpr double kPermitSettle_s = 0.5;
+constexpr double kRiseMax = 1.15;  // of the own force while a request stands
 constexpr double kPermitEngine_rad_s = 85.0;
 
 std::uint32_t microseconds(double t_s) {
@@ -86,12 +87,13 @@ void TcuModel::decide_permission(const TcuInput& input, double t_s) {
   const bool settled = (at_overdrive || at_low) && out_.lockup_closed && !input.wheel_slip &&
                        input.engine_running && input.omega_e_rad_s > kPermitEngine_rad_s &&
                        input.oil_degC >= parameters_.oil_permit_degC && input.brake_m_s2 <= 0.0 &&
+                       (!out_.obeying || out_.own_force_N <= kRiseMax * agreed_N_) &&
                        faults_.active(FaultKind::kTcuWithdraws, t_s) == nullptr;
   if (!settled) settled_since_s_ = t_s;
   out_.permitted = settled && t_s - settled_since_s_ >= kPermitSettle_s;
 }
 
-double TcuModel::secondary_force_N(const TcuInput& input, double t_s) {
+double TcuModel::own_force_N(const TcuInput& input) const {
   const double wedge = std::cos(variator_.half_wedge_angle_rad);
   // A clutch that slips carries what it can, whatever the engine gives.
   const double clutch_Nm = out_.lockup_closed ? 0.0 : out_.lockup_capacity_Nm;
@@ -102,15 +104,19 @@ double TcuModel::secondary_force_N(const TcuInput& input, double t_s) {
       variator_.secondary_centrifugal_N_s2 * input.omega_s_rad_s * input.omega_s_rad_s;
   const double least_N = variator_.secondary_spring_force_N + centrifugal_N +
                          variator_.secondary_piston_area_m2 * pressure_floor_Pa_;
-  out_.own_force_N = std::max(
-      least_N, torque_Nm * wedge / (2.0 * input.primary_radius_m * parameters_.design_friction));
-  const beltgrip_limits limits{parameters_.force_floor_N, parameters_.force_fall_max_N_per_s};
+  return std::max(least_N,
+                  torque_Nm * wedge / (2.0 * input.primary_radius_m * parameters_.design_friction));
+}
+
+double TcuModel::secondary_force_N(double t_s) {
   const bool was_obeying = out_.obeying;
+  const beltgrip_limits limits{parameters_.force_floor_N, parameters_.force_fall_max_N_per_s};
   double force_N = beltgrip_receiver_force(&receiver_, &limits, out_.own_force_N, out_.permitted,
                                            microseconds(t_s));
   out_.obeying = receiver_.active;
   if (out_.obeying && !was_obeying) {
     ++out_.requests;
+    agreed_N_ = out_.own_force_N;
     faults_.request_began(t_s);
   }
   if (faults_.active(FaultKind::kTcuIgnores, t_s) != nullptr) force_N = out_.own_force_N;
@@ -133,8 +139,9 @@ void TcuModel::cycle(double t_s, const TcuInput& input) {
   ratio_target_ =
       std::clamp(ratio_target(input, t_s), ratio_target_ / limit, ratio_target_ * limit);
   decide_lockup(input, t_s);
+  out_.own_force_N = own_force_N(input);
   decide_permission(input, t_s);
-  out_.force_N = secondary_force_N(input, t_s);
+  out_.force_N = secondary_force_N(t_s);
 
   const double omega_s2 = input.omega_s_rad_s * input.omega_s_rad_s;
   const double omega_p2 = input.omega_p_rad_s * input.omega_p_rad_s;

@@ -3,6 +3,8 @@
 // every cycle_s on the values of its own sensors. Simulation only.
 //
 //   own clamp force  F_s = (max(|T_e|, pedal demand) + reserve) cos(theta) / (2 R_p mu_design)
+// It withdraws its permission when its own force has risen by a sixth since a request began: more
+// torque than it agreed to.
 //   primary force    F_s e^(a ln r_g) e^(controller), more than that at the overdrive stop, less at
 //   LOW
 #pragma once
@@ -57,7 +59,8 @@ class TcuModel {
   double ratio_target(const TcuInput& input, double t_s) const;
   void decide_lockup(const TcuInput& input, double t_s);
   void decide_permission(const TcuInput& input, double t_s);
-  double secondary_force_N(const TcuInput& input, double t_s);
+  double own_force_N(const TcuInput& input) const;
+  double secondary_force_N(double t_s);
 
   VariatorParameters variator_;
   EngineParameters engine_;
@@ -69,6 +72,7 @@ class TcuModel {
   double ratio_target_ = 0.0;
   double settled_since_s_ = 0.0;
   double latched_N_ = 0.0;
+  double agreed_N_ = 0.0;  // own force when the request began
   TcuOutput out_;
 };
 

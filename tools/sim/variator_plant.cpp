@@ -15,7 +15,12 @@ VariatorPlant::VariatorPlant(const VariatorModel& model, const FrictionCurve& fr
               .primary_m) {}
 
 double VariatorPlant::ratio_at(double clamp_force_N) const {
-  return model_.ratio * (1.0 - model_.deformation_per_N * clamp_force_N);
+  return ratio_factor_ * model_.ratio * (1.0 - model_.deformation_per_N * clamp_force_N);
+}
+
+FrictionPoint VariatorPlant::friction_now(double slip) const {
+  const FrictionPoint point = friction_at(friction_, slip);
+  return {friction_factor_ * point.mu, friction_factor_ * point.slope};
 }
 
 double VariatorPlant::drag_Nm(double omega_s_rad_s) const {
@@ -29,10 +34,10 @@ bool VariatorPlant::settle(double omega_p_rad_s, double torque_p_Nm, double clam
       std::abs(torque_p_Nm) * cos_wedge_ / (2.0 * primary_radius_m_ * clamp_force_N);
   double low = 0.0;
   double high = friction_.peak_slip_percent / 100.0;
-  if (!(friction_at(friction_, high).mu >= wanted)) return false;
+  if (!(friction_now(high).mu >= wanted)) return false;
   for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (low + high);
-    (friction_at(friction_, middle).mu < wanted ? low : high) = middle;
+    (friction_now(middle).mu < wanted ? low : high) = middle;
   }
   const double slip = std::copysign(0.5 * (low + high), torque_p_Nm);
   state_.omega_p_rad_s = omega_p_rad_s;
@@ -44,7 +49,7 @@ PlantOutput VariatorPlant::output(double clamp_force_N) const {
   PlantOutput out;
   out.geometric_ratio = ratio_at(clamp_force_N);
   out.slip = 1.0 - state_.omega_s_rad_s / (out.geometric_ratio * state_.omega_p_rad_s);
-  out.mu = friction_at(friction_, out.slip).mu;
+  out.mu = friction_now(out.slip).mu;
   out.torque_p_Nm = 2.0 * out.mu * clamp_force_N * primary_radius_m_ / cos_wedge_;
   out.torque_s_Nm = out.torque_p_Nm / out.geometric_ratio;
   return out;
@@ -63,7 +68,7 @@ VariatorPlant::Derivative VariatorPlant::derivative(const PlantState& state,
                                                     double omega_p_start_rad_s) const {
   const double ratio = ratio_at(input.clamp_force_N);
   const double slip = 1.0 - state.omega_s_rad_s / (ratio * state.omega_p_rad_s);
-  const FrictionPoint friction = friction_at(friction_, slip);
+  const FrictionPoint friction = friction_now(slip);
   const double torque_per_mu = 2.0 * input.clamp_force_N * primary_radius_m_ / cos_wedge_;
   const double torque_p = torque_per_mu * friction.mu;
   const double torque_p_per_slip = torque_per_mu * friction.slope;

@@ -59,6 +59,11 @@ class VariatorPlant {
   const PlantState& state() const { return state_; }
   bool finite() const;
   PlantOutput output(double clamp_force_N) const;
+  // Factors on the geometric ratio and on friction, from now on: what else acts on the machine.
+  void set_factors(double ratio, double friction) {
+    ratio_factor_ = ratio;
+    friction_factor_ = friction;
+  }
   // Secondary load that balances that belt torque on the primary pulley at the present speeds.
   double balancing_load_Nm(double torque_p_Nm, double clamp_force_N) const;
   double primary_radius_m() const { return primary_radius_m_; }
@@ -69,6 +74,7 @@ class VariatorPlant {
     double pp = 0.0, ps = 0.0, sp = 0.0, ss = 0.0;  // its Jacobian
   };
   double ratio_at(double clamp_force_N) const;
+  FrictionPoint friction_now(double slip) const;
   double drag_Nm(double omega_s_rad_s) const;
   // Drive torque is linearised around omega_p of the step's start.
   Derivative derivative(const PlantState& state, const PlantInput& input,
@@ -78,6 +84,7 @@ class VariatorPlant {
   FrictionCurve friction_;
   double cos_wedge_;
   double primary_radius_m_;
+  double ratio_factor_ = 1.0, friction_factor_ = 1.0;
   PlantState state_;
 };
 

@@ -16,7 +16,7 @@ namespace beltgrip::sim {
 
 namespace {
 
-constexpr std::string_view kCounterSuffix = "Counter";
+constexpr std::string_view kCounterSuffix = "Counter", kCrcSuffix = "Crc";
 
 struct ChannelRow {
   std::string_view signal;  // name in the DBC
@@ -48,6 +48,21 @@ const ChannelRow kChannels[] = {
     {"BrakePressed", [](const VehicleSignals& s) { return s.brake_pressed; }, nullptr},
 };
 
+// CRC-8 of AUTOSAR E2E profile 1, bit by bit, over the identifier and all other bytes.
+void protect(can::CanFrame& frame, std::size_t crc_byte) {
+  unsigned crc = 0;
+  const auto add = [&crc](unsigned byte) {
+    crc ^= byte;
+    for (int bit = 0; bit < 8; ++bit) crc = (crc & 0x80U) != 0 ? crc << 1 ^ 0x11DU : crc << 1;
+  };
+  add(frame.id.value & 0xFFU);
+  add(frame.id.value >> 8);
+  for (std::size_t i = 0; i < frame.length; ++i) {
+    if (i != crc_byte) add(frame.data[i]);
+  }
+  frame.data[crc_byte] = static_cast<std::uint8_t>(crc);
+}
+
 }  // namespace
 
 VehicleBus::VehicleBus(const can::Database& dbc, const VehicleScenario& scenario,
@@ -68,6 +83,8 @@ VehicleBus::VehicleBus(const can::Database& dbc, const VehicleScenario& scenario
       channel.ripple = scenario.sensors.secondary_ripple;
       channel.angle = [](const VehicleSignals& s) { return s.angle_s_rad; };
     }
+    if (row.signal == "PrimarySpeed") speeds_.first = channels_.size();
+    if (row.signal == "SecondarySpeed") speeds_.second = channels_.size();
     channels_.push_back(std::move(channel));
   }
   Random phase(seed, "frame phase");
@@ -84,6 +101,10 @@ VehicleBus::VehicleBus(const can::Database& dbc, const VehicleScenario& scenario
       if (signal.name.ends_with(kCounterSuffix)) {
         message.counter_codec = can::SignalCodec(signal);
         message.has_counter = true;
+        continue;
+      }
+      if (signal.name.ends_with(kCrcSuffix)) {
+        message.crc_byte = signal.start_bit / 8;
         continue;
       }
       const auto row = std::find_if(std::begin(kChannels), std::end(kChannels),
@@ -144,8 +165,15 @@ void VehicleBus::emit(Message& message, const FaultScript& faults, std::int64_t 
   stamped.frame.id = message.id;
   stamped.frame.length = message.length;
   const std::span<std::uint8_t> payload(stamped.frame.data.data(), message.length);
+  const bool swapped = active(FaultKind::kSignalsSwapped) != nullptr;
+  const auto channel_of = [&](const Signal& signal) {
+    if (!swapped) return signal.channel;
+    return signal.channel == speeds_.first    ? speeds_.second
+           : signal.channel == speeds_.second ? speeds_.first
+                                              : signal.channel;
+  };
   for (const Signal& signal : message.signals) {
-    Channel& channel = channels_[signal.channel];
+    Channel& channel = channels_[channel_of(signal)];
     const double value = measure(channel, faults, t_s);
     if (faults.active(FaultKind::kSignalNotAvailable, t_s, channel.name) != nullptr) {
       signal.codec.insert(payload, ~std::uint64_t{0});
@@ -155,8 +183,11 @@ void VehicleBus::emit(Message& message, const FaultScript& faults, std::int64_t 
   }
   if (message.has_counter) {
     message.counter_codec.insert(payload, message.counter);
-    message.counter = static_cast<std::uint8_t>((message.counter + 1) & 15);
+    if (active(FaultKind::kCounterFrozen) == nullptr) {
+      message.counter = static_cast<std::uint8_t>((message.counter + 1) & 15);
+    }
   }
+  if (message.crc_byte) protect(stamped.frame, *message.crc_byte);
   double delay_s = delay_s_ + jitter_s_ * jitter_.uniform();
   const double chance = frame_random_.uniform();
   const auto bit = static_cast<std::size_t>(frame_random_.uniform() * 8.0 * message.length);
@@ -170,6 +201,17 @@ void VehicleBus::emit(Message& message, const FaultScript& faults, std::int64_t 
     stamped.frame.data[stamped.frame.length] = 0;
   }
   if (active(FaultKind::kFrameRepeat) != nullptr) stamped.frame = message.last;
+  message.past[message.sent++ % kFramesKept] = stamped.frame;
+  if (const FaultStep* fault = active(FaultKind::kFrameOld)) {
+    const auto wanted =
+        static_cast<std::size_t>(fault->size * 1e9 / static_cast<double>(message.period_ns));
+    const std::size_t back = std::min({wanted, message.sent - 1, kFramesKept - 1});
+    stamped.frame = message.past[(message.sent - 1 - back) % kFramesKept];
+  }
+  if (active(FaultKind::kFrameStranger) != nullptr) {
+    const Message& other = &message == &messages_.front() ? messages_.back() : messages_.front();
+    stamped.frame.data = other.last.data;
+  }
   if (const FaultStep* fault = active(FaultKind::kFrameDelay)) delay_s += fault->size;
   if (const FaultStep* fault = active(FaultKind::kFrameJitter)) delay_s += fault->size * chance;
   message.last = stamped.frame;
@@ -187,8 +229,16 @@ void VehicleBus::sample(const VehicleSimulation& vehicle, std::vector<can::Stamp
   const std::int64_t now_ns = vehicle.now_ns();
   for (Message& message : messages_) {
     if (message.next_ns > now_ns) continue;
-    message.next_ns += message.period_ns;
-    emit(message, vehicle.faults(), now_ns, static_cast<double>(now_ns) * 1e-9, out);
+    const double t_s = static_cast<double>(now_ns) * 1e-9;
+    double interval = 1.0;  // periods
+    if (const FaultStep* fault =
+            vehicle.faults().active(FaultKind::kFrameSlow, t_s, message.name)) {
+      interval = fault->size;
+    } else if (vehicle.faults().active(FaultKind::kFrameInserted, t_s, message.name) != nullptr) {
+      interval = 0.5;
+    }
+    message.next_ns += std::llround(interval * static_cast<double>(message.period_ns));
+    emit(message, vehicle.faults(), now_ns, t_s, out);
   }
 }
 
@@ -200,6 +250,7 @@ const can::Database& vehicle_database() {
 std::string vehicle_configuration(const VehicleScenario& scenario, std::string_view interface,
                                   std::string_view dbc_file) {
   const VariatorParameters& v = scenario.variator;
+  const KnownOfVehicle& known = scenario.known;
   const auto radius = [&v](double ratio) {
     return estimator::running_radii(ratio, v.belt_length_m, v.centre_distance_m).primary_m;
   };
@@ -215,7 +266,7 @@ std::string vehicle_configuration(const VehicleScenario& scenario, std::string_v
                 "primary_speed        = \"TCU_Speed.PrimarySpeed\"\n"
                 "secondary_speed      = \"TCU_Speed.SecondarySpeed\"\n"
                 "secondary_pressure   = \"TCU_Pressure.SecondaryPressure\"\n"
-                "engine_torque        = \"ECU_Engine.EngineTorque\"\n"
+                "engine_torque        = { signal = \"ECU_Engine.EngineTorque\", offset = %.6g }\n"
                 "engine_speed         = \"ECU_Engine.EngineSpeed\"\n"
                 "accelerator_pedal    = \"ECU_Engine.AcceleratorPedal\"\n"
                 "oil_temperature      = \"TCU_State.OilTemperature\"\n"
@@ -224,9 +275,21 @@ std::string vehicle_configuration(const VehicleScenario& scenario, std::string_v
                 "vehicle_speed        = \"ESP_Vehicle.VehicleSpeed\"\n"
                 "brake_pressed        = \"ESP_Vehicle.BrakePressed\"\n"
                 "\n"
+                "[protection]\n"
+                "ECU_Engine   = { counter = \"EngineCounter\", crc = \"EngineCrc\", data_id = "
+                "0x110 }\n"
+                "TCU_Speed    = { counter = \"SpeedCounter\", crc = \"SpeedCrc\", data_id = 0x120 "
+                "}\n"
+                "TCU_Pressure = { counter = \"PressureCounter\", crc = \"PressureCrc\", data_id = "
+                "0x130 }\n"
+                "TCU_State    = { counter = \"StateCounter\", crc = \"StateCrc\", data_id = 0x140 "
+                "}\n"
+                "ESP_Vehicle  = { counter = \"VehicleCounter\", crc = \"VehicleCrc\", data_id = "
+                "0x210 }\n"
+                "\n"
                 "[sensors]\n"
-                "engine_torque      = { bias_Nm = 1.0, gain = 0.02 }\n"
-                "secondary_pressure = { bias_Pa = 3e3, gain = 0.005 }\n"
+                "engine_torque      = { bias_Nm = %.6g, gain = %.6g }\n"
+                "secondary_pressure = { bias_Pa = %.6g, gain = %.6g }\n"
                 "\n"
                 "[variator]\n"
                 "half_wedge_angle_deg       = %.6g\n"
@@ -246,16 +309,19 @@ std::string vehicle_configuration(const VehicleScenario& scenario, std::string_v
                 "secondary_pressure_floor_Pa = %.6g\n"
                 "actuator_dead_time_s        = %.6g\n"
                 "actuator_lag_s              = %.6g\n"
-                "cooldown_s                  = 2.0\n"
-                "cooldown_m                  = 0.0\n",
+                "cooldown_s                  = %.6g\n"
+                "cooldown_m                  = %.6g\n",
                 scenario.name.c_str(), static_cast<int>(interface.size()), interface.data(),
-                static_cast<int>(dbc_file.size()), dbc_file.data(),
-                v.half_wedge_angle_rad * 180.0 / std::numbers::pi, v.ratio_low, v.ratio_overdrive,
-                radius(v.ratio_overdrive), radius(v.ratio_low), v.secondary_piston_area_m2,
-                v.secondary_spring_force_N, v.secondary_centrifugal_N_s2,
-                scenario.engine.inertia_kg_m2 + v.primary_inertia_kg_m2, "coast_down",
-                scenario.hydraulics.pressure_floor_Pa, 1.2 * scenario.hydraulics.dead_time_s,
-                1.2 * scenario.hydraulics.lag_s);
+                static_cast<int>(dbc_file.size()), dbc_file.data(), known.torque_offset_Nm,
+                known.torque_bias_Nm, known.torque_gain, known.pressure_bias_Pa,
+                known.pressure_gain, v.half_wedge_angle_rad * 180.0 / std::numbers::pi, v.ratio_low,
+                v.ratio_overdrive, radius(v.ratio_overdrive), radius(v.ratio_low),
+                v.secondary_piston_area_m2, v.secondary_spring_force_N,
+                v.secondary_centrifugal_N_s2,
+                scenario.engine.inertia_kg_m2 + v.primary_inertia_kg_m2,
+                known.steady ? "steady" : "coast_down", scenario.hydraulics.pressure_floor_Pa,
+                1.2 * scenario.hydraulics.dead_time_s, 1.2 * scenario.hydraulics.lag_s,
+                known.cooldown_s, known.cooldown_m);
   return text;
 }
 

@@ -3,9 +3,12 @@
 // Simulation only.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "can_dbc/can_frame.h"
@@ -25,6 +28,7 @@ class VehicleBus {
   void sample(const VehicleSimulation& vehicle, std::vector<can::StampedFrame>& out);
 
  private:
+  static constexpr std::size_t kFramesKept = 128;
   struct Channel {
     std::string name;
     double (*value)(const VehicleSignals&) = nullptr;
@@ -52,7 +56,10 @@ class VehicleBus {
     std::vector<Signal> signals;
     can::SignalCodec counter_codec;
     bool has_counter = false;
+    std::optional<std::size_t> crc_byte;
     can::CanFrame last;
+    std::array<can::CanFrame, kFramesKept> past;  // as they were before frame faults
+    std::size_t sent = 0;
   };
 
   double measure(Channel& channel, const FaultScript& faults, double t_s);
@@ -63,6 +70,7 @@ class VehicleBus {
   std::vector<VehicleSignals> past_;  // a ring of steps, for delays
   std::size_t now_ = 0;
   std::vector<Channel> channels_;
+  std::pair<std::size_t, std::size_t> speeds_;  // channels of primary and secondary speed
   std::vector<Message> messages_;
   Random jitter_;
   Random frame_random_;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/machine_effects.h"
 #include "tools/sim/fault_script.h"
 #include "tools/sim/friction_curve.h"
 
@@ -125,6 +126,19 @@ struct SensorParameters {
   double frame_jitter_s = 0.0;
 };
 
+// What BeltGrip's configuration says of the vehicle beside its geometry.
+struct KnownOfVehicle {
+  bool steady = false;            // trigger "steady" instead of "coast_down"
+  double torque_offset_Nm = 0.0;  // added to the torque signal: what it leaves out
+  // One standard deviation each.
+  double torque_bias_Nm = 0.0;
+  double torque_gain = 0.0;
+  double pressure_bias_Pa = 0.0;
+  double pressure_gain = 0.0;
+  double cooldown_s = 0.0;
+  double cooldown_m = 0.0;
+};
+
 struct VehicleScenario {
   std::string name;
   double duration_s = 0.0;
@@ -137,7 +151,11 @@ struct VehicleScenario {
   TcuParameters tcu;
   DriverParameters driver;
   SensorParameters sensors;
+  KnownOfVehicle known;
   std::vector<FaultStep> faults;
+  // What the machine has beyond the above; a model file says it. The controller does not know.
+  estimator::MachineEffects effects;
+  int experiment = 0;  // its place among several, for wear
 };
 
 }  // namespace beltgrip::sim

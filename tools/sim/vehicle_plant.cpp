@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimator/variator_geometry.h"
+#include "tools/sim/friction_factor.h"
 
 namespace beltgrip::sim {
 
@@ -52,6 +53,8 @@ std::array<double, 3> solve(std::array<std::array<double, 3>, 3> a, std::array<d
 VehiclePlant::VehiclePlant(const VehicleScenario& scenario)
     : variator_(scenario.variator),
       belt_(scenario.belt),
+      effects_(scenario.effects),
+      experiment_(scenario.experiment),
       body_(scenario.body),
       engine_inertia_kg_m2_(scenario.engine.inertia_kg_m2),
       secondary_inertia_kg_m2_(variator_.secondary_inertia_kg_m2 +
@@ -103,9 +106,16 @@ VehiclePlant::Held VehiclePlant::hold(const DrivelineInput& input) const {
       (1.0 + low_share * (belt_.low_mu_factor - 1.0)) * (1.0 - input.wear) *
       std::max(0.2, 1.0 + belt_.temperature_per_K * (input.oil_degC - kReferenceTemperature_degC)) *
       std::max(0.2, 1.0 + belt_.speed_per_ln * std::log(speed)) *
-      std::pow(force, -belt_.load_exponent);
-  held.ratio = state_.ratio * (1.0 - variator_.deformation_per_N * input.secondary_force_N -
-                               variator_.deformation_per_Nm * output_.belt_torque_Nm);
+      std::pow(force, -belt_.load_exponent) *
+      friction_factor(effects_, {input.oil_degC, state_.omega_p_rad_s, input.secondary_force_N,
+                                 low_share, input.time_s, input.slip_energy_kJ, experiment_});
+  const double kN = 1e-3 * input.secondary_force_N;
+  const double end_stop =
+      low_share * effects_.end_stop_low + (1.0 - low_share) * effects_.end_stop_overdrive;
+  held.ratio = state_.ratio * (1.0 + end_stop) * std::exp(low_share > 0.5 ? crept_ : -crept_) *
+               (1.0 - variator_.deformation_per_N * input.secondary_force_N -
+                effects_.deformation_per_kN * kN - effects_.deformation_per_kN2 * kN * kN -
+                (variator_.deformation_per_Nm + effects_.tilt_per_Nm) * output_.belt_torque_Nm);
   held.radius_m = primary_radius_m(state_.ratio);
   held.torque_per_mu = 2.0 * input.secondary_force_N * held.radius_m / cos_wedge_;
   return held;
@@ -142,7 +152,9 @@ VehiclePlant::Rates VehiclePlant::rates(const std::array<double, 3>& omega,
                               2.0 * kConverter_Nm_s2 * std::abs(difference);
 
   const double loss =
-      variator_.primary_loss_Nm + variator_.primary_loss_Nm_per_N * input.secondary_force_N;
+      variator_.primary_loss_Nm + effects_.loss_constant_Nm +
+      (variator_.primary_loss_Nm_per_N + 1e-3 * effects_.loss_per_kN_Nm) * input.secondary_force_N +
+      effects_.loss_per_rad_s_Nm * omega[1];
   const double tp = std::tanh(omega[1] / kCoulombWidth_rad_s);
   const double ts = std::tanh(omega[2] / kCoulombWidth_rad_s);
   const double speed_per_omega = body_.wheel_radius_m / body_.final_drive;
@@ -160,7 +172,7 @@ VehiclePlant::Rates VehiclePlant::rates(const std::array<double, 3>& omega,
 
   Rates r;
   const double je = engine_inertia_kg_m2_;
-  const double jp = variator_.primary_inertia_kg_m2;
+  const double jp = variator_.primary_inertia_kg_m2 + effects_.inertia_kg_m2;
   const double js = secondary_inertia_kg_m2_;
   r.value = {(input.engine_torque_Nm - clutch) / je, (clutch - loss * tp - belt) / jp,
              (belt / held.ratio - road) / js};
@@ -185,6 +197,23 @@ void VehiclePlant::shift(const DrivelineInput& input, double step_s) {
                       (std::log(force_ratio) - equilibrium);
   state_.ratio =
       std::clamp(state_.ratio + rate * step_s, variator_.ratio_low, variator_.ratio_overdrive);
+  creep(std::log(force_ratio), step_s);
+}
+
+// Held by the stop, the ratio gives way as the force ratio falls from where it was at arrival.
+void VehiclePlant::creep(double ln_force_ratio, double step_s) {
+  constexpr double kCreepMax = 0.2;
+  const bool low = state_.ratio <= variator_.ratio_low;
+  if (!low && state_.ratio < variator_.ratio_overdrive) {
+    on_stop_ = false;
+    crept_ = 0.0;
+    return;
+  }
+  if (!on_stop_) reference_ln_ = ln_force_ratio;
+  on_stop_ = true;
+  const double lost = (low ? -1.0 : 1.0) * (reference_ln_ - ln_force_ratio);
+  crept_ = std::clamp(crept_ + effects_.creep_rate * state_.omega_p_rad_s * lost * step_s, 0.0,
+                      kCreepMax);
 }
 
 void VehiclePlant::observe(const DrivelineInput& input) {

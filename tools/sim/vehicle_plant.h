@@ -36,6 +36,7 @@ struct DrivelineInput {
   double disturbance_Nm = 0.0;  // at the secondary shaft, > 0 brakes
   double oil_degC = 80.0;
   double wear = 0.0;  // share of the friction that is gone
+  double time_s = 0.0, slip_energy_kJ = 0.0;
 };
 
 struct DrivelineOutput {
@@ -85,11 +86,14 @@ class VehiclePlant {
   Rates rates(const std::array<double, 3>& omega, const DrivelineInput& input,
               const Held& held) const;
   void shift(const DrivelineInput& input, double step_s);
+  void creep(double ln_force_ratio, double step_s);
   void observe(const DrivelineInput& input);
 
   static constexpr int kRadii = 128;
   VariatorParameters variator_;
   BeltParameters belt_;
+  estimator::MachineEffects effects_;
+  int experiment_;
   VehicleBody body_;
   double engine_inertia_kg_m2_;
   double secondary_inertia_kg_m2_;  // with the vehicle
@@ -97,6 +101,9 @@ class VehiclePlant {
   std::array<double, kRadii> radius_m_;  // over ln(ratio) between the end stops
   DrivelineState state_;
   DrivelineOutput output_;
+  double crept_ = 0.0;         // share of the ratio, away from the end stop
+  double reference_ln_ = 0.0;  // ln(F_p / F_s) when it came to the stop
+  bool on_stop_ = false;
 };
 
 }  // namespace beltgrip::sim

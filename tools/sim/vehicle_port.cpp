@@ -12,6 +12,14 @@ constexpr std::int64_t kFrame_ns = 260'000;    // 8 bytes at 500 kbit/s, with st
 constexpr double kArbitration_ns = 500'000.0;  // waits up to two other frames
 constexpr std::int64_t kForeignPeriod_ns = 10'000'000;
 constexpr std::uint32_t kClampIdentifier = 0x6A2;
+constexpr std::uint32_t kFloodIdentifier = 0x050;
+constexpr std::int64_t kFlood_ns = 10'000'000;
+// Error frames as in linux/can/error.h.
+constexpr std::uint32_t kErrorController = 0x04;
+constexpr std::uint32_t kErrorBusOff = 0x40;
+constexpr std::uint32_t kErrorRestarted = 0x100;
+constexpr std::uint8_t kTxPassive = 0x20;
+constexpr std::uint8_t kActive = 0x40;
 }  // namespace
 
 VehiclePort::VehiclePort(const VehicleScenario& scenario, std::uint64_t seed, Observers observers)
@@ -33,6 +41,53 @@ void VehiclePort::arrive(std::int64_t t_ns, const can::CanFrame& frame, bool own
   std::push_heap(arrivals_.begin(), arrivals_.end(), std::greater<>{});
 }
 
+void VehiclePort::report_bus_errors(double t_s) {
+  const auto error = [this](std::uint32_t error_class, std::uint8_t detail) {
+    can::CanFrame frame;
+    frame.id = {error_class, false};
+    frame.error = true;
+    frame.length = 8;
+    frame.data[1] = detail;
+    arrive(vehicle_.now_ns() + kFrame_ns, frame, false);
+  };
+  const bool off = vehicle_.faults().active(FaultKind::kBusOff, t_s) != nullptr;
+  const bool passive = vehicle_.faults().active(FaultKind::kBusPassive, t_s) != nullptr;
+  if (off && !was_off_) error(kErrorBusOff, 0);
+  if (!off && was_off_) error(kErrorRestarted, 0);
+  if (passive && !was_passive_) error(kErrorController, kTxPassive);
+  if (!passive && was_passive_) error(kErrorController, kActive);
+  was_off_ = off;
+  was_passive_ = passive;
+}
+
+void VehiclePort::send_foreign(double size) {
+  next_foreign_ns_ = vehicle_.now_ns() + kForeignPeriod_ns;
+  const auto force = static_cast<std::uint16_t>(size);
+  can::CanFrame frame;
+  frame.id = {kClampIdentifier, false};
+  frame.length = 8;
+  frame.data[2] = force > 0 ? 1 : 0;
+  frame.data[3] = static_cast<std::uint8_t>(force & 0xFF);
+  frame.data[4] = static_cast<std::uint8_t>(force >> 8);
+  can::e2e::protect(frame, kClampIdentifier, foreign_counter_);
+  foreign_counter_ = can::e2e::next_counter(foreign_counter_);
+  fresh_.push_back({vehicle_.now_ns() + kFrame_ns, frame});
+  vehicle_.deliver(frame, vehicle_.now_ns() + kFrame_ns);
+}
+
+void VehiclePort::flood(double t_s) {
+  const FaultStep* fault = vehicle_.faults().active(FaultKind::kFrameFlood, t_s);
+  if (fault != nullptr && !was_flooded_) {
+    can::CanFrame frame;
+    frame.id = {kFloodIdentifier, false};
+    const auto count = static_cast<std::int64_t>(fault->size);
+    for (std::int64_t i = 0; i < count; ++i) {
+      arrive(vehicle_.now_ns() + i * kFlood_ns / count, frame, false);
+    }
+  }
+  was_flooded_ = fault != nullptr;
+}
+
 void VehiclePort::advance(std::int64_t t_ns, bool stop_at_frame) {
   const auto due = [this] { return arrivals_.empty() ? INT64_MAX : arrivals_.front().t_ns; };
   while (!vehicle_.finished() && vehicle_.finite()) {
@@ -44,21 +99,10 @@ void VehiclePort::advance(std::int64_t t_ns, bool stop_at_frame) {
     bus_.sample(vehicle_, fresh_);
     const double t_s = static_cast<double>(vehicle_.now_ns()) * 1e-9;
     if (const FaultStep* fault = vehicle_.faults().active(FaultKind::kForeignFrames, t_s)) {
-      if (vehicle_.now_ns() >= next_foreign_ns_) {
-        next_foreign_ns_ = vehicle_.now_ns() + kForeignPeriod_ns;
-        const auto force = static_cast<std::uint16_t>(fault->size);
-        can::CanFrame frame;
-        frame.id = {kClampIdentifier, false};
-        frame.length = 8;
-        frame.data[2] = force > 0 ? 1 : 0;
-        frame.data[3] = static_cast<std::uint8_t>(force & 0xFF);
-        frame.data[4] = static_cast<std::uint8_t>(force >> 8);
-        can::e2e::protect(frame, kClampIdentifier, foreign_counter_);
-        foreign_counter_ = can::e2e::next_counter(foreign_counter_);
-        fresh_.push_back({vehicle_.now_ns() + kFrame_ns, frame});
-        vehicle_.deliver(frame, vehicle_.now_ns() + kFrame_ns);
-      }
+      if (vehicle_.now_ns() >= next_foreign_ns_) send_foreign(fault->size);
     }
+    flood(t_s);
+    report_bus_errors(t_s);
     const bool deaf = vehicle_.faults().active(FaultKind::kBusOff, t_s) != nullptr ||
                       vehicle_.faults().active(FaultKind::kBusDown, t_s) != nullptr;
     for (const can::StampedFrame& frame : fresh_) {
@@ -91,7 +135,12 @@ daemon::Wake VehiclePort::wait_until(daemon::MonoTime deadline) noexcept {
 std::size_t VehiclePort::receive(std::span<daemon::RxFrame> out) noexcept {
   std::size_t count = 0;
   while (count < out.size() && !arrivals_.empty() && arrivals_.front().t_ns <= now_ns_) {
-    out[count++] = arrivals_.front().frame;
+    if (observers_.on_received) observers_.on_received(arrivals_.front().frame);
+    out[count] = arrivals_.front().frame;
+    if (const FaultStep* fault = active(FaultKind::kStampBack)) {
+      out[count].t -= std::llround(fault->size * 1e9);
+    }
+    ++count;
     std::pop_heap(arrivals_.begin(), arrivals_.end(), std::greater<>{});
     arrivals_.pop_back();
   }
@@ -100,16 +149,17 @@ std::size_t VehiclePort::receive(std::span<daemon::RxFrame> out) noexcept {
 
 daemon::SendResult VehiclePort::send(const can::CanFrame& frame) noexcept {
   if (daemon_is_dead()) return daemon::SendResult::kSent;
-  if (active(FaultKind::kBusDown) != nullptr) return daemon::SendResult::kDown;
-  if (active(FaultKind::kBusOff) != nullptr || active(FaultKind::kSendFull) != nullptr) {
-    return daemon::SendResult::kFull;
+  const bool down = active(FaultKind::kBusDown) != nullptr;
+  if (down || active(FaultKind::kBusOff) != nullptr || active(FaultKind::kSendFull) != nullptr) {
+    if (observers_.on_unsent) observers_.on_unsent();
+    return down ? daemon::SendResult::kDown : daemon::SendResult::kFull;
   }
   // Frames of one node leave one after the other.
   const std::int64_t start = std::max(now_ns_, sent_until_ns_) +
                              static_cast<std::int64_t>(kArbitration_ns * transmission_.uniform());
   sent_until_ns_ = start + kFrame_ns;
-  if (active(FaultKind::kSendLost) != nullptr) return daemon::SendResult::kSent;
   if (observers_.on_sent) observers_.on_sent(sent_until_ns_, frame);
+  if (active(FaultKind::kSendLost) != nullptr) return daemon::SendResult::kSent;
   std::int64_t delay_ns = 0;
   if (const FaultStep* fault = active(FaultKind::kTcuDelays)) {
     delay_ns = std::llround(fault->size * 1e9);
@@ -120,10 +170,8 @@ daemon::SendResult VehiclePort::send(const can::CanFrame& frame) noexcept {
 }
 
 daemon::BusState VehiclePort::bus_state() noexcept {
-  if (active(FaultKind::kBusDown) != nullptr) return daemon::BusState::kDown;
-  if (active(FaultKind::kBusOff) != nullptr) return daemon::BusState::kOff;
-  if (active(FaultKind::kBusPassive) != nullptr) return daemon::BusState::kPassive;
-  return daemon::BusState::kActive;
+  return active(FaultKind::kBusDown) != nullptr ? daemon::BusState::kDown
+                                                : daemon::BusState::kActive;
 }
 
 void VehiclePort::run_alone() { advance(INT64_MAX, false); }

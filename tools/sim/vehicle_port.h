@@ -16,11 +16,13 @@ namespace beltgrip::sim {
 
 class VehiclePort final : public daemon::Port {
  public:
-  // Both may be empty. on_step is called after every step of the plant, on_sent for every frame
-  // that the daemon put on the bus, with the instant.
+  // Each may be empty: after every step of the plant; for every frame that the daemon put on the
+  // bus, with the instant; for every frame that it took from the bus.
   struct Observers {
     std::function<void(const VehicleSimulation&)> on_step;
     std::function<void(std::int64_t, const can::CanFrame&)> on_sent;
+    std::function<void(const daemon::RxFrame&)> on_received;
+    std::function<void()> on_unsent;  // a frame that the bus did not take
   };
   VehiclePort(const VehicleScenario& scenario, std::uint64_t seed, Observers observers = {});
 
@@ -49,6 +51,10 @@ class VehiclePort final : public daemon::Port {
   };
   // Steps the vehicle up to t_ns, or until a frame is there.
   void advance(std::int64_t t_ns, bool stop_at_frame);
+  // What the controller reports when a bus fault begins, as error frames.
+  void report_bus_errors(double t_s);
+  void send_foreign(double size);
+  void flood(double t_s);
   void arrive(std::int64_t t_ns, const can::CanFrame& frame, bool own);
   const FaultStep* active(FaultKind kind) const;
 
@@ -60,6 +66,9 @@ class VehiclePort final : public daemon::Port {
   std::int64_t sent_until_ns_ = 0;
   std::int64_t next_foreign_ns_ = 0;
   std::uint8_t foreign_counter_ = 0;
+  bool was_off_ = false;
+  bool was_passive_ = false;
+  bool was_flooded_ = false;
   std::uint64_t order_ = 0;
   std::vector<Arrival> arrivals_;  // a heap, earliest first
   std::vector<can::StampedFrame> fresh_;

@@ -18,6 +18,9 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kKmh = 1.0 / 3.6;
 constexpr double kPercent = 0.01;
 
+// A pushbelt's elements do not bend around less.
+constexpr double kLeastRadiusShare = 0.03;  // of its length
+
 constexpr const char* kBase = "coast-overdrive";
 constexpr const char* kPositiveInertia = "a rotating mass has a positive inertia";
 constexpr const char* kNoise = "a standard deviation is not negative";
@@ -64,13 +67,14 @@ void name_variator(ScenarioReader& r, VariatorParameters& v) {
 }
 
 void name_belt(ScenarioReader& r, BeltParameters& b) {
-  r.choice("belt.curve", {"tanh_fall", "magic_formula", "saturating"},
+  r.choice("belt.curve", {"tanh_fall", "magic_formula", "saturating", "two_peaks"},
            [&b](std::size_t i) { b.overdrive.shape = static_cast<CurveShape>(i); });
   r.number("belt.mu_max", b.overdrive.mu_max, 0.005, 1.0, "a friction coefficient of a pushbelt");
   r.number("belt.peak_slip_percent", b.overdrive.peak_slip_percent, 0.1, 50.0,
            "friction needs some slip to reach its peak");
   r.number("belt.fall_per_percent", b.overdrive.fall_per_percent, 0.0, 0.1,
            "friction falls beyond its peak");
+  r.number("belt.fall_at_once", b.overdrive.fall_at_once, 0.0, 0.5, "a share of the friction");
   r.number("belt.low_mu_factor", b.low_mu_factor, 0.5, 2.0, "friction depends little on ratio");
   r.number("belt.low_peak_slip_percent", b.low_peak_slip_percent, 0.1, 50.0,
            "friction needs some slip to reach its peak");
@@ -159,6 +163,18 @@ void name_sensors(ScenarioReader& r, SensorParameters& s) {
   r.number("sensors.frame_jitter_s", s.frame_jitter_s, 0.0, 1.0, "a frame follows its measurement");
 }
 
+void name_known(ScenarioReader& r, KnownOfVehicle& k) {
+  r.choice("beltgrip.trigger", {"coast_down", "steady"},
+           [&k](std::size_t i) { k.steady = i == 1; });
+  r.number("beltgrip.torque_offset_Nm", k.torque_offset_Nm, -50.0, 50.0, "accessories and losses");
+  r.number("beltgrip.torque_bias_Nm", k.torque_bias_Nm, 0.0, 50.0, kNoise);
+  r.number("beltgrip.torque_gain", k.torque_gain, 0.0, 0.5, kNoise);
+  r.number("beltgrip.pressure_bias_Pa", k.pressure_bias_Pa, 0.0, 1e6, kNoise);
+  r.number("beltgrip.pressure_gain", k.pressure_gain, 0.0, 0.5, kNoise);
+  r.number("beltgrip.cooldown_s", k.cooldown_s, 1.0, 86400.0, kDuration);
+  r.number("beltgrip.cooldown_m", k.cooldown_m, 0.0, 1e6, "a way");
+}
+
 void name_driver(ScenarioReader& r, DriverParameters& d) {
   r.choice("driver.pattern", {"steps", "city"},
            [&d](std::size_t i) { d.pattern = static_cast<DriverPattern>(i); });
@@ -199,7 +215,8 @@ void name_faults(ScenarioReader& r, std::vector<FaultStep>& faults) {
 bool check_geometry(ScenarioReader& r, const VariatorParameters& v) {
   const auto fits = [&v](double ratio) {
     const auto radii = estimator::running_radii(ratio, v.belt_length_m, v.centre_distance_m);
-    return radii.primary_m > 0.0 && radii.primary_m + radii.secondary_m < v.centre_distance_m;
+    return std::min(radii.primary_m, radii.secondary_m) > kLeastRadiusShare * v.belt_length_m &&
+           radii.primary_m + radii.secondary_m < v.centre_distance_m;
   };
   if (v.belt_length_m <= 2.0 * v.centre_distance_m) {
     r.contradiction("variator.belt_length_m", "found " + number_text(v.belt_length_m) +
@@ -217,8 +234,8 @@ bool check_geometry(ScenarioReader& r, const VariatorParameters& v) {
     r.contradiction(key, "found " + number_text(ratio) +
                              ": out of reach, no two pulleys that fit between shafts " +
                              number_text(v.centre_distance_m) +
-                             " m apart have this ratio under a belt of " +
-                             number_text(v.belt_length_m) + " m");
+                             " m apart, and around which a belt of " +
+                             number_text(v.belt_length_m) + " m bends, have this ratio");
   }
   return right;
 }
@@ -267,6 +284,7 @@ VehicleScenarioResult parse_vehicle_scenario(const std::vector<ScenarioLayer>& l
   name_controller(reader, s.tcu);
   name_driver(reader, s.driver);
   name_sensors(reader, s.sensors);
+  name_known(reader, s.known);
   name_faults(reader, s.faults);
   reader.apply({std::string(kBase) + ".toml", std::string(shipped(std::string(kBase) + ".toml"))});
   for (const ScenarioLayer& layer : layers) reader.apply(layer);

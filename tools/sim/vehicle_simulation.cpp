@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kWarmOil_degC = 60.0;
 constexpr double kAbsFrequency_Hz = 8.0;
+constexpr double kRolling_m_s = 3.0;
 constexpr double kSettle_s = 3.0;  // before time zero: hydraulics and controller find their state
 
 // Lag and dead time of cold oil over those of warm oil.
@@ -29,6 +30,7 @@ VehicleSimulation::VehicleSimulation(const VehicleScenario& scenario, std::uint6
       tcu_(scenario, faults_),
       secondary_(scenario.hydraulics, scenario.step_s),
       primary_(scenario.hydraulics, scenario.step_s),
+      clamping_(scenario.effects, scenario.step_s),
       step_ns_(std::llround(scenario.step_s * 1e9)),
       end_ns_(std::llround(scenario.duration_s * 1e9)),
       cycle_ns_(std::llround(scenario.tcu.cycle_s * 1e9)),
@@ -102,7 +104,8 @@ void VehicleSimulation::step() {
   const double model_force_N =
       v.secondary_piston_area_m2 * p_s + v.secondary_spring_force_N +
       v.secondary_centrifugal_N_s2 * state.omega_s_rad_s * state.omega_s_rad_s;
-  input.secondary_force_N = play_.step(model_force_N, hydraulics.friction_force_N);
+  input.secondary_force_N =
+      clamping_.step(play_.step(model_force_N, hydraulics.friction_force_N), state.omega_s_rad_s);
   input.primary_force_N = v.primary_piston_area_m2 * p_p +
                           v.primary_centrifugal_N_s2 * state.omega_p_rad_s * state.omega_p_rad_s;
   const FaultStep* torque_step = faults_.active(FaultKind::kTorqueStep, t_s);
@@ -120,7 +123,10 @@ void VehicleSimulation::step() {
   }
   input.oil_degC = signals_.oil_degC;
   input.wear = t_s >= scenario_.belt.wear_at_s ? scenario_.belt.wear_step : 0.0;
+  input.time_s = t_s;
+  input.slip_energy_kJ = slip_energy_kJ_;
   plant_.step(input, step_s_);
+  slip_energy_kJ_ += 1e-3 * plant_.output().slip_power_W * step_s_;
   now_ns_ += step_ns_;
 
   signals_.omega_e_rad_s = state.omega_e_rad_s;
@@ -146,7 +152,18 @@ void VehicleSimulation::step() {
   truth_.own_force_N = tcu.own_force_N;
   truth_.engine_running = engine_.running();
   truth_.stalls = engine_.stalls();
+  count_coast_downs(driver);
   observe(static_cast<double>(now_ns_) * 1e-9);
+}
+
+void VehicleSimulation::count_coast_downs(const DriverOutput& driver) {
+  const bool coasting = driver.accelerator <= 0.0 && driver.brake_m_s2 <= 0.0 &&
+                        plant_.speed_m_s() > kRolling_m_s && now_ns_ > 0;
+  const double before_s = coasting_s_;
+  coasting_s_ = coasting ? coasting_s_ + step_s_ : 0.0;
+  if (before_s < VehicleTruth::kCoast_s && coasting_s_ >= VehicleTruth::kCoast_s) {
+    ++truth_.coast_downs;
+  }
 }
 
 void VehicleSimulation::observe(double t_s) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "can_dbc/can_frame.h"
+#include "tools/sim/clamp_effects.h"
 #include "tools/sim/fault_script.h"
 #include "tools/sim/hydraulic_actuator.h"
 #include "tools/sim/tcu_model.h"
@@ -45,6 +46,8 @@ struct VehicleTruth {
   double own_force_N = 0.0;
   bool engine_running = true;
   int stalls = 0;
+  int coast_downs = 0;  // of kCoast_s and more: rolling, neither pedal pressed
+  static constexpr double kCoast_s = 2.0;
 };
 
 // One request that the controller obeyed, from its begin until kAfter_s after its end.
@@ -84,6 +87,7 @@ class VehicleSimulation {
  private:
   void control(double t_s, const DriverOutput& driver);
   void observe(double t_s);
+  void count_coast_downs(const DriverOutput& driver);
 
   VehicleScenario scenario_;
   FaultScript faults_;
@@ -93,6 +97,7 @@ class VehicleSimulation {
   TcuModel tcu_;
   HydraulicActuator secondary_;
   HydraulicActuator primary_;
+  ClampEffects clamping_;
   CoulombPlay play_;
   std::int64_t step_ns_;
   std::int64_t end_ns_;
@@ -103,6 +108,8 @@ class VehicleSimulation {
   std::deque<can::StampedFrame> to_tcu_;
   VehicleSignals signals_;
   VehicleTruth truth_;
+  double coasting_s_ = 0.0;
+  double slip_energy_kJ_ = 0.0;
   std::vector<RequestTruth> requests_;
 };
 

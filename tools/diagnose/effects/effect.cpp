@@ -205,12 +205,11 @@ std::vector<Slot> make_slots(const std::vector<ExperimentData>& runs) {
       add(0, {});
       add(0, "clamp force");
     } else if (row.apply == apply_channel_skew) {
-      const bool engine = any(runs, [](const auto& run) { return run.torque_is_engine; });
       for (const std::string_view role :
            {"primary_speed", "secondary_speed", "secondary_pressure"}) {
         add(0, role);
       }
-      add(0, engine ? "engine_torque" : "primary_torque");
+      // Of the torque it is torque_delay.
     } else {
       add(0, {});
     }

@@ -26,10 +26,8 @@ void apply_channel_skew(Context& c, const Slot& slot, double delay_s) {
     c.omega_p += shift_change(c.run.omega_p, dt_s, delay_s);
   } else if (slot.role == "secondary_speed") {
     c.omega_s += shift_change(c.run.omega_s, dt_s, delay_s);
-  } else if (slot.role == "secondary_pressure") {
-    c.pressure += shift_change(c.run.pressure, dt_s, delay_s);
   } else {
-    c.torque += shift_change(c.run.torque, dt_s, delay_s);
+    c.pressure += shift_change(c.run.pressure, dt_s, delay_s);
   }
 }
 

@@ -1,0 +1,273 @@
+// The ratio at the end stops, extrapolated to zero clamping force, and the delay between the
+// speeds, from the same cells.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "estimator/clamp_force.h"
+#include "estimator/slip.h"
+#include "tools/calibrate/calibrate.h"
+#include "tools/calibrate/cluster_fit.h"
+#include "tools/calibrate/series.h"
+
+namespace beltgrip::calibrate {
+
+namespace {
+
+using daemon::Role;
+using estimator::EndStop;
+
+constexpr double kCell_s = 0.5;
+constexpr double kGrid_s = 0.02;
+constexpr double kReach = 0.06;        // ln: how far the configured ratio may be off
+constexpr double kDense = 0.03;        // ln: cells of one stop lie within this
+constexpr double kStill = 1.5e-3;      // ln: between the halves of a cell
+constexpr double kTractionMax = 0.06;  // mu*: well below any peak
+constexpr double kSpeedMin_rad_s = 30.0;
+constexpr double kVisitGap_s = 3.0;
+constexpr double kScatterMax = 2.5e-3;  // ln: a stop holds the ratio
+constexpr double kModelStd = 2e-4;      // ln: what the straight lines in F and mu* leave out
+constexpr double kDelayFloor_s = 1e-3;  // and for the delay
+constexpr double kStdMax = 0.003;       // 0.3 % of slip: more is not worth writing
+constexpr int kVisitsMin = 4;
+constexpr double kDelayStdMax_s = 0.005;
+constexpr double kNewton_kN = 1e-3;
+
+struct Cell {
+  double t_s = 0.0;
+  double ln_ratio = 0.0;
+  double force_kN = 0.0;
+  double traction = 0.0;  // mu*, signed
+  double rate_1_s = 0.0;  // d ln(omega_p)/dt
+  int log = 0;
+};
+
+class Cells {
+ public:
+  Cells(const daemon::Config& config, EndStop stop, double pressure_zero_Pa)
+      : config_(config),
+        pressure_zero_Pa_(pressure_zero_Pa),
+        point_(operating_point(config.variator, stop, estimator::Direction::kDrive)) {}
+
+  void add(const diagnose::SignalTable& log, int number) {
+    const Series primary(log[Role::kPrimarySpeed]), secondary(log[Role::kSecondarySpeed]),
+        pressure(log[Role::kSecondaryPressure]),
+        torque(
+            log[config_.estimator.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque]);
+    if (primary.empty() || secondary.empty() || pressure.empty() || torque.empty()) return;
+    const double end = std::min(primary.end_s(), secondary.end_s());
+    for (double t = std::max(primary.begin_s(), secondary.begin_s()); t + kCell_s < end;
+         t += kCell_s) {
+      add_cell(primary, secondary, pressure, torque, t, number);
+    }
+  }
+  std::vector<Cell> cells;
+
+ private:
+  void add_cell(const Series& primary, const Series& secondary, const Series& pressure,
+                const Series& torque, double t, int number) {
+    std::array<double, 2> half{};
+    double mean_p = 0.0, mean_s = 0.0, xx = 0.0, xp = 0.0;
+    constexpr int kPoints = static_cast<int>(kCell_s / kGrid_s);
+    for (int i = 0; i < kPoints; ++i) {
+      const double x = (i + 0.5) * kGrid_s;
+      const auto p = primary.at(t + x);
+      const auto s = secondary.at(t + x);
+      if (!p || !s || *p < kSpeedMin_rad_s || *s < 1.0) return;
+      half[i < kPoints / 2 ? 0 : 1] += std::log(*s / *p);
+      mean_p += *p / kPoints;
+      mean_s += *s / kPoints;
+      const double from_middle = x - 0.5 * kCell_s;
+      xx += from_middle * from_middle;
+      xp += from_middle * *p;
+    }
+    Cell cell;
+    constexpr int kFirst = kPoints / 2;
+    half[0] /= kFirst;
+    half[1] /= kPoints - kFirst;
+    cell.ln_ratio = std::log(mean_s / mean_p);
+    if (std::abs(half[1] - half[0]) > kStill ||
+        std::abs(cell.ln_ratio - std::log(point_.ratio_g0)) > kReach) {
+      return;
+    }
+    const auto p_Pa = pressure.mean(t, t + kCell_s);
+    const auto torque_Nm = torque.mean(t, t + kCell_s);
+    if (!p_Pa || !torque_Nm) return;
+    const double force_N =
+        secondary_clamp_force_N(config_.variator, *p_Pa - pressure_zero_Pa_, mean_s);
+    if (force_N < 1.0) return;
+    cell.traction = traction_coefficient(config_.variator, point_, *torque_Nm, force_N);
+    if (std::abs(cell.traction) > kTractionMax) return;
+    cell.t_s = t;
+    cell.log = number;
+    cell.force_kN = force_N * kNewton_kN;
+    cell.rate_1_s = xp / xx / mean_p;
+    cells.push_back(cell);
+  }
+  const daemon::Config& config_;
+  double pressure_zero_Pa_;
+  estimator::OperatingPoint point_;
+};
+
+// What is known before: deformation of 0.5 to 2 % at 5 kN, less under large forces; 0.03 to 0.1 of
+// mu* per percent of micro-slip.
+constexpr double kDeformation_1_kN = 1.5e-3, kDeformationStd_1_kN = 1.5e-3;
+constexpr double kCreep = 0.2, kCreepStd = 0.15;
+
+// The stretch of kDense with the most cells in it, deformation and creep taken off as expected: the
+// others are on their way, or hold a ratio beside the stop.
+std::vector<Cell> densest(std::vector<Cell> cells) {
+  const auto at_rest = [](const Cell& each) {
+    return each.ln_ratio + kDeformation_1_kN * each.force_kN + kCreep * each.traction;
+  };
+  std::vector<double> sorted;
+  sorted.reserve(cells.size());
+  for (const Cell& each : cells) sorted.push_back(at_rest(each));
+  std::sort(sorted.begin(), sorted.end());
+  std::size_t best = 0, best_count = 0;
+  for (std::size_t i = 0, j = 0; i < sorted.size(); ++i) {
+    while (j < sorted.size() && sorted[j] <= sorted[i] + kDense) ++j;
+    if (j - i > best_count) {
+      best_count = j - i;
+      best = i;
+    }
+  }
+  std::erase_if(cells, [&](const Cell& each) {
+    return at_rest(each) < sorted[best] || at_rest(each) > sorted[best] + kDense;
+  });
+  return cells;
+}
+
+enum Coefficient { kLevel, kForce, kTraction, kRate, kCoefficients };
+
+Observations observations(const std::vector<Cell>& cells, double ln_configured) {
+  Observations data;
+  int visit = -1;
+  const Cell* before = nullptr;
+  for (const Cell& each : cells) {
+    if (before == nullptr || each.log != before->log || each.t_s - before->t_s > kVisitGap_s) {
+      ++visit;
+    }
+    Eigen::VectorXd x(static_cast<Eigen::Index>(kCoefficients));
+    x << 1.0, -each.force_kN, -each.traction, -each.rate_1_s;
+    data.add(each.ln_ratio - ln_configured, x, visit);
+    before = &each;
+  }
+  return data;
+}
+
+std::string text(const char* pattern, auto... values) {
+  std::array<char, 200> line;
+  std::snprintf(line.data(), line.size(), pattern, values...);
+  return line.data();
+}
+
+struct StopFindings {
+  Finding ratio, delay;
+};
+
+StopFindings one_stop(std::span<const diagnose::SignalTable> logs, const daemon::Config& config,
+                      EndStop stop, PressureError pressure) {
+  const bool low = stop == EndStop::kLow;
+  StopFindings found;
+  found.ratio.key = low ? "variator.ratio_low" : "variator.ratio_overdrive";
+  found.ratio.configured = low ? config.variator.ratio_low : config.variator.ratio_overdrive;
+  found.delay.key = "delay.secondary_speed";
+  found.delay.unit = "s";
+  Cells all(config, stop, pressure.zero);
+  for (std::size_t i = 0; i < logs.size(); ++i) all.add(logs[i], static_cast<int>(i));
+  const std::size_t candidates = all.cells.size();
+  const auto refuse = [&](const std::string& why) {
+    found.ratio.text = found.delay.text = why;
+    return found;
+  };
+  if (candidates == 0) {
+    return refuse(
+        text("no half second within %.0f %% of the configured %.4g in which the ratio "
+             "stands still under little traction",
+             100.0 * kReach, found.ratio.configured));
+  }
+  std::vector<Cell> cells = densest(all.cells);
+  const double ln_configured = std::log(found.ratio.configured);
+  Eigen::VectorXd mean(static_cast<Eigen::Index>(kCoefficients));
+  Eigen::VectorXd spread(static_cast<Eigen::Index>(kCoefficients));
+  mean << 0.0, kDeformation_1_kN, kCreep, 0.0;
+  spread << 0.1, kDeformationStd_1_kN, kCreepStd, 0.1;
+  ClusterFit fitted;
+  Observations data;
+  constexpr int kTrims = 4;
+  for (int trim = 0; trim < kTrims; ++trim) {
+    data = observations(cells, ln_configured);
+    fitted = fit(data, mean, spread);
+    if (!fitted.solved || trim + 1 == kTrims) break;
+    // A cell on its way to the stop or from it lies far off all others.
+    std::vector<double> sizes;
+    sizes.reserve(fitted.residual.size());
+    for (const double each : fitted.residual) sizes.push_back(std::abs(each));
+    std::nth_element(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2),
+                     sizes.end());
+    const double limit = std::max(4.0 * 1.4826 * sizes[sizes.size() / 2], 2e-4);
+    std::vector<Cell> kept;
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      if (std::abs(fitted.residual[i]) <= limit) kept.push_back(cells[i]);
+    }
+    cells = std::move(kept);
+  }
+  if (!fitted.solved || fitted.clusters < kVisitsMin) {
+    return refuse(text("%d visits to the stop, needs %d", fitted.clusters, kVisitsMin));
+  }
+  // Cells that are spread evenly come from a ratio that is controlled.
+  if (2 * cells.size() < candidates || fitted.residual_std > kScatterMax) {
+    return refuse(
+        text("the ratio does not come to rest at one value: %zu of %zu half seconds lie "
+             "together",
+             cells.size(), candidates));
+  }
+  const auto [least, most] =
+      std::minmax_element(cells.begin(), cells.end(),
+                          [](const Cell& a, const Cell& b) { return a.force_kN < b.force_kN; });
+  const std::string basis =
+      text("%zu half seconds in %d visits, %.1f to %.1f kN, scatter %.2f %%", cells.size(),
+           fitted.clusters, least->force_kN, most->force_kN, 100.0 * fitted.residual_std);
+  const double ratio = std::exp(ln_configured + fitted.value[kLevel]);
+  // The zero of the pressure shifts every force, and the ratio at none of it.
+  const double force_std_kN = config.variator.secondary_piston_area_m2 * pressure.std * kNewton_kN;
+  const double level_std =
+      std::hypot(fitted.std[kLevel], fitted.value[kForce] * force_std_kN, kModelStd);
+  if (level_std > kStdMax) {
+    found.ratio.text =
+        text("known to %.2f %% only, %.2f %% would do (", 100.0 * level_std, 100.0 * kStdMax) +
+        basis + "); drive at the stop under more different clamping forces";
+  } else {
+    found.ratio.value = ratio;
+    found.ratio.std = ratio * level_std;
+    found.ratio.text = basis + text(", falls by %.2f %% per kN", 100.0 * fitted.value[kForce]);
+  }
+  found.delay.std = std::hypot(fitted.std[kRate], kDelayFloor_s);
+  if (found.delay.std > kDelayStdMax_s) {
+    found.delay.text = text(
+        "known to %.1f ms only, %.1f ms would do; accelerate and brake at the "
+        "stop",
+        1e3 * found.delay.std, 1e3 * kDelayStdMax_s);
+  } else {
+    found.delay.value = fitted.value[kRate];
+    found.delay.text = std::string("after primary_speed; at the ") + (low ? "low" : "overdrive") +
+                       " stop, " + basis;
+  }
+  return found;
+}
+
+}  // namespace
+
+std::vector<Finding> end_stops(std::span<const diagnose::SignalTable> logs,
+                               const daemon::Config& config, PressureError pressure) {
+  StopFindings low = one_stop(logs, config, EndStop::kLow, pressure);
+  StopFindings overdrive = one_stop(logs, config, EndStop::kOverdrive, pressure);
+  // One delay: that of the stop which says more.
+  const bool from_low =
+      low.delay.value && (!overdrive.delay.value || low.delay.std < overdrive.delay.std);
+  return {low.ratio, overdrive.ratio, from_low ? low.delay : overdrive.delay};
+}
+
+}  // namespace beltgrip::calibrate

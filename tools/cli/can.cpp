@@ -1,0 +1,196 @@
+// beltgrip can: sets up a CAN interface, takes it down, shows what its controller says.
+#include "tools/cli/can.h"
+
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "daemon/io/can_link.h"
+#include "tools/cli/exit_codes.h"
+#include "tools/cli/json_writer.h"
+
+namespace beltgrip::cli {
+
+namespace {
+
+using daemon::CanLink;
+
+struct Options {
+  std::string interface;
+  daemon::CanLinkSetting setting;
+  bool json = false;
+};
+
+CanLink link_of(const std::string& interface) {
+  std::string why;
+  std::optional<CanLink> link = daemon::read_can_link(interface, why);
+  if (!link) throw Failure{kUnavailable, why};
+  return *std::move(link);
+}
+
+void field(JsonWriter& json, const char* name, const auto& value) {
+  json.key(name);
+  if (value) {
+    json.value(*value);
+  } else {
+    json.null();
+  }
+}
+
+std::string json_text(const CanLink& link) {
+  JsonWriter json;
+  json.begin_object().field("interface", link.interface).field("up", link.up);
+  json.field("driver", link.driver).field("controller", link.has_controller);
+  field(json, "state", link.state);
+  json.key("bit_timing");
+  if (link.bitrate) {
+    json.begin_object().field("bitrate", *link.bitrate);
+    field(json, "sample_point", link.sample_point);
+    json.end_object();
+  } else {
+    json.null();
+  }
+  field(json, "restart_ms", link.restart_ms);
+  json.key("error_counters");
+  if (link.error_counters) {
+    json.begin_object()
+        .field("transmit", link.error_counters->transmit)
+        .field("receive", link.error_counters->receive)
+        .end_object();
+  } else {
+    json.null();
+  }
+  json.key("controller_counters");
+  if (link.device_counters) {
+    const CanLink::DeviceCounters& counted = *link.device_counters;
+    json.begin_object()
+        .field("restarts", counted.restarts)
+        .field("bus_errors", counted.bus_errors)
+        .field("warnings", counted.warnings)
+        .field("passives", counted.passives)
+        .field("bus_offs", counted.bus_offs)
+        .field("arbitration_lost", counted.arbitration_lost)
+        .end_object();
+  } else {
+    json.null();
+  }
+  json.field("queue_length", link.queue_length).key("frames");
+  if (link.frame_counters) {
+    const CanLink::FrameCounters& counted = *link.frame_counters;
+    json.begin_object()
+        .field("received", counted.received)
+        .field("sent", counted.sent)
+        .field("receive_errors", counted.receive_errors)
+        .field("transmit_errors", counted.transmit_errors)
+        .field("received_dropped", counted.received_dropped)
+        .field("sent_dropped", counted.sent_dropped)
+        .field("overruns", counted.overruns)
+        .end_object();
+  } else {
+    json.null();
+  }
+  return json.end_object().take();
+}
+
+std::string number_or(const auto& value, const char* unit) {
+  return value ? std::to_string(*value) + unit : std::string("the controller does not say");
+}
+
+void print(const CanLink& link) {
+  const auto line = [](const char* name, const std::string& text) {
+    std::printf("%-16s %s\n", name, text.c_str());
+  };
+  line("interface", link.interface + (link.up ? ", up" : ", down") + ", driver " +
+                        (link.driver.empty() ? "unknown" : link.driver));
+  if (!link.has_controller) {
+    line("controller", "none: a virtual interface has no state, bit rate or error counters");
+  } else {
+    line("state", std::string(link.state.value_or("the controller does not say")));
+    std::string timing = number_or(link.bitrate, " bit/s");
+    if (link.sample_point) {
+      char point[32];
+      std::snprintf(point, sizeof point, ", sample point %.1f %%", 100.0 * *link.sample_point);
+      timing += point;
+    }
+    line("bit timing", timing);
+    line("restart", link.restart_ms == 0U ? "none after bus-off"
+                                          : number_or(link.restart_ms, " ms after bus-off"));
+    line("error counters", link.error_counters
+                               ? "transmit " + std::to_string(link.error_counters->transmit) +
+                                     ", receive " + std::to_string(link.error_counters->receive)
+                               : "the controller does not say");
+    if (link.device_counters) {
+      const CanLink::DeviceCounters& counted = *link.device_counters;
+      line("since it is up", std::to_string(counted.bus_offs) + " bus-off, " +
+                                 std::to_string(counted.restarts) + " restarts, " +
+                                 std::to_string(counted.passives) + " passive, " +
+                                 std::to_string(counted.warnings) + " warnings, " +
+                                 std::to_string(counted.bus_errors) + " bus errors, " +
+                                 std::to_string(counted.arbitration_lost) + " arbitration lost");
+    }
+  }
+  line("queue length", std::to_string(link.queue_length) + " frames");
+  if (link.frame_counters) {
+    const CanLink::FrameCounters& counted = *link.frame_counters;
+    line("received", std::to_string(counted.received) + ", " +
+                         std::to_string(counted.receive_errors) + " errors, " +
+                         std::to_string(counted.received_dropped) + " dropped, " +
+                         std::to_string(counted.overruns) + " overruns");
+    line("sent", std::to_string(counted.sent) + ", " + std::to_string(counted.transmit_errors) +
+                     " errors, " + std::to_string(counted.sent_dropped) + " dropped");
+  }
+}
+
+void demand(const std::string& failure) {
+  if (!failure.empty()) throw Failure{kUnavailable, failure};
+}
+
+}  // namespace
+
+void add_can(CLI::App& app) {
+  CLI::App* can = app.add_subcommand("can", "Set up a CAN interface, or show its state");
+  can->require_subcommand(1);
+  auto options = std::make_shared<Options>();
+  const auto subcommand = [&](const char* name, const char* help) {
+    CLI::App* command = can->add_subcommand(name, help);
+    command->add_option("interface", options->interface, "A CAN interface")->required();
+    return command;
+  };
+
+  // The variables are those of beltgrip-can@.service; an empty one counts as not given.
+  CLI::App* up = subcommand("up", "Set what is given, then bring it up");
+  up->add_option("--bitrate", options->setting.bitrate, "bit/s")
+      ->envname("CAN_BITRATE")
+      ->check(CLI::Range(1000U, 8'000'000U));
+  up->add_option("--sample-point", options->setting.sample_point,
+                 "Share of a bit's time after which it is read")
+      ->envname("CAN_SAMPLE_POINT")
+      ->check(CLI::Range(0.3, 0.95));
+  up->add_option("--restart-ms", options->setting.restart_ms,
+                 "Milliseconds from bus-off to the restart, 0: none")
+      ->envname("CAN_RESTART_MS")
+      ->check(CLI::Range(0U, 60'000U));
+  up->add_option("--queue-length", options->setting.queue_length,
+                 "Frames that may wait for the controller")
+      ->envname("CAN_QUEUE_LENGTH")
+      ->check(CLI::Range(1, 10'000));
+  up->callback(
+      [options] { demand(daemon::bring_up(link_of(options->interface), options->setting)); });
+
+  subcommand("down", "Take it down")->callback([options] {
+    demand(daemon::bring_down(link_of(options->interface)));
+  });
+
+  CLI::App* status = subcommand("status", "State, error counters, bit timing, restarts, drops");
+  status->add_flag("--json", options->json, "As one JSON object; null: nobody can say");
+  status->callback([options] {
+    const CanLink link = link_of(options->interface);
+    if (options->json) {
+      std::puts(json_text(link).c_str());
+    } else {
+      print(link);
+    }
+  });
+}
+
+}  // namespace beltgrip::cli

@@ -1,0 +1,372 @@
+// beltgrip history: the experiments that a daemon has kept, and what they say together. Reads the
+// file and changes nothing, while the daemon runs or not.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/core/event.h"
+#include "daemon/io/history_db.h"
+#include "tools/cli/command.h"
+#include "tools/cli/configuration.h"
+#include "tools/cli/json_writer.h"
+#include "tools/cli/output_file.h"
+#include "tools/cli/replay_run.h"
+
+namespace beltgrip::cli {
+
+namespace {
+
+using daemon::direction_name;
+using daemon::end_stop_name;
+using daemon::HistoryRow;
+using daemon::outcome_name;
+using daemon::stop_reason_name;
+using estimator::Direction;
+using estimator::EndStop;
+using estimator::PeakKind;
+
+constexpr const char* kDefaultFolder = "/var/lib/beltgrip";
+constexpr std::array<const char*, estimator::kNoteCount> kNoteNames{
+    "outlier", "trend", "wear", "directions_disagree", "end_stops_disagree", "contradictory"};
+
+struct Options {
+  std::string file;
+  std::string config;
+  std::string json;
+  std::string csv;
+};
+
+struct Group {
+  Direction direction;
+  EndStop end_stop;
+  estimator::FusedFriction fused;
+  estimator::WearTest wear;
+};
+
+struct History {
+  std::string path;
+  std::vector<HistoryRow> rows;
+  std::int64_t damaged = 0;
+  std::string fingerprint;     // of the last row: its configuration is the one that counts
+  std::size_t comparable = 0;  // rows under it
+  std::vector<Group> groups;   // that hold a value
+};
+
+// history.db in the folder, or in the only one of its folders that has one: the service gives each
+// interface its own.
+std::string in_folder(const std::string& folder) {
+  namespace fs = std::filesystem;
+  const fs::path direct = fs::path(folder) / daemon::kHistoryFile;
+  if (fs::exists(direct)) return direct.string();
+  std::vector<std::string> found;
+  std::error_code ignored;
+  for (const auto& each : fs::directory_iterator(folder, ignored)) {
+    const fs::path below = each.path() / daemon::kHistoryFile;
+    if (fs::exists(below, ignored)) found.push_back(below.string());
+  }
+  if (found.size() > 1) {
+    std::sort(found.begin(), found.end());
+    std::string all;
+    for (const std::string& each : found) all += (all.empty() ? "" : ", ") + each;
+    throw Failure{kUsage, "history: found several, name one of them: " + all};
+  }
+  return found.empty() ? direct.string() : found.front();
+}
+
+std::string path_of(const Options& options) {
+  namespace fs = std::filesystem;
+  std::string path = options.file;
+  if (path.empty() && !options.config.empty()) {
+    const std::string folder = load_configuration(options.config, "").state_dir;
+    if (!folder.empty()) path = (fs::path(options.config).parent_path() / folder).string();
+  }
+  if (path.empty()) path = kDefaultFolder;
+  return fs::is_directory(path) ? in_folder(path) : path;
+}
+
+History read(const Options& options) {
+  History history;
+  history.path = path_of(options);
+  const auto opened = daemon::HistoryDb::open_to_read(history.path);
+  using daemon::HistoryTrouble;
+  if (opened.trouble == HistoryTrouble::kMissing) {
+    throw Failure{kNoInput, history.path + ": found no readable history (" + opened.text +
+                                "), expected the history.db of a daemon or its folder"};
+  }
+  if (opened.db == nullptr) {
+    throw Failure{kBadInput,
+                  history.path + ": found a history that cannot be used (" + opened.text + ")"};
+  }
+  daemon::HistoryContent content = opened.db->read();
+  if (opened.trouble == HistoryTrouble::kCorrupt) {
+    if (content.rows.empty()) {
+      throw Failure{kBadInput, history.path + ": found no history (" + opened.text +
+                                   "), expected the history.db of a daemon"};
+    }
+    std::fprintf(stderr, "beltgrip: warning: %s: damaged (%s)\n", history.path.c_str(),
+                 opened.text.c_str());
+  }
+  history.damaged = content.damaged;
+  history.rows = std::move(content.rows);
+  if (history.damaged > 0) {
+    std::fprintf(stderr, "beltgrip: warning: %s: %lld rows damaged or missing\n",
+                 history.path.c_str(), static_cast<long long>(history.damaged));
+  }
+  return history;
+}
+
+// As of the last experiment, so that the same file gives the same answer on any day.
+void judge(History& history) {
+  if (history.rows.empty()) return;
+  history.fingerprint = history.rows.back().fingerprint;
+  std::vector<estimator::BeltExperiment> experiments;
+  for (const HistoryRow& row : history.rows) {
+    if (row.fingerprint == history.fingerprint) experiments.push_back(belt_experiment(row));
+  }
+  history.comparable = experiments.size();
+  for (const Direction direction : {Direction::kDrive, Direction::kOverrun}) {
+    for (const EndStop end_stop : {EndStop::kOverdrive, EndStop::kLow}) {
+      Group group{direction, end_stop,
+                  fuse(experiments, direction, end_stop, history.rows.back().time_s),
+                  wear(experiments, direction, end_stop)};
+      if (group.fused.known) history.groups.push_back(group);
+    }
+  }
+}
+
+std::string utc(double time_s) {
+  constexpr double kLatest_s = 4e10;  // the year 3237
+  if (!(std::abs(time_s) < kLatest_s)) return "-";
+  const auto seconds = static_cast<std::time_t>(std::floor(time_s));
+  std::tm parts{};
+  gmtime_r(&seconds, &parts);
+  std::array<char, 32> text{};
+  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &parts);
+  return text.data();
+}
+
+std::string notes_text(std::uint32_t notes, const char* separator) {
+  std::string text;
+  for (std::size_t i = 0; i < kNoteNames.size(); ++i) {
+    if ((notes >> i & 1U) == 0) continue;
+    if (!text.empty()) text += separator;
+    text += kNoteNames[i];
+  }
+  return text;
+}
+
+std::string lower(const char* name) { return snake_case(name); }
+std::string lower(std::string_view name) { return snake_case(std::string(name)); }
+
+// One column of the rows, for JSON and CSV alike: text, or a number that may be missing.
+struct Cell {
+  const char* name;
+  bool is_text;
+  std::string text;
+  double number = 0.0;
+};
+
+std::vector<Cell> cells(const HistoryRow& row) {
+  const daemon::ExperimentResult& result = row.result;
+  const estimator::PeakEstimate& peak = result.peak;
+  const bool value = peak.kind == PeakKind::kValue;
+  const auto text = [](const char* name, std::string content) {
+    return Cell{name, true, std::move(content), 0.0};
+  };
+  const auto number = [](const char* name, double content, bool given = true) {
+    return Cell{name, false, {}, given ? content : kJsonNull};
+  };
+  return {number("id", static_cast<double>(row.id)),
+          number("time_s", row.time_s),
+          text("time_utc", utc(row.time_s)),
+          text("outcome", lower(outcome_name(result.outcome))),
+          text("stop_reason", lower(stop_reason_name(result.stop_reason))),
+          number("mu_max", peak.mu_max, value),
+          number("mu_max_std", peak.mu_max_std, value),
+          number("ci95_low", peak.ci95_low, value),
+          number("ci95_high", peak.ci95_high, value),
+          number("sensor_std", result.sensor_std, value),
+          number("mu_max_lower_bound", peak.mu_max, peak.kind == PeakKind::kLowerBound),
+          number("sigma_stop_percent", result.sigma_stop_percent),
+          number("sigma_peak_percent", peak.sigma_peak_percent),
+          number("samples", static_cast<double>(result.samples)),
+          number("duration_s", static_cast<double>(result.end - result.start) * 1e-9),
+          text("direction", lower(direction_name(result.direction))),
+          text("ratio", lower(end_stop_name(result.end_stop))),
+          number("speed_ratio", result.omega_s_rad_s / result.omega_p_rad_s),
+          number("primary_speed_rad_s", result.omega_p_rad_s),
+          number("torque_Nm", result.torque_Nm),
+          number("clamp_force_N", result.clamp_force_N),
+          number("oil_degC", result.oil_degC),
+          text("notes", notes_text(row.notes, " ")),
+          text("fingerprint", row.fingerprint)};
+}
+
+std::string number_text(double value) {
+  if (!std::isfinite(value)) return {};
+  std::array<char, 32> digits;
+  return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
+}
+
+std::string json_lines(const History& history) {
+  std::string out;
+  JsonWriter json;
+  for (const HistoryRow& row : history.rows) {
+    json.begin_object().field("type", "experiment");
+    for (const Cell& cell : cells(row)) {
+      if (cell.is_text) {
+        json.field(cell.name, cell.text);
+      } else {
+        json.field(cell.name, cell.number);
+      }
+    }
+    out += json.end_object().take() + '\n';
+  }
+  for (const Group& group : history.groups) {
+    const estimator::FusedFriction& fused = group.fused;
+    json.begin_object().field("type", "fused");
+    json.field("direction", lower(direction_name(group.direction)));
+    json.field("ratio", lower(end_stop_name(group.end_stop)));
+    json.field("mu_max", fused.mu_max).field("mu_max_std", fused.mu_max_std);
+    json.key("mu_max_ci95").begin_array().value(fused.ci95_low).value(fused.ci95_high).end_array();
+    json.field("experiments", fused.experiments);
+    json.field("repeatability_percent", fused.repeatability_percent);
+    const bool drift = fused.drift_percent_std > 0.0;
+    json.field("drift_percent_per_experiment", drift ? fused.drift_percent : kJsonNull);
+    json.field("drift_percent_std", drift ? fused.drift_percent_std : kJsonNull);
+    json.key("wear");
+    const estimator::WearTest& wear = group.wear;
+    if (wear.judged) {
+      json.begin_object().field("found", wear.found).field("change_percent", wear.change_percent);
+      json.key("ci95").begin_array().value(wear.ci95_low).value(wear.ci95_high).end_array();
+      json.field("p_value", wear.p_value).field("before", wear.before).field("after", wear.after);
+      json.end_object();
+    } else {
+      json.null();
+    }
+    out += json.end_object().take() + '\n';
+  }
+  json.begin_object().field("type", "summary").field("file", history.path);
+  json.field("experiments", history.rows.size()).field("damaged", history.damaged);
+  json.field("fingerprint", history.fingerprint).field("comparable", history.comparable);
+  return out + json.end_object().take() + '\n';
+}
+
+std::string csv(const History& history) {
+  std::string out;
+  for (const Cell& cell : cells(HistoryRow{})) {
+    out += (out.empty() ? "" : ",") + std::string(cell.name);
+  }
+  out += '\n';
+  for (const HistoryRow& row : history.rows) {
+    bool first = true;
+    for (const Cell& cell : cells(row)) {
+      if (!first) out += ',';
+      first = false;
+      out += cell.is_text ? cell.text : number_text(cell.number);
+    }
+    out += '\n';
+  }
+  return out;
+}
+
+std::string format(const char* pattern, auto... values) {
+  std::array<char, 256> line;
+  std::snprintf(line.data(), line.size(), pattern, values...);
+  return line.data();
+}
+
+std::string or_dash(double value, bool given, const char* pattern) {
+  return given && std::isfinite(value) ? format(pattern, value) : "-";
+}
+
+std::string table(const History& history) {
+  if (history.rows.empty()) return history.path + ": no experiment yet\n";
+  std::string out = format("%5s  %-20s  %-12s  %-11s  %-7s  %-9s  %8s  %7s  %6s  %5s  %4s  %s\n",
+                           "id", "time (UTC)", "outcome", "stop", "torque", "ratio", "mu_max",
+                           "std", "slip %", "Nm", "oil", "notes");
+  for (const HistoryRow& row : history.rows) {
+    const daemon::ExperimentResult& result = row.result;
+    const estimator::PeakEstimate& peak = result.peak;
+    const bool value = peak.kind == PeakKind::kValue;
+    const bool bound = peak.kind == PeakKind::kLowerBound;
+    std::string mu = or_dash(peak.mu_max, value || bound, "%.4f");
+    if (bound) mu.insert(0, ">");
+    std::string notes = notes_text(row.notes, ", ");
+    if (row.fingerprint != history.fingerprint) {
+      notes += notes.empty() ? "other configuration" : ", other configuration";
+    }
+    out += format("%5lld  %-20s  %-12s  %-11s  %-7s  %-9s  %8s  %7s  %6s  %5s  %4s  ",
+                  static_cast<long long>(row.id), utc(row.time_s).c_str(),
+                  lower(outcome_name(result.outcome)).c_str(),
+                  lower(stop_reason_name(result.stop_reason)).c_str(),
+                  lower(direction_name(result.direction)).c_str(),
+                  lower(end_stop_name(result.end_stop)).c_str(), mu.c_str(),
+                  or_dash(peak.mu_max_std, value, "%.4f").c_str(),
+                  or_dash(result.sigma_stop_percent, true, "%.2f").c_str(),
+                  or_dash(result.torque_Nm, true, "%.0f").c_str(),
+                  or_dash(result.oil_degC, true, "%.0f").c_str());
+    out += notes + '\n';
+  }
+  for (const Group& group : history.groups) {
+    const estimator::FusedFriction& fused = group.fused;
+    out += format(
+        "%s, %s: mu_max %.4f, std %.4f, 95 %% %.4f .. %.4f, from %d experiments that "
+        "scatter by %.1f %%",
+        lower(direction_name(group.direction)).c_str(),
+        lower(end_stop_name(group.end_stop)).c_str(), fused.mu_max, fused.mu_max_std,
+        fused.ci95_low, fused.ci95_high, fused.experiments, fused.repeatability_percent);
+    if (fused.drift_percent_std > 0.0) {
+      out += format("; drift %+.3f +- %.3f %% an experiment", fused.drift_percent,
+                    fused.drift_percent_std);
+    }
+    out += '\n';
+    const estimator::WearTest& wear = group.wear;
+    if (wear.judged) {
+      out += format("  the last %d against %d before: %+.1f %%, 95 %% %+.1f .. %+.1f, p %.2g: %s\n",
+                    wear.after, wear.before, wear.change_percent, wear.ci95_low, wear.ci95_high,
+                    wear.p_value, wear.found ? "WEAR" : "no wear");
+    }
+  }
+  if (history.comparable < history.rows.size()) {
+    out += format("%zu experiments under other configurations are not compared\n",
+                  history.rows.size() - history.comparable);
+  }
+  return out;
+}
+
+void run(const Options& options) {
+  if (options.json == "-" && options.csv == "-") {
+    throw Failure{kUsage, "history: only one of --json and --csv can be standard output"};
+  }
+  History history = read(options);
+  judge(history);
+  if (!options.json.empty()) write_file(options.json, json_lines(history));
+  if (!options.csv.empty()) write_file(options.csv, csv(history));
+  if (options.json != "-" && options.csv != "-") std::fputs(table(history).c_str(), stdout);
+}
+
+}  // namespace
+
+void add_history(CLI::App& app) {
+  CLI::App* command = app.add_subcommand(
+      "history", "The experiments that the daemon has kept, and what they say together");
+  auto options = std::make_shared<Options>();
+  command->add_option("file", options->file,
+                      "history.db or its folder (default: the configuration's state_dir, else " +
+                          std::string(kDefaultFolder) + ")");
+  command->add_option("--config", options->config, "BeltGrip's configuration, for its state_dir");
+  command->add_option("--json", options->json, "As JSON lines, '-': standard output");
+  command->add_option("--csv", options->csv, "The experiments as CSV, '-': standard output");
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace beltgrip::cli

@@ -1,0 +1,53 @@
+#include "tools/cli/log_table.h"
+
+#include <memory>
+#include <optional>
+
+#include "daemon/core/input_monitor.h"
+#include "tools/cli/exit_codes.h"
+#include "tools/cli/replay_run.h"
+
+namespace beltgrip::cli {
+
+diagnose::SignalTable read_log(const std::string& path, const daemon::Config& config) {
+  const auto timeline = open_timeline({path}, "", config.identifiers, further_interface(config));
+  daemon::InputMonitor inputs(config);
+  daemon::FaultSet faults;
+  diagnose::SignalTable table;
+  table.name = path;
+  std::optional<std::int64_t> first_ns;
+  std::uint64_t bad = 0;
+  can::StampedFrame frame;
+  while (timeline->next(frame)) {
+    if (!first_ns) first_ns = frame.t_ns;
+    daemon::RxFrame received{frame.t_ns, frame.frame};
+    received.bus = frame.bus;
+    const daemon::FrameUse use = inputs.on_frame(received, faults);
+    if (use == daemon::FrameUse::kBad) ++bad;
+    if (use != daemon::FrameUse::kTaken) continue;
+    for (const daemon::RoleBinding& binding : config.roles) {
+      const daemon::SignalHistory& history = inputs.history(binding.role);
+      if (history.empty()) continue;
+      diagnose::Channel& channel = table[binding.role];
+      const double t_s =
+          static_cast<double>(history.newest() - inputs.delay(binding.role) - *first_ns) * 1e-9;
+      if (!channel.empty() && t_s <= channel.t_s.back()) continue;
+      channel.t_s.push_back(t_s);
+      channel.value.push_back(history.newest_value());
+    }
+  }
+  const can::LogStats stats = timeline->stats();
+  const auto note = [&](std::uint64_t count, const char* what) {
+    if (count > 0) table.notes.push_back(path + ": " + std::to_string(count) + " " + what);
+  };
+  if (!first_ns) {
+    throw Failure{kBadInput,
+                  path + ": no readable frame in " + std::to_string(stats.lines) + " lines"};
+  }
+  note(stats.lines_bad, "unreadable lines");
+  note(bad, "frames whose length or kind is not the DBC's, ignored");
+  note(timeline->counters().clock_steps, "steps of the log's clock, taken out");
+  return table;
+}
+
+}  // namespace beltgrip::cli

@@ -1,0 +1,15 @@
+// A CAN log as a table of measured signals: the configuration's roles, SI, each channel with the
+// stamps of its own frames. Frames and values are taken by the daemon's rules. Tools only.
+#pragma once
+
+#include <string>
+
+#include "daemon/core/config.h"
+#include "tools/diagnose/signal_table.h"
+
+namespace beltgrip::cli {
+
+// Throws Failure: 66 the log is missing, 65 it has no frame that carries a role.
+diagnose::SignalTable read_log(const std::string& path, const daemon::Config& config);
+
+}  // namespace beltgrip::cli

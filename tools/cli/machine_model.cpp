@@ -1,0 +1,114 @@
+#include "tools/cli/machine_model.h"
+
+#include <algorithm>
+#include <map>
+
+#include "daemon/core/config_model.h"
+#include "tools/cli/exit_codes.h"
+
+namespace beltgrip::cli {
+namespace {
+
+using daemon::ModelFile;
+using estimator::MachineEffects;
+
+ModelFile read(const std::string& path, const estimator::VariatorParameters& variator) {
+  ModelFile base;
+  base.variator = variator;
+  try {
+    return daemon::read_model(path, base);
+  } catch (const daemon::ModelError& error) {
+    throw Failure{error.missing_file ? kNoInput : kConfiguration, error.text};
+  }
+}
+
+void take(const std::map<std::string, double>& section, const char* key, double& target,
+          double factor = 1.0) {
+  if (const auto found = section.find(key); found != section.end()) {
+    target = factor * found->second;
+  }
+}
+
+void shape(const MachineEffects& effects, sim::FrictionCurve& curve) {
+  if (effects.peak_slip_percent > 0.0) curve.peak_slip_percent = effects.peak_slip_percent;
+  curve.fall_per_percent = std::max(0.0, curve.fall_per_percent + effects.fall_per_percent);
+}
+
+}  // namespace
+
+void apply_model(const std::string& path, sim::Scenario& scenario) {
+  const bool low = scenario.variator.ratio < 1.0;
+  estimator::VariatorParameters variator;
+  variator.half_wedge_angle_rad = scenario.variator.half_wedge_angle_rad;
+  (low ? variator.ratio_low : variator.ratio_overdrive) = scenario.variator.ratio;
+  variator.secondary_piston_area_m2 = scenario.secondary_piston_area_m2;
+  variator.secondary_spring_force_N = scenario.secondary_spring_force_N;
+  const ModelFile model = read(path, variator);
+  scenario.variator.half_wedge_angle_rad = model.variator.half_wedge_angle_rad;
+  scenario.variator.ratio = low ? model.variator.ratio_low : model.variator.ratio_overdrive;
+  scenario.secondary_piston_area_m2 = model.variator.secondary_piston_area_m2;
+  scenario.secondary_spring_force_N = model.variator.secondary_spring_force_N;
+  take(model.driveline, "deformation_per_kN", scenario.variator.deformation_per_N, 1e-3);
+  sim::FrictionCurve& belt = scenario.belts.at(scenario.belt);
+  take(model.friction, "mu_max", belt.mu_max);
+  take(model.friction, low ? "peak_slip_low_percent" : "peak_slip_overdrive_percent",
+       belt.peak_slip_percent);
+  ModelFile rest = model;  // the deformation is the variator's
+  rest.driveline.erase("deformation_per_kN");
+  scenario.effects = daemon::whole_machine(rest);
+  scenario.effects.centrifugal_N_s2 += model.variator.secondary_centrifugal_N_s2;
+  shape(scenario.effects, belt);
+}
+
+void apply_model(const std::string& path, sim::VehicleScenario& scenario) {
+  sim::VariatorParameters& v = scenario.variator;
+  estimator::VariatorParameters variator;
+  variator.half_wedge_angle_rad = v.half_wedge_angle_rad;
+  variator.ratio_low = v.ratio_low;
+  variator.ratio_overdrive = v.ratio_overdrive;
+  variator.secondary_piston_area_m2 = v.secondary_piston_area_m2;
+  variator.secondary_spring_force_N = v.secondary_spring_force_N;
+  variator.secondary_centrifugal_N_s2 = v.secondary_centrifugal_N_s2;
+  variator.primary_inertia_kg_m2 = scenario.engine.inertia_kg_m2 + v.primary_inertia_kg_m2;
+  const double known_inertia = variator.primary_inertia_kg_m2;
+  const ModelFile model = read(path, variator);
+  v.half_wedge_angle_rad = model.variator.half_wedge_angle_rad;
+  v.ratio_low = model.variator.ratio_low;
+  v.ratio_overdrive = model.variator.ratio_overdrive;
+  v.secondary_piston_area_m2 = model.variator.secondary_piston_area_m2;
+  v.secondary_spring_force_N = model.variator.secondary_spring_force_N;
+  v.secondary_centrifugal_N_s2 = model.variator.secondary_centrifugal_N_s2;
+  v.primary_inertia_kg_m2 += model.variator.primary_inertia_kg_m2 - known_inertia;
+  take(model.driveline, "deformation_per_kN", v.deformation_per_N, 1e-3);
+  take(model.driveline, "loss_constant_Nm", v.primary_loss_Nm);
+  take(model.friction, "mu_max", scenario.belt.overdrive.mu_max);
+  take(model.friction, "peak_slip_overdrive_percent", scenario.belt.overdrive.peak_slip_percent);
+  take(model.friction, "peak_slip_low_percent", scenario.belt.low_peak_slip_percent);
+  ModelFile rest = model;  // these two are the variator's
+  rest.driveline.erase("deformation_per_kN");
+  rest.driveline.erase("loss_constant_Nm");
+  MachineEffects& effects = scenario.effects;
+  effects = daemon::whole_machine(rest);
+  shape(effects, scenario.belt.overdrive);
+
+  // A channel that leads makes all others lag.
+  sim::SensorParameters& sensors = scenario.sensors;
+  const double lead_s =
+      std::max({0.0, -effects.primary_speed_delay_s, -effects.secondary_speed_delay_s,
+                -effects.torque_delay_s, -effects.pressure_delay_s});
+  sensors.primary_speed.delay_s += lead_s + effects.primary_speed_delay_s;
+  sensors.secondary_speed.delay_s += lead_s + effects.secondary_speed_delay_s;
+  sensors.torque.delay_s += lead_s + effects.torque_delay_s;
+  sensors.pressure.delay_s += lead_s + effects.pressure_delay_s;
+  sensors.engine_speed.delay_s += lead_s;
+  sensors.primary_speed.gain += effects.primary_speed_scale;
+  sensors.secondary_speed.gain += effects.secondary_speed_scale;
+  sensors.torque.gain += effects.torque_gain;
+  sensors.torque.bias += effects.torque_bias_Nm;
+  sensors.pressure.gain += effects.pressure_gain;
+  sensors.pressure.bias += effects.pressure_offset_Pa;
+  sensors.primary_ripple += effects.primary_ripple;
+  sensors.secondary_ripple += effects.secondary_ripple;
+}
+
+}  // namespace beltgrip::cli

@@ -1,0 +1,37 @@
+// A report as one HTML file that needs nothing beside it: text, tables and plots, the library that
+// draws the plots included. Tools only.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace beltgrip::report {
+
+struct Series {
+  std::string name;
+  std::vector<double> x, y;  // same length; what is not finite is a gap
+  bool line = false;         // else points
+};
+
+struct Chart {
+  std::string title, x_label, y_label;
+  std::vector<Series> series;
+};
+
+class HtmlPage {
+ public:
+  explicit HtmlPage(std::string title);
+  void heading(std::string_view text);
+  void paragraph(std::string_view text);
+  void table(const std::vector<std::string>& header,
+             const std::vector<std::vector<std::string>>& rows);
+  void charts(const std::vector<Chart>& charts);  // side by side as far as there is room
+  std::string text() const;                       // the whole file
+
+ private:
+  std::string title_, body_, data_;
+  int count_ = 0;
+};
+
+}  // namespace beltgrip::report

@@ -1,0 +1,34 @@
+// What a model file says that friction depends on, as one factor. Simulation only.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/machine_effects.h"
+
+namespace beltgrip::sim {
+
+struct FrictionConditions {
+  double oil_degC = 80.0;
+  double omega_p_rad_s = 105.0;
+  double force_N = 3000.0;
+  double low_share = 0.0;  // 1 at the low end stop, 0 at overdrive
+  double time_s = 0.0;     // since the experiment began
+  double slip_energy_kJ = 0.0;
+  int experiment = 0;
+};
+
+inline double friction_factor(const estimator::MachineEffects& e, const FrictionConditions& now) {
+  constexpr double kLeast = 0.05;
+  const double wear = (now.experiment >= e.wear_from ? 1.0 - e.wear_step : 1.0) *
+                      (1.0 - e.wear_per_experiment * static_cast<double>(now.experiment));
+  return std::max(kLeast, wear) * std::max(kLeast, 1.0 + e.friction_per_K * (now.oil_degC - 80.0)) *
+         std::max(kLeast, 1.0 + e.friction_per_ln_speed *
+                                    std::log(std::max(now.omega_p_rad_s, 5.0) / 105.0)) *
+         std::pow(std::max(now.force_N, 1.0) / 3000.0, -e.friction_load_exponent) *
+         (1.0 + now.low_share * e.friction_low_relative) *
+         std::max(kLeast, 1.0 + e.warm_up_per_kJ * now.slip_energy_kJ) *
+         (1.0 + e.warm_up_per_start * -std::expm1(-std::max(now.time_s, 0.0) / 30.0));
+}
+
+}  // namespace beltgrip::sim
