@@ -33,12 +33,13 @@ const std::array kLayers{
     // The truth shares nothing with the estimator but the geometry.
     LayerRule{"tools/sim/",
               {"can_dbc/", "estimator/variator_geometry.h", "estimator/parameters.h",
-               "daemon/core/port.h", "daemon/core/mono_time.h", "tools/sim/"}},
+               "estimator/machine_effects.h", "daemon/core/port.h", "daemon/core/mono_time.h",
+               "tools/sim/"}},
     LayerRule{"tools/", {"can_dbc/", "estimator/", "daemon/", "tools/"}},
     LayerRule{"tests/", {"can_dbc/", "estimator/", "daemon/", "tools/", "tests/"}},
 };
-constexpr std::array<std::string_view, 6> kProjectFolders{"can_dbc/", "estimator/", "daemon/",
-                                                          "tools/",   "tests/",     "systemd/"};
+constexpr std::array<std::string_view, 5> kProjectFolders{"can_dbc/", "estimator/", "daemon/",
+                                                          "tools/", "tests/"};
 
 // What may stand at the top of the tree, beside names that begin with a dot.
 constexpr std::array<std::string_view, 9> kTop{"CMakeLists.txt", "LICENSE", "README.md",
@@ -71,11 +72,12 @@ const std::array kCodeRules{
              R"(\b(strtod|strtof|atof|stod|stof|sscanf|setlocale|istringstream)\b)",
              "numbers are read by std::from_chars: exact, and free of the locale"},
     TextRule{{"can_dbc/", "estimator/", "daemon/", "tools/"},
-             {"daemon/core/loop.cpp", "tools/cli/bus.cpp"},  // the daemon's; a trace's player
-             R"((\.|->)\s*send\s*\()",
+             // the daemon's, and the port that hands on to one of two buses; a trace's player
+             {"daemon/core/loop.cpp", "daemon/io/socket_port.cpp", "tools/cli/bus.cpp"},
+             R"((\.|->)\s*send(_on)?\s*\()",
              "one place sends"},
     TextRule{{"can_dbc/", "estimator/", "daemon/", "tools/"},
-             {"daemon/io/socket_port.cpp"},
+             {"daemon/io/can_socket.cpp"},
              R"(\b(sendmsg|sendmmsg|sendto|pwrite|writev)\s*\(|(^|[^\w>])::write\s*\()",
              "one place writes to a socket"},
     TextRule{

@@ -221,6 +221,12 @@ TEST(CandumpLog, ConsoleFormatWithoutTimesHasNoFrame) {
   EXPECT_EQ(log.stats.first_bad[0].reason, "no time stamp");
 }
 
+TEST(CandumpLog, ConsoleFormatWithRawLengthCodes) {
+  const Log log = read(" (1.000000)  can0  123  {B}  11 22 33 44 55 66 77 88\n");
+  ASSERT_EQ(log.frames.size(), 1U);
+  EXPECT_EQ(log.frames[0].text(), "can0 123#1122334455667788");
+}
+
 TEST(CandumpLog, ConsoleColoursAreLookedThrough) {
   const Log log = read("\x1B[31m (1.000000)  vcan0  \x1B[0m123   [2]  00 11\x1B[0m\n");
   ASSERT_EQ(log.frames.size(), 1U);
@@ -272,6 +278,28 @@ TEST(AscLog, DecimalRelativeAndNames) {
   EXPECT_EQ(log.frames[1].text(), "2 18FE6D00#07");
 }
 
+TEST(AscLog, RelativeTimesThatAddUpBeyondTheRangeAreBadLines) {
+  const Log log = read(
+      "base dec  timestamps relative\n"
+      "   5555555555 1  291             Rx   d 1 16\n"
+      "   5555555555 1  291             Rx   d 1 17\n"
+      "   0.5        1  291             Rx   d 1 18\n");
+  EXPECT_EQ(log.stats.lines_bad, 1U);
+  ASSERT_EQ(log.frames.size(), 2U);
+  EXPECT_EQ(log.frames[1].text(), "1 123#12");
+  EXPECT_EQ(log.frames[1].t_ns, 5'555'555'555'500'000'000);
+}
+
+TEST(AscLog, TheHeaderIsReadInAnyCase) {
+  const Log log = read(
+      "Base Dec  Timestamps Relative\n"
+      "   0.5 1  291             Rx   d 1 16\n"
+      "   0.5 1  291             Rx   d 1 17\n");
+  ASSERT_EQ(log.frames.size(), 2U);
+  EXPECT_EQ(log.frames[1].text(), "1 123#11");
+  EXPECT_EQ(log.frames[1].t_ns, 1'000'000'000);
+}
+
 TEST(AscLog, CanFd) {
   const Log log = read(
       "base hex  timestamps absolute\n"
@@ -305,6 +333,17 @@ TEST(AscLog, RemoteFrameOnACanFdChannelHasNoData) {
   wanted.remote = true;
   wanted.length = 2;
   EXPECT_EQ(log.frames[0].frame, wanted);
+}
+
+TEST(AscLog, ErrorFramesOnACanFdChannel) {
+  const Log log = read(
+      "base hex  timestamps absolute\n"
+      "   0.100000 CANFD   1 Rx ErrorFrame Not Acknowledge error\n"
+      "   0.200000 CANFD   2 ErrorFrame Rx   Not Acknowledge error\n");
+  EXPECT_EQ(log.stats.lines_bad, 0U);
+  ASSERT_EQ(log.frames.size(), 2U);
+  EXPECT_TRUE(log.frames[0].frame.error);
+  EXPECT_TRUE(log.frames[1].frame.error);
 }
 
 TEST(AscLog, BrokenLinesAreCounted) {
@@ -441,6 +480,29 @@ TEST(CsvLog, OtherHeaders) {
   EXPECT_EQ(cabana.frames[0].text(), "0 1D2#0011");
 }
 
+TEST(CsvLog, TimesOfDayDecimalBytesAndCommasInQuotes) {
+  const Log clock = read("Time,ID,Data\n10:20:30.5,0x123,00\n10:20:31:2500,0x123,01\n");
+  ASSERT_EQ(clock.frames.size(), 2U);
+  EXPECT_EQ(clock.frames[0].t_ns, 37'230'500'000'000);
+  EXPECT_EQ(clock.frames[1].t_ns, 37'231'250'000'000);
+  const Log decimals = read("time,id,d0,d1\n0.1,0x10,255,16\n0.2,0x10,7,1\n");
+  ASSERT_EQ(decimals.frames.size(), 2U);
+  EXPECT_EQ(decimals.frames[0].text(), "1 010#FF10");
+  const Log quoted = read("\"Time\",\"ID\",\"Data\"\n\"0.5\",\"0x123\",\"11,22\"\n");
+  ASSERT_EQ(quoted.frames.size(), 1U);
+  EXPECT_EQ(quoted.frames[0].text(), "1 123#1122");
+}
+
+TEST(CsvLog, HeaderBehindAPreamble) {
+  const Log log = read(
+      "Export of a measurement\n\n"
+      "Line,Abs Time(Sec),Er,Tx,Network,Arb ID,Remote,Xtd,B1,B2,B3\n"
+      "1,0.1,F,F,HS CAN,18FEF100,F,T,11,22,\n");
+  EXPECT_EQ(log.stats.lines_bad, 1U);
+  ASSERT_EQ(log.frames.size(), 1U);
+  EXPECT_EQ(log.frames[0].text(), "HS CAN 18FEF100#1122");
+}
+
 TEST(CsvLog, BrokenRowsAreCounted) {
   const Log log = read(
       "time,id,dlc,data\n"
@@ -506,6 +568,38 @@ TEST(AnyLog, ReportsPackedDataThatEndEarlyOrAreDamaged) {
   packed.resize(packed.size() / 2);
   const Log half_zstd = read(packed);
   EXPECT_EQ(half_zstd.stats.first_bad.back().reason, "zstd data ends before its end");
+}
+
+// The line in which packed data break off has lost its end: its frame would be a shorter one.
+TEST(AnyLog, TheLineInWhichPackedDataBreakOffIsNoFrame) {
+  const std::string text = many_lines(100'000);
+  const std::string whole = gzipped(text);
+  for (std::size_t bytes = whole.size() / 2; bytes < whole.size() / 2 + 64; ++bytes) {
+    const Log log = read(whole.substr(0, bytes));
+    ASSERT_EQ(log.stats.lines_bad, 1U);
+    EXPECT_EQ(log.stats.first_bad[0].line, log.frames.size() + 1);
+    EXPECT_EQ(log.frames.back().frame.length, log.frames.front().frame.length);
+  }
+}
+
+// Lines that end with CR alone look like one line; its first frame must not stand for all.
+TEST(AnyLog, ACarriageReturnInsideALineIsReported) {
+  const Log log = read("(1.0) can0 123#00\r(2.0) can0 123#01\r\n(3.0) can0 123#02\r\r\n");
+  ASSERT_EQ(log.frames.size(), 1U);
+  EXPECT_EQ(log.frames[0].text(), "can0 123#02");
+  ASSERT_EQ(log.stats.lines_bad, 1U);
+  EXPECT_EQ(log.stats.first_bad[0].line, 1U);
+}
+
+TEST(AnyLog, WhatFollowsGzipDataIsSaidUnlessItIsPadding) {
+  const std::string packed = gzipped("(1.0) can0 123#00\n");
+  const Log padded = read(packed + std::string(512, '\0') + packed);
+  EXPECT_EQ(padded.frames.size(), 2U);
+  EXPECT_EQ(padded.stats.lines_bad, 0U);
+  const Log more = read(packed + "(2.0) can0 123#00\n");
+  EXPECT_EQ(more.frames.size(), 1U);
+  ASSERT_EQ(more.stats.lines_bad, 1U);
+  EXPECT_EQ(more.stats.first_bad[0].reason, "gzip data with something else behind them");
 }
 
 TEST(AnyLog, LinesWithoutEndAreCountedOnceAndMemoryStaysFlat) {

@@ -10,6 +10,7 @@ namespace beltgrip::daemon {
 namespace {
 
 constexpr Duration kSample = 5 * kMillisecond;
+constexpr Duration kSearch = 40 * kSample;  // a ramp, at the most
 
 Config config(Trigger trigger = Trigger::kCoastDown) {
   Config c;
@@ -55,7 +56,7 @@ TEST_F(ArmingTest, SettlesAfterOneAndAHalfSecondsAndFindsARamp) {
   run(Arming::kSettle);
   EXPECT_TRUE(arming_.triggered());
   EXPECT_FALSE(arming_.settled());
-  run(kSample);
+  run(kSearch);
   EXPECT_TRUE(arming_.settled());
   EXPECT_TRUE(arming_.cleared());
   EXPECT_GT(arming_.ramp().rate_N_per_s, 100.0);
@@ -121,7 +122,7 @@ TEST_F(ArmingTest, AnInterruptionStartsTheSettlingAnew) {
   run(kSample, [](Arming::Now& n) { n.conditions.brake_pressed = true; });
   run(Arming::kSettle);
   EXPECT_FALSE(arming_.settled());
-  run(kSample);
+  run(kSearch);
   EXPECT_TRUE(arming_.settled());
 }
 

@@ -25,6 +25,14 @@ RampPoint point(double torque_Nm, double omega_p = 140.0) {
 
 Reaction reaction(double lag_s) { return {0.03, 0.05, 0.05, 0.01, 0.035, lag_s}; }
 
+Ramp choose_ramp(const RampPoint& p, const Reaction& r, const SlipLimits& limits,
+                 double rate_max_N_per_s) {
+  RampSearch search(p, r, limits, rate_max_N_per_s);
+  while (!search.step()) {
+  }
+  return search.ramp();
+}
+
 // Explicit Euler with a microsecond-fine step, states and events written out.
 Excursion integrated(const RampPoint& p, const Reaction& r, double rate, double reaction_s) {
   const double dt = 2e-6;

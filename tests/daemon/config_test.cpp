@@ -48,12 +48,14 @@ class ConfigTest : public testing::Test {
   static std::string vehicle(const std::string& what, const std::string& by) {
     return replaced(test::kVehicleToml, what, by);
   }
-  // Exactly one error, with this exit code, that names file, line, key and the words.
+  // Exactly one error (or the first of so many), with this exit code, that names file, line, key
+  // and the words.
   void expect_error(const std::string& toml, const std::string& key,
-                    const std::vector<std::string>& words, int line = 0, int exit_code = 78) {
+                    const std::vector<std::string>& words, int line = 0, int exit_code = 78,
+                    std::size_t errors = 1) {
     const ConfigResult result = load(toml);
     EXPECT_FALSE(result.config.has_value()) << key;
-    ASSERT_EQ(result.errors.size(), 1U)
+    ASSERT_EQ(result.errors.size(), errors)
         << key << (result.errors.size() > 1 ? result.errors[1].text : std::string());
     const ConfigError& error = result.errors[0];
     EXPECT_EQ(error.exit_code, exit_code);
@@ -201,22 +203,44 @@ TEST_F(ConfigTest, EveryChoice) {
       const ConfigResult result = load(toml('"' + std::string(choice) + '"'));
       // "command" needs roles that this vehicle does not have; CommandNeedsItsRoles says more.
       if (choice == "command") continue;
-      const bool there = choice != "confidence";
-      EXPECT_EQ(result.config.has_value(), there) << name << " " << choice;
-      if (there) {
-        EXPECT_EQ(option.choices[option.get_choice(*result.config)], choice);
-      } else {
-        ASSERT_EQ(result.errors.size(), 1U);
-        EXPECT_NE(result.errors[0].text.find("this version does not do yet"), std::string::npos);
-      }
+      ASSERT_TRUE(result.config.has_value()) << name << " " << choice;
+      EXPECT_EQ(option.choices[option.get_choice(*result.config)], choice);
     }
     expect_error(toml("\"nonsense\""), name, {"\"nonsense\"", std::string(option.choices[0])});
     expect_error(toml("1"), name, {std::string(option.choices[0])});
   }
 }
 
-TEST_F(ConfigTest, WhatIsNotThereYetSaysSo) {
-  expect_error(with("estimator", "model = \"wear.toml\""), "estimator.model", {"wear.toml"});
+TEST_F(ConfigTest, AModelFileIsReadWithTheConfiguration) {
+  directory_.write("loss.toml",
+                   "[variator]\nratio_low = 0.41\n[driveline]\nloss_constant_Nm = 0.5\n"
+                   "[effects.torque_loss]\nconstant_Nm = 1.5\n[effects.channel_skew]\n"
+                   "role = \"engine_torque\"\ndelay_s = 0.03\n");
+  const ConfigResult result = load(with("estimator", "model = \"loss.toml\""));
+  ASSERT_TRUE(result.config.has_value()) << result.errors[0].text;
+  EXPECT_EQ(result.config->variator.ratio_low, 0.41);
+  ASSERT_TRUE(result.config->corrected.has_value());
+  EXPECT_EQ(result.config->corrected->loss_constant_Nm, 2.0);
+  EXPECT_EQ(result.config->corrected->torque_delay_s, 0.03);
+  // One line that names the file, what is wrong there and what would be right.
+  const ConfigResult missing = load(with("estimator", "model = \"none.toml\""));
+  ASSERT_EQ(missing.errors.size(), 1U);
+  EXPECT_EQ(missing.exit_code(), 66);
+  EXPECT_NE(missing.errors[0].text.find("none.toml: found no readable file"), std::string::npos);
+  directory_.write("bad.toml", "[effects.wera]\nstep = 0.1\n");
+  const ConfigResult bad = load(with("estimator", "model = \"bad.toml\""));
+  ASSERT_EQ(bad.errors.size(), 1U);
+  EXPECT_EQ(bad.exit_code(), 78);
+  EXPECT_NE(bad.errors[0].text.find("bad.toml:1: effects.wera: found an unknown effect"),
+            std::string::npos)
+      << bad.errors[0].text;
+}
+
+TEST_F(ConfigTest, ThePapersMethodHasNoConfidence) {
+  std::string toml = with("experiment", "stop = \"confidence\"\nconfidence_width = 0.1");
+  EXPECT_TRUE(load(toml).config.has_value());
+  toml += "[estimator]\nmethod = \"paper\"\n";
+  expect_error(toml, "experiment.stop", {"\"peak\"", "paper"});
 }
 
 TEST_F(ConfigTest, CommandNeedsItsRolesATriggerAndTheInertia) {
@@ -334,6 +358,12 @@ TEST_F(ConfigTest, RolesAsTables) {
   expect_error(role("scale = nan"), key + ".scale", {"nan"}, 5);
   expect_error(role("offset = \"1\""), key + ".offset", {"finite number"}, 5);
   expect_error(role("period_ms = 0"), key + ".period_ms", {"0.5 to 10000"}, 5);
+  EXPECT_EQ(result.config->roles[0].delay_ms, 0.0);
+  const ConfigResult late = load(role("delay_ms = -3.5"));
+  ASSERT_TRUE(late.config.has_value());
+  EXPECT_EQ(late.config->roles[0].delay_ms, -3.5);
+  expect_error(role("delay_ms = 201"), key + ".delay_ms", {"-50 to 200"}, 5);
+  expect_error(role("delay_ms = \"3\""), key + ".delay_ms", {"-50 to 200"}, 5);
   expect_error(role("period = 10"), key + ".period", {"nearest is \"period_ms\""}, 5);
   expect_error(vehicle("\"Speeds.PrimarySpeed\"", "{ unit = \"rpm\" }"), key, {"without signal"},
                5);
@@ -369,6 +399,18 @@ TEST_F(ConfigTest, SignalsThatCannotBeDecoded) {
   EXPECT_NE(result.errors[0].text.find("factor"), std::string::npos) << result.errors[0].text;
 }
 
+TEST_F(ConfigTest, MessagesOfSeveralFramesAreNoInput) {
+  for (const char* length : {"9", "264", "1785"}) {
+    directory_.write("vehicle.dbc", replaced(test::kVehicleDbc, "BO_ 256 Speeds: 8",
+                                             "BO_ 256 Speeds: " + std::string(length)));
+    const ConfigResult result = load(test::kVehicleToml);
+    ASSERT_FALSE(result.errors.empty()) << length;
+    EXPECT_EQ(result.exit_code(), 78);
+    EXPECT_NE(result.errors[0].text.find("of " + std::string(length) + " bytes"),
+              std::string::npos);
+  }
+}
+
 TEST_F(ConfigTest, AMultiplexedRoleKnowsItsSelectors) {
   directory_.write("vehicle.dbc",
                    replaced(replaced(test::kVehicleDbc, "PrimarySpeed :", "PrimarySpeed m3 :"),
@@ -381,6 +423,34 @@ TEST_F(ConfigTest, AMultiplexedRoleKnowsItsSelectors) {
   EXPECT_EQ(result.config->roles[0].mux[0].ranges.front(),
             (std::pair<std::uint64_t, std::uint64_t>{3, 3}));
   EXPECT_TRUE(result.config->roles[1].mux.empty());
+}
+
+TEST_F(ConfigTest, J1939MessagesAreBoundWithTheirSources) {
+  // Two sources of one group in the DBC; and what the null address says.
+  const std::string j1939 =
+      "BA_DEF_ \"ProtocolType\" STRING ;\nBA_DEF_DEF_ \"ProtocolType\" \"J1939\";\n";
+  const std::string other =
+      "BO_ 2565865521 Other: 8 TCU\n SG_ X : 0|8@1+ (1,0) [0|0] \"\" ECU\n\n";  // 0x18F00431
+  const auto bound = [&](const char* id) {
+    std::string dbc = replaced(test::kVehicleDbc, "BO_ 256 ", "BO_ " + std::string(id) + " ");
+    dbc = replaced(dbc, "BO_ 256 10", "BO_ " + std::string(id) + " 10");
+    dbc = replaced(dbc, "BO_ 257 Pressure", other + "BO_ 257 Pressure");
+    directory_.write("vehicle.dbc", dbc + j1939);
+    const ConfigResult result = load(test::kVehicleToml);
+    EXPECT_TRUE(result.config.has_value());
+    return result.config ? result.config->roles[0].sources : std::bitset<256>();
+  };
+  const auto own = bound("2565865472");  // 0x18F00400
+  EXPECT_EQ(own.count(), 255U);
+  EXPECT_FALSE(own[0x31]);
+  const auto any = bound("2565865726");  // 0x18F004FE
+  EXPECT_EQ(any.count(), 255U);
+  EXPECT_FALSE(any[0x31]);
+  directory_.write("vehicle.dbc", test::kVehicleDbc);
+  const ConfigResult plain = load(test::kVehicleToml);
+  for (const RoleBinding& role : plain.config->roles) {
+    EXPECT_TRUE(role.sources.none());
+  }
 }
 
 TEST_F(ConfigTest, DbcFiles) {
@@ -580,6 +650,160 @@ TEST_F(ConfigTest, DefaultsOfTheInterface) {
   EXPECT_EQ(config.estimator.method, estimator::Method::kRobust);
   EXPECT_EQ(config.trigger, Trigger::kCoastDown);
   EXPECT_EQ(config.control, Control::kObserve);
+}
+
+// The pressure from diagnostics instead of a message.
+std::string with_uds(const std::string& uds, const std::string& rest = ", unit = \"kPa\"") {
+  std::string toml = test::kVehicleToml;
+  const std::string what = "\"Pressure.SecondaryPressure\"";
+  return toml.replace(toml.find(what), what.size(), "{ uds = " + uds + rest + " }");
+}
+constexpr const char* kUds =
+    "{ request = 0x7E1, response = 0x7E9, did = 0x1101, start = 7, length = 16, "
+    "byte_order = \"big\", scale = 0.5, offset = -1.0 }";
+constexpr const char* kPoll = "diagnostics = \"poll\"\n";
+
+TEST_F(ConfigTest, ASignalFromDiagnostics) {
+  const ConfigResult result = load(with_uds(kUds, ", unit = \"kPa\", period_ms = 50"));
+  ASSERT_TRUE(result.config.has_value()) << result.errors.at(0).text;
+  EXPECT_EQ(result.config->diagnostics, Diagnostics::kListen);
+  const RoleBinding& pressure = result.config->roles[2];
+  ASSERT_TRUE(pressure.uds.has_value());
+  EXPECT_EQ(pressure.uds->request, (can::CanId{0x7E1, false}));
+  EXPECT_EQ(pressure.uds->response, (can::CanId{0x7E9, false}));
+  EXPECT_EQ(pressure.uds->identifier, 0x1101);
+  EXPECT_EQ(pressure.period_ms, 50.0);
+  EXPECT_EQ(pressure.factor, 1000.0);
+  const std::array<std::uint8_t, 2> data{0x01, 0x02};  // 258
+  EXPECT_EQ(pressure.codec.decode(data), 128.0);
+  // 29 bit; without the keys that have a default.
+  const ConfigResult extended = load(
+      with_uds("{ request = 0x18DA10F1, response = 0x18DAF110, did = 1, start = 0, length = 8, "
+               "byte_order = \"little\", signed = true }"));
+  ASSERT_TRUE(extended.config.has_value()) << extended.errors.at(0).text;
+  EXPECT_TRUE(extended.config->roles[2].uds->request.extended);
+  const std::array<std::uint8_t, 1> negative{0xFE};
+  EXPECT_EQ(extended.config->roles[2].codec.decode(negative), -2.0);
+}
+
+TEST_F(ConfigTest, SignalsFromDiagnosticsThatAreWrong) {
+  const auto uds = [](const std::string& what, const std::string& by) {
+    return with_uds(replaced(kUds, what, by));
+  };
+  const int line = line_of(test::kVehicleToml, "secondary_pressure");
+  const std::string key = "signals.secondary_pressure";
+  expect_error(uds("0x7E1", "0x20000000"), key + ".uds.request", {"29 bit"}, line);
+  expect_error(uds("0x7E1", "-1"), key + ".uds.request", {"-1"}, line);
+  expect_error(uds("0x7E1", "\"0x7E1\""), key + ".uds.request", {"identifier"}, line);
+  expect_error(uds("0x7E9", "0x7E1"), key + ".uds.response", {"request"}, line);
+  expect_error(uds("0x1101", "0x10000"), key + ".uds.did", {"0xFFFF"}, line);
+  expect_error(uds("length = 16", "length = 65"), key + ".uds.length", {"64"}, line);
+  expect_error(uds("length = 16", "length = 0"), key + ".uds.length", {"1"}, line);
+  expect_error(uds("start = 7", "start = -1"), key + ".uds.start", {"DBC"}, line);
+  expect_error(uds("start = 7", "start = 32735"), key + ".uds", {"fit"}, line);
+  expect_error(uds("\"big\"", "\"motorola\""), key + ".uds.byte_order", {"little"}, line);
+  expect_error(uds("scale = 0.5", "scale = 0"), key + ".uds.scale", {"0"}, line);
+  expect_error(uds("offset = -1.0", "offset = nan"), key + ".uds.offset", {"finite"}, line);
+  expect_error(uds("offset = -1.0", "signed = 1"), key + ".uds.signed", {"true"}, line);
+  expect_error(uds("did = ", "dit = "), key + ".uds.dit", {"did"}, line, 78, 2);
+  expect_error(uds("did = 0x1101, ", ""), key + ".uds", {"did"}, line);
+  expect_error(with_uds("0x1101"), key + ".uds", {"request"}, line);
+  expect_error(with_uds(kUds, ""), key, {"no unit", "pressure"}, line);
+  expect_error(with_uds(kUds, ", unit = \"Nm\""), key, {"torque"}, line);
+  expect_error(with_uds(kUds, ", unit = \"kPa\", scale = 2"), key + ".scale", {"inside"}, line);
+  expect_error(with_uds(kUds, ", unit = \"kPa\", signal = \"Pressure.SecondaryPressure\""), key,
+               {"both"}, line);
+  // Identifiers that mean something else.
+  expect_error(uds("0x7E9", "0x6A1"), key + ".uds.response", {"BeltGrip"}, line);
+  expect_error(uds("0x7E1", "0x100"), key + ".uds.request", {"Speeds"}, line, 78, 2);
+  expect_error(with("signals",
+                    "oil_temperature = { uds = { request = 0x7E2, response = 0x7E9, "
+                    "did = 2, start = 7, length = 8 }, unit = \"degC\" }\n"
+                    "primary_pressure = { uds = " +
+                        std::string(kUds) + ", unit = \"kPa\" }"),
+               "signals.oil_temperature.uds", {"primary_pressure"});
+}
+
+TEST_F(ConfigTest, PollingNeedsAPeriodAndAnEcu) {
+  const auto polled = [](std::string toml) { return toml.insert(toml.find("[signals]"), kPoll); };
+  expect_good(polled(with_uds(kUds, ", unit = \"kPa\", period_ms = 10")));
+  const std::string key = "signals.secondary_pressure";
+  expect_error(polled(with_uds(kUds)), key + ".period_ms", {"poll"});
+  expect_error(polled(with_uds(kUds, ", unit = \"kPa\", period_ms = 9")), key + ".period_ms",
+               {"10"});
+  for (const char* everyone : {"0x7DF", "0x18DB33F1"}) {
+    expect_error(
+        polled(with_uds(replaced(kUds, "0x7E1", everyone), ", unit = \"kPa\", period_ms = 50")),
+        key + ".uds.request", {"all ECUs"});
+  }
+  expect_error(vehicle("[signals]", "diagnostics = true\n[signals]"), "bus.diagnostics",
+               {"listen", "poll"});
+}
+
+TEST_F(ConfigTest, AFurtherBus) {
+  directory_.write("further.dbc",
+                   "VERSION \"\"\nBU_: X\nBO_ 256 Other: 8 X\n SG_ Torque : 0|16@1- (0.5,0) [0|0] "
+                   "\"Nm\" X\n");
+  const auto further = [](const std::string& bus, const std::string& role) {
+    const std::string toml = replaced(test::kVehicleToml, "\"0x12345678x.EngineTorque\"", role);
+    return replaced(replaced(toml, "inproc:test", "can0"), "[signals]", bus + "[signals]");
+  };
+  const std::string bus = "[bus.diag]\ninterface = \"can1\"\n";
+  const std::string dbc = "dbc = [\"further.dbc\"]\n";
+  // 0x100 of the one bus is not 0x100 of the other.
+  const ConfigResult result =
+      load(further(bus + dbc, "{ signal = \"Other.Torque\", bus = \"diag\" }"));
+  ASSERT_TRUE(result.config.has_value()) << result.errors.at(0).text;
+  ASSERT_TRUE(result.config->further_bus.has_value());
+  EXPECT_EQ(result.config->further_bus->interface, "can1");
+  EXPECT_EQ(result.config->roles[3].bus, 1);
+  EXPECT_EQ(result.config->roles[3].id, (can::CanId{0x100, false}));
+  EXPECT_EQ(result.config->roles[0].bus, 0);
+  // Without DBC files of its own it has those of [bus].
+  expect_good(further(bus, "{ signal = \"0x12345678x.EngineTorque\", bus = \"diag\" }"));
+
+  const std::string role = "{ signal = \"0x12345678x.EngineTorque\", bus = \"diag\" }";
+  expect_error(further(bus, "\"0x12345678x.EngineTorque\""), "bus.diag", {"no role"});
+  expect_error(further("", role), "signals.engine_torque.bus", {"[bus.NAME]"});
+  expect_error(further(bus, replaced(role, "\"diag\"", "\"dia\"")), "signals.engine_torque.bus",
+               {"diag"}, 0, 78, 1);
+  expect_error(further(bus, replaced(role, "\"diag\"", "1")), "signals.engine_torque.bus",
+               {"quotes"});
+  expect_error(further(bus + dbc, role), "signals.engine_torque", {"0x12345678x"});
+  expect_error(further("[bus.diag]\n", role), "bus.diag", {"interface"});
+  expect_error(further(replaced(bus, "can1", "can0"), role), "bus.diag.interface", {"can0"});
+  expect_error(further(replaced(bus, "can1", "a/b"), role), "bus.diag.interface", {"a/b"});
+  expect_error(further(replaced(bus, "can1", "inproc:x"), role), "bus.diag.interface",
+               {"SocketCAN"});
+  expect_error(further(bus + "dbs = []\n", role), "bus.diag.dbs", {"dbc"});
+  expect_error(further(bus + "[bus.more]\ninterface = \"can2\"\n", role), "bus.more", {"third"});
+  expect_error(further(bus + "dbc = [\"gone.dbc\"]\n", role), "bus.diag.dbc", {"gone.dbc"}, 0, 66);
+}
+
+TEST_F(ConfigTest, ProtectionOfAMessage) {
+  const ConfigResult result =
+      load(with("protection", "Flags = { counter = \"ExperimentActive\", counter_max = 2 }\n"));
+  ASSERT_TRUE(result.config.has_value()) << result.errors.at(0).text;
+  ASSERT_EQ(result.config->protections.size(), 1U);
+  EXPECT_EQ(result.config->protections[0].counter->maximum, 2U);
+  EXPECT_FALSE(result.config->protections[0].crc.has_value());
+}
+
+TEST_F(ConfigTest, MistakesInAProtection) {
+  const auto expect = [&](const std::string& line, const std::string& key,
+                          const std::vector<std::string>& words) {
+    expect_error(with("protection", line), "protection." + key, words);
+  };
+  expect("Fags = { counter = \"Permitted\" }", "Fags", {"that no DBC names", "\"Flags\""});
+  expect("Flags = 3", "Flags", {"found 3"});
+  expect("Flags = {}", "Flags", {"neither counter nor crc"});
+  expect("Flags = { counter = \"Nothing\" }", "Flags.counter", {"\"Nothing\"", "up to 8 bits"});
+  expect("Speeds = { counter = \"PrimarySpeed\" }", "Speeds.counter", {"up to 8 bits"});
+  expect("Flags = { counter = \"ExperimentActive\", counter_max = 4 }", "Flags.counter_max",
+         {"found 4", "from 1 to 3"});
+  expect("Flags = { counter = \"ExperimentActive\", data_id = 1 }", "Flags", {"no crc"});
+  expect("Flags = { counter = \"ExperimentActive\", max = 3 }", "Flags.max", {"an unknown key"});
+  expect("Flags = { crc = \"ExperimentActive\", data_id = 1 }", "Flags.crc", {"one byte"});
 }
 
 TEST_F(ConfigTest, TheShippedDefaultFileIsTheGeneratedOne) {

@@ -7,6 +7,8 @@
 #include <thread>
 #include <vector>
 
+#include "daemon/core/arming.h"
+
 namespace beltgrip::daemon {
 namespace {
 
@@ -39,10 +41,31 @@ TEST(EventSink, OneEventForEachChange) {
   EXPECT_EQ(bench.report(), std::vector<std::string>{"fault InputStale gone"});
 }
 
+TEST(EventSink, WhatAloneKeepsAnExperimentFromBeginning) {
+  Bench bench;
+  const auto after = [&](Duration duration, std::uint32_t inhibits) {
+    bench.now.t += duration;
+    bench.now.inhibits = inhibits;
+    return bench.report();
+  };
+  const std::uint32_t brake = inhibit_bit(Inhibit::kBrake), pedal = inhibit_bit(Inhibit::kPedal);
+  EXPECT_TRUE(after(kSecond, brake).empty());
+  EXPECT_TRUE(after(kSecond - 1, brake).empty());
+  EXPECT_EQ(after(1, brake), std::vector<std::string>{"no experiment: brake"});
+  EXPECT_TRUE(after(kSecond, brake).empty());
+  EXPECT_TRUE(after(kSecond, brake | pedal).empty());
+  EXPECT_TRUE(after(2 * kSecond, brake | pedal).empty());
+  EXPECT_TRUE(after(kSecond, inhibit_bit(Inhibit::kUnreachable)).empty());
+  EXPECT_EQ(after(kSecond, inhibit_bit(Inhibit::kUnreachable)),
+            std::vector<std::string>{"no experiment: unreachable"});
+  bench.now.in_experiment = true;
+  EXPECT_TRUE(after(5 * kSecond, inhibit_bit(Inhibit::kUnreachable)).empty());
+}
+
 TEST(EventSink, StopAndResult) {
   Bench bench;
   bench.now.macro_slip_stop = true;
-  bench.now.curve.stop = StopReason::kSlope;
+  bench.now.stop_reason = StopReason::kSlope;
   bench.now.curve.sigma_star_percent = 3.456;
   bench.now.curve.mu_star = 0.10451;
   EXPECT_EQ(bench.report(),
@@ -68,6 +91,7 @@ TEST(EventSink, StopAndResult) {
 TEST(EventSink, AnAbortNamesItsOwnReason) {
   Bench bench;
   bench.now.macro_slip_stop = true;
+  bench.now.stop_reason = StopReason::kInputs;
   bench.now.new_result = true;
   bench.now.result.outcome = Outcome::kAborted;
   bench.now.result.stop_reason = StopReason::kInputs;
@@ -105,6 +129,29 @@ TEST(SpscRing, ElementsCrossInOrder) {
     ++i;
   }
   producer.join();
+}
+
+TEST(LineBudget, TenLinesASecondAndWhatWasLeftOut) {
+  LineBudget budget;
+  int lines = 0;
+  unsigned more = 0;
+  for (int i = 0; i < 100; ++i) {
+    Event event;
+    event.t = 10 * kSecond + i * 5 * kMillisecond;
+    event.id = EventId::kFaultRaised;
+    lines += budget.take(event) ? 1 : 0;
+    more += budget.left_out(event.t);
+  }
+  EXPECT_EQ(lines, static_cast<int>(LineBudget::kMost));
+  Event stop;
+  stop.t = 10 * kSecond + 500 * kMillisecond;
+  stop.id = EventId::kStop;
+  EXPECT_TRUE(budget.take(stop));
+  Event later;
+  later.t = 12 * kSecond;
+  EXPECT_TRUE(budget.take(later));
+  more += budget.left_out(later.t);
+  EXPECT_EQ(more, 100U - LineBudget::kMost);
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ TEST(InprocBus, VirtualTimePassesOnlyWhileAllWait) {
   EXPECT_EQ(port->wait_until(InprocBus::kNever), Wake::kClosed);  // nobody is left to send
 }
 
-TEST(InprocBus, FramesReachAllOthersWithTheirInstant) {
+TEST(InprocBus, FramesReachAllWithTheirInstantAndTheirSenderAsEcho) {
   const auto bus = InprocBus::create(InprocBus::Clock::kVirtual);
   auto sender = bus->connect();
   std::array<std::vector<MonoTime>, 2> seen;
@@ -42,18 +42,28 @@ TEST(InprocBus, FramesReachAllOthersWithTheirInstant) {
         const std::size_t count = ports[i]->receive(batch);
         for (std::size_t k = 0; k < count; ++k) {
           EXPECT_EQ(batch[k].frame, numbered(static_cast<std::uint32_t>(seen[i].size())));
+          EXPECT_FALSE(batch[k].own_echo);
           seen[i].push_back(batch[k].t);
         }
       }
       ports[i].reset();
     });
   }
+  std::uint32_t echoes = 0;
+  const auto take_echoes = [&] {
+    std::array<RxFrame, 1> own;
+    while (sender->receive(own) == 1) {
+      EXPECT_TRUE(own[0].own_echo);
+      EXPECT_EQ(own[0].frame, numbered(echoes++));
+    }
+  };
   for (std::uint32_t i = 0; i < 100; ++i) {
+    take_echoes();
     sender->wait_until(MonoTime{i / 5} * kMillisecond);  // five at an instant
     EXPECT_EQ(sender->send(numbered(i)), SendResult::kSent);
   }
-  std::array<RxFrame, 1> own;
-  EXPECT_EQ(sender->receive(own), 0U);
+  take_echoes();
+  EXPECT_EQ(echoes, 100U);
   sender.reset();
   for (auto& thread : threads) thread.join();
   for (const auto& times : seen) {
@@ -71,6 +81,8 @@ TEST(InprocBus, AtTheSameInstantTheLaterConnectedRunsFirst) {
   auto second = bus->connect();
   std::thread sender([&] {
     for (std::uint32_t i = 1; i <= 50; ++i) {
+      std::array<RxFrame, 4> echoes;
+      second->receive(echoes);
       second->wait_until(MonoTime{i} * 5 * kMillisecond);
       second->send(numbered(i));
     }

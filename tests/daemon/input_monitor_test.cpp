@@ -105,6 +105,105 @@ TEST(InputMonitor, ExtendedIdentifiersAreFoundAmongMany) {
   }
 }
 
+// J1939's electronic engine controller 1 (group 0xF004): one signal, known from this source.
+Config one_group_signal(std::uint32_t dbc_source) {
+  Config config = one_signal(Role::kEngineSpeed,
+                             signal_def(8, can::ValueType::kUnsigned, 1.0, 0.0, 0.0, 250.0));
+  config.roles[0].id = {0x0CF00400 | dbc_source, true};
+  config.roles[0].sources.set();
+  return config;
+}
+
+struct GroupBench : Bench {
+  using Bench::Bench;
+  FrameUse from(std::uint32_t source, std::uint64_t raw, MonoTime t,
+                std::uint32_t id = 0x18F00400) {
+    can::CanFrame frame = raw_frame(raw);
+    frame.id = {id | source, true};
+    return monitor.on_frame(at(t, frame), faults);
+  }
+  double value() const { return monitor.history(Role::kEngineSpeed).newest_value(); }
+  bool has_value() const { return !monitor.history(Role::kEngineSpeed).empty(); }
+};
+
+TEST(InputMonitor, J1939FramesAreTakenByParameterGroup) {
+  GroupBench bench(one_group_signal(0xFE));
+  EXPECT_EQ(bench.from(0x00, 7, 1, 0x0CF00300), FrameUse::kForeign);  // another group
+  EXPECT_EQ(bench.from(0x00, 7, 1, 0x0DF00400), FrameUse::kForeign);  // another data page
+  EXPECT_FALSE(bench.has_value());
+  EXPECT_EQ(bench.from(0x31, 7, 2, 0x0CF00400), FrameUse::kTaken);
+  EXPECT_EQ(bench.value(), 7.0);
+  EXPECT_EQ(bench.from(0x31, 8, 3, 0x18F00400), FrameUse::kTaken);  // another priority
+  EXPECT_EQ(bench.value(), 8.0);
+}
+
+TEST(InputMonitor, J1939DestinationsDoNotCount) {
+  Config config = one_group_signal(0x03);
+  config.roles[0].id = {0x0C000003, true};  // TSC1, to address 0x00
+  GroupBench bench(config);
+  EXPECT_EQ(bench.from(0x03, 5, 1, 0x0C00FF00), FrameUse::kTaken);
+  EXPECT_EQ(bench.from(0x03, 5, 2, 0x0C01FF00), FrameUse::kForeign);
+}
+
+TEST(InputMonitor, J1939FollowsTheFirstSourceThatGivesAValueUntilItIsStale) {
+  GroupBench bench(one_group_signal(0xFE));
+  bench.from(0x0F, 0xFF, 0);  // not available
+  EXPECT_FALSE(bench.has_value());
+  bench.from(0x31, 10, 1 * kMillisecond);
+  bench.from(0x0F, 20, 2 * kMillisecond);
+  EXPECT_EQ(bench.value(), 10.0);
+  bench.monitor.update(100 * kMillisecond, bench.faults);
+  ASSERT_EQ(bench.monitor.quality(Role::kEngineSpeed), SignalQuality::kStale);
+  bench.from(0x0F, 0xFF, 101 * kMillisecond);  // not available: nothing to follow
+  EXPECT_EQ(bench.value(), 10.0);
+  bench.from(0x0F, 21, 102 * kMillisecond);
+  EXPECT_EQ(bench.value(), 21.0);
+  bench.from(0x31, 11, 103 * kMillisecond);  // back again: too late
+  EXPECT_EQ(bench.value(), 21.0);
+  double before = 0.0;  // nothing of the former source is left
+  EXPECT_FALSE(
+      bench.monitor.history(Role::kEngineSpeed).value_at(50 * kMillisecond, kMillisecond, before));
+}
+
+TEST(InputMonitor, J1939SourceOfTheDbcComesBeforeOthers) {
+  GroupBench bench(one_group_signal(0x00));
+  bench.from(0x31, 10, 1 * kMillisecond);
+  EXPECT_EQ(bench.value(), 10.0);  // any source will do while it is the only one
+  bench.from(0x00, 20, 2 * kMillisecond);
+  bench.from(0x31, 11, 3 * kMillisecond);
+  EXPECT_EQ(bench.value(), 20.0);
+}
+
+TEST(InputMonitor, J1939SourceThatIsNotFollowedCausesNoFaults) {
+  GroupBench bench(one_group_signal(0xFE));
+  bench.from(0x31, 10, 1 * kMillisecond);
+  bench.from(0x0F, 0xFF, 2 * kMillisecond);
+  can::CanFrame shorter = raw_frame(1, 4);
+  shorter.id = {0x18F0040F, true};
+  EXPECT_EQ(bench.monitor.on_frame(at(3 * kMillisecond, shorter), bench.faults),
+            FrameUse::kForeign);
+  EXPECT_EQ(bench.faults.bits(), 0U);
+  bench.from(0x31, 0xFF, 4 * kMillisecond);
+  EXPECT_TRUE(bench.faults.has(Fault::kInputRange));
+}
+
+TEST(InputMonitor, J1939SourcesOfAnotherMessageAreNotThisOnes) {
+  Config config = one_group_signal(0x00);
+  config.roles[0].sources.reset(0x31);
+  config.roles.push_back(config.roles[0]);
+  config.roles[1].role = Role::kVehicleSpeed;
+  config.roles[1].id = {0x0CF00431, true};
+  config.roles[1].sources.reset();
+  config.roles[1].sources.set(0x31);
+  GroupBench bench(config);
+  bench.from(0x31, 10, 1);
+  EXPECT_FALSE(bench.has_value());
+  EXPECT_EQ(bench.monitor.history(Role::kVehicleSpeed).newest_value(), 10.0);
+  bench.from(0x05, 20, 2);
+  EXPECT_EQ(bench.value(), 20.0);
+  EXPECT_EQ(bench.monitor.history(Role::kVehicleSpeed).newest_value(), 10.0);
+}
+
 TEST(InputMonitor, FdLengthsAreThoseOfTheWire) {
   for (std::uint32_t length = 1; length <= 64; ++length) {
     Config config =

@@ -10,6 +10,7 @@
 
 #include "daemon/core/event.h"
 #include "daemon/core/loop.h"
+#include "daemon/core/observation.h"
 #include "daemon/core/pipeline.h"
 #include "daemon/io/inproc_bus.h"
 #include "tests/daemon/test_vehicle.h"
@@ -21,21 +22,26 @@ namespace {
 // Keeps the last result; allocates on the first report where it is told to.
 class Sink final : public SampleSink {
  public:
-  explicit Sink(bool allocates) : allocates_(allocates), events_(ring) {}
+  Sink(const Pipeline& pipeline, bool allocates)
+      : allocates_(allocates), events_(ring), observations_(pipeline, meters, slot_) {}
   void on_report(const SampleReport& report) noexcept override {
     events_.on_report(report);
+    observations_.on_report(report);
     if (report.new_result) result = report.result;
     samples += 1;
     if (allocates_) planted_ = std::make_unique<int>(1);
     allocates_ = false;
   }
   EventRing ring;
+  LoopMeters meters;
   ExperimentResult result;
   std::size_t samples = 0;
 
  private:
   bool allocates_;
   EventSink events_;
+  LatestSlot<Observation> slot_;
+  ObservationSink observations_;
   std::unique_ptr<int> planted_;
 };
 
@@ -51,7 +57,7 @@ Observed run_guarded(const Config& config, const std::vector<can::StampedFrame>&
   const std::unique_ptr<Port> port = bus->connect();
   std::unique_ptr<Port> feeder = bus->connect();
   Pipeline pipeline(config);
-  Sink sink(planted);
+  Sink sink(pipeline, planted);
   std::thread vehicle([&] {
     for (const can::StampedFrame& each : frames) {
       while (feeder->now() < each.t_ns) {
@@ -65,10 +71,12 @@ Observed run_guarded(const Config& config, const std::vector<can::StampedFrame>&
     feeder.reset();
   });
   Observed observed;
+  const auto record = std::make_unique<RecordRings>();
+  RecordTap tap(*record);
   {
     const test::AllocGuard guard;
     run_loop(*port, pipeline, config.estimator.sample_rate_hz, estimator::StopReason::kShutdown,
-             &sink);
+             &sink, &sink.meters, &tap);
     observed.allocations = test::AllocGuard::allocations();
     observed.frees = test::AllocGuard::frees();
     observed.first_size = test::AllocGuard::first_size();
@@ -122,6 +130,37 @@ TEST(NoAlloc, ARunWithEverythingWrong) {
   const Observed observed = run_guarded(test::vehicle_config(), frames);
   EXPECT_EQ(observed.result.outcome, Outcome::kAborted);
   EXPECT_EQ(observed.allocations, 0U) << "first " << observed.first_size << " bytes";
+}
+
+// The pressure in diagnostic answers, every tenth of them a long one, and polled for.
+TEST(NoAlloc, ARunWithDiagnostics) {
+  std::string toml = test::kVehicleToml;
+  const std::string role = "\"Pressure.SecondaryPressure\"";
+  toml.replace(toml.find(role), role.size(),
+               "{ uds = { request = 0x7E1, response = 0x7E9, did = 0x1101, start = 7, length = 16, "
+               "scale = 0.001 }, unit = \"bar\", period_ms = 20 }");
+  toml.insert(toml.find("[signals]"), "diagnostics = \"poll\"\n");
+  std::vector<can::StampedFrame> frames;
+  std::size_t count = 0;
+  for (const can::StampedFrame& each : test::drive_frames({})) {
+    frames.push_back(each);
+    can::CanFrame& frame = frames.back().frame;
+    if (frame.id != can::CanId{0x101, false}) continue;
+    const auto high = frame.data[0], low = frame.data[1];
+    const bool is_long = count++ % 10 == 9;
+    frame.id = {0x7E9, false};
+    frame.length = 8;
+    frame.data = is_long ? decltype(frame.data){0x10, 0x09, 0x62, 0x11, 0x01, high, low, 0}
+                         : decltype(frame.data){0x05, 0x62, 0x11, 0x01, high, low, 0xAA, 0xAA};
+    if (!is_long) continue;
+    frames.push_back(frames.back());
+    frames.back().frame.data = {0x21, 1, 2, 3, 0xAA, 0xAA, 0xAA, 0xAA};
+  }
+  ASSERT_GT(count, 100U);
+  const Observed observed = run_guarded(test::vehicle_config(toml), frames);
+  EXPECT_EQ(observed.result.outcome, Outcome::kCompleted);
+  EXPECT_EQ(observed.allocations, 0U) << "first " << observed.first_size << " bytes";
+  EXPECT_EQ(observed.frees, 0U);
 }
 
 TEST(NoAlloc, APlantedAllocationIsSeen) {

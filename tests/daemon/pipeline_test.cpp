@@ -10,6 +10,7 @@
 #include <set>
 
 #include "can_dbc/e2e.h"
+#include "daemon/core/history_link.h"
 #include "daemon/core/own_frames.h"
 #include "tests/daemon/frame_player.h"
 #include "tests/daemon/test_vehicle.h"
@@ -71,7 +72,8 @@ TEST(Pipeline, AnExperimentIsCompletedAndPublishedAtOnce) {
   EXPECT_GT(result.sigma_stop_percent, 1.0);
   EXPECT_LT(result.sigma_stop_percent, 10.0);
 
-  // In the sample of the decision the flag leaves, and within one more the result.
+  // In the sample of the decision the flag leaves; the result when the evaluation, a piece of it
+  // per sample, is done.
   const auto first_stop = std::find_if(run.sent.begin(), run.sent.end(), [](const auto& each) {
     return each.frame.id.value == 0x6A1 && value_of(each.frame, "MacroSlipStop") == 1.0;
   });
@@ -81,7 +83,7 @@ TEST(Pipeline, AnExperimentIsCompletedAndPublishedAtOnce) {
     return each.frame.id.value == 0x6A0 && value_of(each.frame, "MuMaxValid") == 1.0;
   });
   ASSERT_NE(first_value, run.sent.end());
-  EXPECT_LE(first_value->t - result.end, 5 * kMillisecond);
+  EXPECT_LE(first_value->t - result.end, 250 * kMillisecond);
   EXPECT_NEAR(value_of(first_value->frame, "MuMax"), result.peak.mu_max, 0.6e-5);
   EXPECT_EQ(value_of(first_value->frame, "MuMaxKind"), 1.0);
   EXPECT_GE(value_of(first_value->frame, "MuMaxStd"), result.peak.mu_max_std);
@@ -121,6 +123,54 @@ TEST(Pipeline, MinimumClampForceFollowsTheTorque) {
     EXPECT_LT(force, wanted + 4.5);
   }
   EXPECT_GT(available, 5U);
+}
+
+// What all experiments say goes before what the last one says, from the first sample on; results go
+// the other way.
+TEST(Pipeline, MinimumClampForceRestsOnTheHistoryWhereThereIsOne) {
+  const Config config = test::vehicle_config();
+  HistoryRings rings;
+  estimator::LearnedFriction learned;
+  estimator::FusedFriction& drive = learned.groups[estimator::LearnedFriction::index(
+      estimator::Direction::kDrive, estimator::EndStop::kOverdrive)];
+  drive.known = true;
+  drive.mu_max = 0.0875;
+  learned.doubtful = learned.unwritten = true;
+  rings.learned.push(learned);
+  test::FramePlayer port(drive_frames({}));
+  test::ReportKeeper keeper;
+  Pipeline pipeline(config);
+  HistoryLink link(rings, pipeline, keeper);
+  run_loop(port, pipeline, config.estimator.sample_rate_hz, StopReason::kTraceEnd, &link);
+  Played run{port.sent, keeper.reports, keeper.results, pipeline.counters()};
+
+  std::size_t before = 0;
+  for (const auto& each : of_id(run, 0x6A0)) {
+    const double force = value_of(each.frame, "MinClampForce");
+    if (force == 8191 * 4.0) continue;
+    before += value_of(each.frame, "MuMaxKind") == 0.0;
+    const auto at = std::find_if(run.reports.begin(), run.reports.end(),
+                                 [&](const SampleReport& report) { return report.t >= each.t; });
+    ASSERT_NE(at, run.reports.end());
+    const double wanted = 1.3 * at->curve.torque_p_Nm * std::cos(11.0 * std::numbers::pi / 180.0) /
+                          (2.0 * 0.0784 * 0.0875);
+    EXPECT_GE(force, wanted);
+    EXPECT_LT(force, wanted + 4.5);
+  }
+  EXPECT_GT(before, 50U);
+  const std::uint32_t faults = run.reports.back().faults;
+  EXPECT_NE(faults & fault_bit(Fault::kResultDoubtful), 0U);
+  EXPECT_NE(faults & fault_bit(Fault::kHistoryUnwritten), 0U);
+
+  ASSERT_EQ(run.results.size(), 1U);
+  ExperimentResult result;
+  ASSERT_TRUE(rings.results.pop(result));
+  EXPECT_EQ(result.peak.mu_max, run.results[0].peak.mu_max);
+  EXPECT_NEAR(result.omega_p_rad_s, run.reports.back().sample.omega_p_rad_s, 50.0);
+  EXPECT_GT(result.torque_Nm, 10.0);
+  EXPECT_GT(result.clamp_force_N, 500.0);
+  EXPECT_TRUE(std::isnan(result.oil_degC));  // no such signal
+  EXPECT_FALSE(rings.results.pop(result));
 }
 
 TEST(Pipeline, APeakOutOfReachIsALowerBoundAndNeverAValue) {

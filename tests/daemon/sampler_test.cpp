@@ -21,6 +21,8 @@ struct Channel {
   double period_ms;
   double phase_ms;
   Function truth;
+  double late_ms = 0.0;   // so long after the instant it tells of a frame is sent
+  double delay_ms = 0.0;  // as configured
 };
 
 // Signals as doubles, one message each.
@@ -37,6 +39,7 @@ Config config_of(const std::vector<Channel>& channels, bool periods_known) {
     binding.message_length = 8;
     binding.codec = can::SignalCodec(signal);
     if (periods_known) binding.period_ms = channel.period_ms;
+    binding.delay_ms = channel.delay_ms;
     config.roles.push_back(binding);
   }
   return config;
@@ -71,7 +74,8 @@ Errors sample_all(const std::vector<Channel>& channels, bool periods_known = tru
       if (measured_s > duration_s) break;
       if (lost && lost(channel.id, i)) continue;
       const double t_ms = measured_s * 1e3 + jitter_ms * uniform(random);
-      arrivals.push_back({std::llround(t_ms * 1e6), channel.id, channel.truth(measured_s)});
+      const double told_s = measured_s - 1e-3 * channel.late_ms;
+      arrivals.push_back({std::llround(t_ms * 1e6), channel.id, channel.truth(told_s)});
     }
   }
   std::stable_sort(arrivals.begin(), arrivals.end(),
@@ -174,6 +178,24 @@ TEST(Sampler, SkewBetweenTheSpeedsIsTakenOut) {
   }
 }
 
+TEST(Sampler, AConfiguredDelayIsTakenOut) {
+  for (const double late_ms : {-4.0, 3.0, 25.0}) {
+    auto late = channels(10, 10, 10);
+    late[1].late_ms = late_ms;
+    EXPECT_GT(sample_all(late).slip_percent, 0.02) << late_ms;
+    late[1].delay_ms = late_ms;
+    const Errors errors = sample_all(late);
+    EXPECT_LT(errors.slip_percent, 1e-6) << late_ms;
+    EXPECT_EQ(errors.delay, (late_ms > 0.0 ? 10 + std::llround(late_ms) : 10) * kMillisecond);
+  }
+  // Beyond 50 ms in all the slope is followed.
+  auto late = channels(10, 10, 10);
+  late[2].late_ms = late[2].delay_ms = 70.0;
+  const Errors errors = sample_all(late);
+  EXPECT_EQ(errors.delay, 50 * kMillisecond);
+  EXPECT_LT(errors.pressure, 1.0);
+}
+
 TEST(Sampler, AFollowedSlopeDoesNotLag) {
   for (const double period : {50.0, 100.0}) {
     const Errors errors = sample_all(channels(10, period, 10), true, 1.0);
@@ -237,7 +259,7 @@ TEST(SignalHistory, KeepsItsOrder) {
   for (int i = 0; i < 1000; ++i) history.add(300 + i, i);
   EXPECT_TRUE(history.value_at(1299 - 60, kSecond, value));
   EXPECT_EQ(value, 939.0);
-  EXPECT_FALSE(history.value_at(1299 - 70, kSecond, value));
+  EXPECT_FALSE(history.value_at(1299 - 130, kSecond, value));
 }
 
 }  // namespace

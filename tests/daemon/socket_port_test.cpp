@@ -22,7 +22,13 @@ constexpr Duration kLimit = 20 * kSecond;
 class SocketPortTest : public test::Vcan {
  protected:
   std::unique_ptr<SocketPort> open(const std::vector<can::CanId>& identifiers, int stop_fd = -1) {
-    auto opened = SocketPort::open("vcan0", identifiers, stop_fd);
+    std::vector<WantedFrames> wanted;
+    for (const can::CanId id : identifiers) wanted.push_back({id, false});
+    return open_wanted(wanted, stop_fd);
+  }
+  std::unique_ptr<SocketPort> open_wanted(const std::vector<WantedFrames>& wanted,
+                                          int stop_fd = -1) {
+    auto opened = SocketPort::open("vcan0", wanted, stop_fd);
     if (const auto* error = std::get_if<BusError>(&opened)) {
       ADD_FAILURE() << error->text;
       return nullptr;
@@ -260,6 +266,23 @@ TEST_F(SocketPortTest, AFullQueueIsSaidAtOnce) {
   EXPECT_EQ(port->bus_state(), BusState::kActive);
 }
 
+TEST_F(SocketPortTest, AParameterGroupComesFromEverySourceWithEveryPriority) {
+  // EEC1 (0xF004, to all) and TSC1 (0x0000, to a destination).
+  const auto port = open_wanted({{{0x0CF004FE, true}, true}, {{0x0C0000FE, true}, true}});
+  ASSERT_NE(port, nullptr);
+  const BusSocket bus("vcan0");
+  bus.send(0x0CF00300 | CAN_EFF_FLAG, {9});  // another group
+  bus.send(0x0DF00400 | CAN_EFF_FLAG, {9});  // another data page
+  bus.send(0x0C010003 | CAN_EFF_FLAG, {9});
+  bus.send(0x0CF00400 | CAN_EFF_FLAG | CAN_RTR_FLAG, {});
+  bus.send(0x0CF00400 | CAN_EFF_FLAG, {1});
+  bus.send(0x18F00431 | CAN_EFF_FLAG, {2});
+  bus.send(0x0C00FF03 | CAN_EFF_FLAG, {3});
+  const auto frames = take(*port, 3);
+  ASSERT_EQ(frames.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(frames[i].frame.data[0], i + 1);
+}
+
 TEST_F(SocketPortTest, EveryKindIsSentButErrorFramesAndWhatIsTooLong) {
   const auto port = open({});
   ASSERT_NE(port, nullptr);
@@ -292,6 +315,72 @@ TEST_F(SocketPortTest, EveryKindIsSentButErrorFramesAndWhatIsTooLong) {
   frame = frame_of(0x123, {1});
   frame.length = 9;
   EXPECT_EQ(port->send(frame), SendResult::kFailed);
+}
+
+class TwoBuses : public SocketPortTest {
+ protected:
+  void SetUp() override {
+    SocketPortTest::SetUp();
+    add_interface("vcan1");
+    auto opened = SocketPort::open(
+        {{"vcan0", "bus.interface"}, {"vcan1", "bus.diag.interface"}},
+        {{{0x123, false}, false, 0}, {{0x123, false}, false, 1}, {{0x124, false}, false, 1}}, -1);
+    ASSERT_TRUE(std::holds_alternative<std::unique_ptr<SocketPort>>(opened));
+    port_ = std::move(std::get<std::unique_ptr<SocketPort>>(opened));
+  }
+  std::unique_ptr<SocketPort> port_;
+};
+
+TEST_F(TwoBuses, FramesComeInTheOrderOfTheirStampsEachWithItsBus) {
+  const BusSocket first("vcan0"), second("vcan1");
+  first.send(0x124, {99});  // wanted on the other only
+  for (std::uint8_t i = 0; i < 200; ++i) {
+    (i % 3 == 0 ? second : first).send(0x123, {i});
+  }
+  second.send(0x124, {200});
+  const auto frames = take(*port_, 201);
+  ASSERT_EQ(frames.size(), 201U);
+  MonoTime last = frames[0].t;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    EXPECT_EQ(frames[i].frame.data[0], i);
+    EXPECT_EQ(frames[i].bus, i % 3 == 0 || i == 200 ? 1 : 0) << i;
+    EXPECT_GE(frames[i].t, last);
+    last = frames[i].t;
+  }
+}
+
+TEST_F(TwoBuses, AFrameLeavesOnItsBus) {
+  const BusSocket first("vcan0"), second("vcan1");
+  EXPECT_EQ(port_->send_on(1, frame_of(0x124, {1})), SendResult::kSent);
+  EXPECT_EQ(port_->send_on(0, frame_of(0x123, {2})), SendResult::kSent);
+  EXPECT_EQ(port_->send_on(2, frame_of(0x123, {3})), SendResult::kDown);
+  auto seen = second.receive(test::kLimit);
+  ASSERT_TRUE(seen.has_value());
+  EXPECT_EQ(seen->frame.can_id, 0x124U);
+  seen = first.receive(test::kLimit);
+  ASSERT_TRUE(seen.has_value());
+  EXPECT_EQ(seen->frame.can_id, 0x123U);
+  const auto echoes = take(*port_, 2);
+  ASSERT_EQ(echoes.size(), 2U);
+  EXPECT_TRUE(echoes[0].own_echo && echoes[1].own_echo);
+}
+
+TEST_F(TwoBuses, OneGoesDownAndTheOtherGoesOn) {
+  ASSERT_NO_FATAL_FAILURE(ip({"link", "set", "vcan1", "down"}));
+  const MonoTime limit = port_->now() + kLimit;
+  std::array<RxFrame, 16> batch;
+  while (port_->bus_state_of(1) != BusState::kDown && port_->now() < limit) {
+    if (port_->wait_until(port_->now() + 5 * kMillisecond) == Wake::kFrames) port_->receive(batch);
+  }
+  EXPECT_EQ(port_->bus_state_of(1), BusState::kDown);
+  EXPECT_EQ(port_->bus_state_of(0), BusState::kActive);
+  const BusSocket first("vcan0");
+  first.send(0x123, {7});
+  EXPECT_EQ(take(*port_, 1).size(), 1U);
+  EXPECT_EQ(port_->send_on(1, frame_of(0x124, {1})), SendResult::kDown);
+  ASSERT_NO_FATAL_FAILURE(ip({"link", "set", "vcan1", "up"}));
+  EXPECT_EQ(port_->send_on(1, frame_of(0x124, {1})), SendResult::kSent);
+  EXPECT_EQ(port_->bus_state_of(1), BusState::kActive);
 }
 
 }  // namespace

@@ -228,5 +228,99 @@ TEST(TxGate, ConfiguredIdentifiersKeepTheirDataIds) {
   EXPECT_FALSE(gate.permits(frame_of(0x102, 0x6A2, 0)));
 }
 
+// --- requests for diagnostics ---------------------------------------------------------------
+
+can::CanFrame request_of(std::uint32_t id, std::vector<std::uint8_t> bytes) {
+  can::CanFrame frame;
+  frame.id = {id, id > can::kStandardIdMax};
+  frame.length = 8;
+  frame.data.fill(0);
+  std::fill_n(frame.data.begin(), 8, std::uint8_t{0xCC});
+  std::copy(bytes.begin(), bytes.end(), frame.data.begin());
+  return frame;
+}
+
+PollLimits two_identifiers() {
+  PollLimits limits;
+  limits.requests[0] = {0, {0x7E1, false}, 0x1101, 50 * kMillisecond};
+  limits.requests[1] = {1, {0x18DA10F1, true}, 0xF190, 100 * kMillisecond};
+  limits.size = 2;
+  return limits;
+}
+
+TEST(TxGatePoll, OnlyTheListedRequestOnItsBus) {
+  const auto permits = [](const can::CanFrame& frame, std::uint8_t bus) {
+    TxGate gate({}, Control::kCommand, kAnyRequest, two_identifiers());
+    return gate.permits(frame, bus, 0);
+  };
+  for (std::uint32_t id = 0; id <= can::kStandardIdMax; ++id) {
+    for (const std::uint8_t bus : {std::uint8_t{0}, std::uint8_t{1}}) {
+      const bool passed = permits(request_of(id, {0x03, 0x22, 0x11, 0x01}), bus);
+      ASSERT_EQ(passed, id == 0x7E1 && bus == 0) << id << " " << int{bus};
+    }
+  }
+  EXPECT_TRUE(permits(request_of(0x18DA10F1, {0x03, 0x22, 0xF1, 0x90}), 1));
+  EXPECT_FALSE(permits(request_of(0x18DA10F1, {0x03, 0x22, 0x11, 0x01}), 1));
+  EXPECT_FALSE(permits(request_of(0x18DA10F1, {0x03, 0x22, 0xF1, 0x90}), 0));
+  // Own frames stay on their bus.
+  EXPECT_TRUE(permits(frame_of(0x6A0, 0x6A0, 0), 0));
+  EXPECT_FALSE(permits(frame_of(0x6A0, 0x6A0, 0), 1));
+}
+
+// Every pair of the first two bytes, and every data identifier: no other service passes.
+TEST(TxGatePoll, OnlyReadingAndOnlyTheListedIdentifier) {
+  TxGate gate({}, Control::kCommand, kAnyRequest, two_identifiers());
+  MonoTime t = 0;
+  for (unsigned first = 0; first < 256; ++first) {
+    for (unsigned second = 0; second < 256; ++second) {
+      const bool listed = first == 0x03 && second == 0x22;
+      const auto frame = request_of(
+          0x7E1, {static_cast<std::uint8_t>(first), static_cast<std::uint8_t>(second), 0x11, 0x01});
+      ASSERT_EQ(gate.permits(frame, 0, t += kSecond), listed) << first << " " << second;
+    }
+  }
+  for (unsigned identifier = 0; identifier <= 0xFFFF; ++identifier) {
+    const auto frame = request_of(0x7E1, {0x03, 0x22, static_cast<std::uint8_t>(identifier >> 8),
+                                          static_cast<std::uint8_t>(identifier & 0xFF)});
+    ASSERT_EQ(gate.permits(frame, 0, t += kSecond), identifier == 0x1101) << identifier;
+  }
+  can::CanFrame odd = request_of(0x7E1, {0x03, 0x22, 0x11, 0x01});
+  for (std::uint8_t length = 0; length < 8; ++length) {
+    odd.length = length;
+    EXPECT_FALSE(gate.permits(odd, 0, t += kSecond));
+  }
+}
+
+TEST(TxGatePoll, NoneWithoutAllowance) {
+  TxGate gate({}, Control::kCommand, kAnyRequest);
+  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x03, 0x22, 0x11, 0x01}), 0, kSecond));
+  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x30, 0, 0}), 0, kSecond));
+}
+
+TEST(TxGatePoll, NoMoreOftenThanItsPeriod) {
+  const can::CanFrame request = request_of(0x7E1, {0x03, 0x22, 0x11, 0x01});
+  TxGate gate({}, Control::kObserve, {}, two_identifiers());
+  int passed = 0;
+  for (MonoTime t = 0; t < 10 * kSecond; t += kMillisecond) passed += gate.permits(request, 0, t);
+  EXPECT_GE(passed, 200);
+  EXPECT_LE(passed, 202);
+  // One that was late lets the next come on the grid, not earlier.
+  EXPECT_TRUE(gate.permits(request, 0, 20 * kSecond + 20 * kMillisecond));
+  EXPECT_FALSE(gate.permits(request, 0, 20 * kSecond + 40 * kMillisecond));
+  EXPECT_TRUE(gate.permits(request, 0, 20 * kSecond + 50 * kMillisecond));
+}
+
+TEST(TxGatePoll, OneFlowControlForARequest) {
+  TxGate gate({}, Control::kObserve, {}, two_identifiers());
+  const can::CanFrame flow = request_of(0x7E1, {0x30, 0, 0});
+  EXPECT_FALSE(gate.permits(flow, 0, 0));
+  EXPECT_TRUE(gate.permits(request_of(0x7E1, {0x03, 0x22, 0x11, 0x01}), 0, 0));
+  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x31, 0, 0}), 0, 1));  // wait
+  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x30, 1, 0}), 0, 1));
+  EXPECT_TRUE(gate.permits(flow, 0, 1));
+  EXPECT_FALSE(gate.permits(flow, 0, 2));
+  EXPECT_EQ(gate.refused(), 4U);
+}
+
 }  // namespace
 }  // namespace beltgrip::daemon

@@ -1,5 +1,6 @@
 // Writes one recording of the generator as CSV files, a configuration and the truth.
-//   generate DIRECTORY SEED [EFFECT.PARAMETER[@ROLE] SIZE]...   SIZE in units of the usual size
+//   generate DIRECTORY trial NUMBER                     that trial of the blind test
+//   generate DIRECTORY SEED [EFFECT.PARAMETER SIZE]...  SIZE in units of the usual size
 #include <charconv>
 #include <cstdio>
 #include <cstring>
@@ -7,12 +8,14 @@
 #include <fstream>
 #include <string>
 
+#include "tests/diagnose/blind_trial.h"
 #include "tests/diagnose/generator.h"
 
 int main(int argc, char** argv) {
   using namespace beltgrip::blind;
   if (argc < 3) {
-    std::fprintf(stderr, "usage: generate DIRECTORY SEED [EFFECT.PARAMETER SIZE]...\n");
+    std::fprintf(stderr,
+                 "usage: generate DIRECTORY trial NUMBER | SEED [EFFECT.PARAMETER SIZE]...\n");
     return 64;
   }
   const std::filesystem::path directory = argv[1];
@@ -23,19 +26,23 @@ int main(int argc, char** argv) {
     std::from_chars(text, text + std::strlen(text), value);
     return value;
   };
-  trial.seed = static_cast<std::uint64_t>(number(argv[2]));
-  Random random(trial.seed);
-  trial.machine = draw_machine(random);
-  trial.plan = draw_plan(random, trial.machine.setting, 12);
-  for (int i = 3; i + 1 < argc; i += 2) {
-    const std::string name = argv[i];
-    for (const Plantable& each : plantables()) {
-      if (each.effect + "." + each.parameter == name) {
-        trial.planted.push_back(draw_effect(random, each, number(argv[i + 1])));
+  if (std::strcmp(argv[2], "trial") == 0 && argc == 4) {
+    trial = draw_envelope(static_cast<std::uint64_t>(number(argv[3]))).trial;
+  } else {
+    trial.seed = static_cast<std::uint64_t>(number(argv[2]));
+    Random random(trial.seed);
+    trial.machine = draw_machine(random);
+    trial.plan = draw_plan(random, trial.machine.setting, 12);
+    for (int i = 3; i + 1 < argc; i += 2) {
+      const std::string name = argv[i];
+      for (const Plantable& each : plantables()) {
+        if (each.effect + "." + each.parameter == name) {
+          trial.planted.push_back(draw_effect(random, each, number(argv[i + 1])));
+        }
       }
-    }
-    for (const std::string& each : outside_causes()) {
-      if (each == name) trial.planted.push_back(draw_outside(random, each, number(argv[i + 1])));
+      for (const std::string& each : outside_causes()) {
+        if (each == name) trial.planted.push_back(draw_outside(random, each, number(argv[i + 1])));
+      }
     }
   }
   const Recording recording = record(trial);

@@ -40,7 +40,8 @@ TEST(ModelFile, ErrorsNameFileLineAndKey) {
   EXPECT_EQ(error_of("[effects.magic]\nsize = 1\n"),
             "m.toml:1: effects.magic: found an unknown effect");
   EXPECT_EQ(error_of("[effects.wear]\nsteps = 1\n"),
-            "m.toml:2: effects.wear.steps: found an unknown key");
+            "m.toml:2: effects.wear.steps: found an unknown key, expected one of step, at, "
+            "per_experiment");
   EXPECT_EQ(error_of("[variator]\nratio_low = \"a\"\n"),
             "m.toml:2: variator.ratio_low: found \"a\", expected a number");
   EXPECT_EQ(error_of("[variator]\nratio_low = 99.0\n"),

@@ -8,7 +8,6 @@
 namespace beltgrip::test {
 namespace {
 
-constexpr double kOmega_p = 105.0;
 constexpr int kSubsteps = 5;
 constexpr double kRate_hz = 200.0;
 
@@ -67,6 +66,7 @@ std::vector<TracePoint> rig_trace(const Rig& rig) {
   std::vector<TracePoint> out;
   for (int i = 0; i < static_cast<int>(rig.end_s * kRate_hz); ++i) {
     const double t_s = i / kRate_hz;
+    const double omega_p_rad_s = rig.omega_p_rad_s - rig.slowing_rad_s2 * t_s;
     const double force_N =
         std::max(200.0, begin_N - rig.ramp_N_per_s * std::max(0.0, t_s - rig.rest_s));
     // Secondary: the belt's torque against the load; slip is what its speed lacks, in both
@@ -74,15 +74,15 @@ std::vector<TracePoint> rig_trace(const Rig& rig) {
     for (int j = 0; j < kSubsteps; ++j) {
       const double belt_Nm = lever_m * force_N * rig.friction(slip);
       slip += 100.0 * (load_Nm - belt_Nm) / (ratio * rig.secondary_inertia_kg_m2) /
-              (kOmega_p * ratio) / (kRate_hz * kSubsteps);
+              (omega_p_rad_s * ratio) / (kRate_hz * kSubsteps);
       slip = std::max(0.0, slip);
     }
     const double mu = rig.friction(slip);
     const double measured_ratio = ratio * (1.0 - rig.deformation_percent_per_kN * 1e-5 * force_N) *
                                   (1.0 - sign * slip / 100.0);
     const double direction = t_s < rig.reversal_s ? sign : -sign;
-    const double omega_p = kOmega_p + 0.03 * rig.noise * noise();
-    const double omega_s = kOmega_p * measured_ratio + 0.05 * rig.noise * noise();
+    const double omega_p = omega_p_rad_s + 0.03 * rig.noise * noise();
+    const double omega_s = omega_p_rad_s * measured_ratio + 0.05 * rig.noise * noise();
     out.push_back(
         {.sample = {.t_ns = i * 5'000'000LL,
                     .omega_p_rad_s = rounded(omega_p, rig.speed_quantum_rad_s),

@@ -35,7 +35,9 @@ struct Rig {
   double deformation_percent_per_kN = 0.18;  // of the ratio
   double noise = 1.0;                        // times 0.2 Nm, 1 kPa, 0.03 and 0.05 rad/s
   double speed_quantum_rad_s = 0.0;
-  double reversal_s = 1e9;  // when the torque changes its sign
+  double reversal_s = 1e9;       // when the torque changes its sign
+  double omega_p_rad_s = 105.0;  // at the begin
+  double slowing_rad_s2 = 0.0;
   std::uint64_t seed = 1;
 };
 

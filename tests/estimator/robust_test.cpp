@@ -113,6 +113,7 @@ INSTANTIATE_TEST_SUITE_P(
                   .deformation_percent_per_kN = 0.1},
                  0.110,
                  3.0},
+        PeakCase{"begins_near_the_peak", {.mu_begin = 0.102}, 0.105, 2.5},
         PeakCase{"fast_ramp",
                  {.friction = test::round_peak(0.105, 2.5), .ramp_N_per_s = 150.0},
                  0.105,
@@ -122,6 +123,29 @@ INSTANTIATE_TEST_SUITE_P(
                  0.105,
                  2.5}),
     [](const auto& each) { return std::string(each.param.name); });
+
+TEST(Robust, NoiseOfSlipThatGrowsAsTheShaftsSlowIsNotThePeak) {
+  // A car that coasts down: from 150 to 30 rad/s the noise of slip grows fivefold. The ramp ends
+  // before the peak.
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U, 5U}) {
+    const Outcome out = run({.friction = test::round_peak(0.105, 3.0),
+                             .end_stop = EndStop::kLow,
+                             .torque_Nm = -80.0,
+                             .mu_begin = 0.05,
+                             .ramp_N_per_s = 170.0,
+                             .end_s = 60.0,
+                             .secondary_inertia_kg_m2 = 8.0,
+                             .deformation_percent_per_kN = 0.26,
+                             .noise = 3.0,
+                             .omega_p_rad_s = 150.0,
+                             .slowing_rad_s2 = 2.0,
+                             .seed = seed});
+    EXPECT_EQ(out.stop, StopReason::kNone) << seed;
+    EXPECT_LT(out.largest_mu, 0.1) << seed;
+    ASSERT_EQ(out.peak.kind, PeakKind::kLowerBound) << seed;
+    EXPECT_LE(out.peak.mu_max, out.largest_mu) << seed;
+  }
+}
 
 TEST(Robust, ARisingCurveGivesALowerBound) {
   // Rises for ever: at 4 % slip it carries 0.096 with a fifth of the slope of its secant.
@@ -190,6 +214,60 @@ TEST(Robust, SensorAccuracyWidensTheInterval) {
   EXPECT_GT(known_width, exact_width);
   // The bias alone: +-1.96 * 2 %.
   EXPECT_NEAR(known_width, std::hypot(exact_width, 2.0 * 1.96 * 0.02 * 0.105), 0.05 * known_width);
+}
+
+// The interval of mu_max before the peak: there once slip moves, narrowing, around the truth.
+TEST(Robust, ExpectsTheTopBeforeItComes) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Rig rig = {.friction = test::round_peak(0.105, 2.5), .seed = seed};
+    const auto estimator = estimator_for(rig);
+    double first_width = 0.0, last_width = 0.0;
+    for (const TracePoint& point : rig_trace(rig)) {
+      const CurveEstimate& now = estimator->step(point.sample);
+      if (point.slip_percent > 0.9 * 2.5 || now.stop != StopReason::kNone) break;
+      if (now.mu_max_expected <= 0.0) continue;
+      EXPECT_LT(now.mu_max_low, now.mu_max_expected);
+      EXPECT_GT(now.mu_max_high, now.mu_max_expected);
+      last_width = now.mu_max_high - now.mu_max_low;
+      if (first_width == 0.0) first_width = last_width;
+      if (point.slip_percent > 0.5 * 2.5) {
+        EXPECT_LT(now.mu_max_low, 0.105) << seed << ' ' << point.slip_percent;
+        EXPECT_GT(now.mu_max_high, 0.105) << seed << ' ' << point.slip_percent;
+      }
+    }
+    EXPECT_GT(first_width, 0.0);
+    EXPECT_LT(last_width, 0.5 * first_width) << seed;
+    EXPECT_LT(last_width, 0.15 * 0.105) << seed;
+  }
+}
+
+TEST(Robust, StopsWithConfidenceBeforeThePeak) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Rig rig = {.friction = test::round_peak(0.105, 2.5), .seed = seed};
+    EstimatorSettings settings = rig_settings(rig);
+    settings.stop_rule = StopRule::kConfidence;
+    settings.confidence_width = 0.15;
+    const auto estimator = make_slip_curve_estimator(settings, {}, {});
+    const Outcome out = run(*estimator, rig_trace(rig));
+    EXPECT_EQ(out.stop, StopReason::kConfidence) << seed;
+    EXPECT_LT(out.stop_slip_percent, 2.5) << seed;
+    ASSERT_EQ(out.peak.kind, PeakKind::kValue) << seed;
+    EXPECT_LT(out.peak.ci95_high - out.peak.ci95_low, 0.15 * out.peak.mu_max) << seed;
+    EXPECT_LT(out.peak.ci95_low, 0.105) << seed;
+    EXPECT_GT(out.peak.ci95_high, 0.105) << seed;
+    EXPECT_GT(out.peak.mu_max_std, 0.0) << seed;
+  }
+}
+
+TEST(Robust, ConfidenceNeverComesFromAKnownBiasOfTheSensors) {
+  // 5 % of torque alone is wider than what is asked for: the peak ends it.
+  EstimatorSettings settings = rig_settings(Rig{});
+  settings.stop_rule = StopRule::kConfidence;
+  settings.confidence_width = 0.15;
+  SensorAccuracies accuracies;
+  accuracies.torque.gain = 0.05;
+  const auto estimator = make_slip_curve_estimator(settings, {}, accuracies);
+  EXPECT_EQ(run(*estimator, rig_trace(Rig{})).stop, StopReason::kSlope);
 }
 
 TEST(Robust, TorqueThatTurnsRoundEndsTheExperiment) {

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "daemon/core/loop.h"
+#include "tests/loop/detectable.h"
 #include "tests/support/invariants.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/vehicle_port.h"
@@ -38,26 +39,76 @@ double largest(const std::vector<double>& bins, double begin_s, double end_s) {
   return out;
 }
 
+constexpr std::uint32_t kClamp = 0x6A2;
+
+// One sample (G4), and what rounding may add.
+constexpr double kReaction_s = 0.005 + 1e-6;
+
+void mix(std::uint64_t& hash, std::uint64_t value) { hash = (hash ^ value) * 1099511628211U; }
+
+bool has_fault(const sim::VehicleScenario& scenario, sim::FaultKind kind) {
+  return std::any_of(scenario.faults.begin(), scenario.faults.end(),
+                     [kind](const sim::FaultStep& fault) { return fault.kind == kind; });
+}
+
 // Passes reports on to the invariants and keeps what a test asks for.
 class Recorder final : public daemon::SampleSink {
  public:
-  Recorder(const sim::VehiclePort& port, Invariants& invariants, LoopRun& run)
-      : port_(port), invariants_(invariants), run_(run) {}
+  Recorder(const sim::VehiclePort& port, const daemon::Pipeline& pipeline,
+           const Detectable& detectable, const double& inactive_s, Invariants& invariants,
+           LoopRun& run)
+      : port_(port),
+        pipeline_(pipeline),
+        // A loop that is not run, or stamps that lie, cannot be held to the clock of the frames.
+        on_time_(!has_fault(port.vehicle().scenario(), sim::FaultKind::kLoopLate) &&
+                 !has_fault(port.vehicle().scenario(), sim::FaultKind::kStampBack)),
+        detectable_(detectable),
+        inactive_s_(inactive_s),
+        invariants_(invariants),
+        run_(run) {}
   void on_report(const daemon::SampleReport& report) noexcept override {
     if (port_.daemon_is_dead()) return;
     invariants_.on_report(report);
+    check_counters();
     if (report.new_result) run_.results.push_back(report.result);
-    if (asked_ && report.request_force_N <= 0.0) {
-      run_.request_end_s.push_back(static_cast<double>(report.t) * 1e-9);
-    }
-    asked_ = report.request_force_N > 0.0;
+    check_reaction(static_cast<double>(report.t) * 1e-9, report.request_force_N > 0.0);
     if (report.state == daemon::State::kSettling) run_.inhibits |= report.inhibits;
     run_.faults |= report.faults;
     run_.last_state = report.state;
   }
 
  private:
+  void check_counters() {
+    const daemon::PipelineCounters& now = pipeline_.counters();
+    if (now.frames < counters_.frames || now.frames_decoded < counters_.frames_decoded ||
+        now.frames_bad < counters_.frames_bad || now.samples < counters_.samples ||
+        now.frames_refused < counters_.frames_refused ||
+        now.frames_decoded + now.frames_bad > now.frames) {
+      run_.broken["I10"] = "a counter fell";
+    }
+    counters_ = now;
+  }
+
+  void check_reaction(double t_s, bool asks) {
+    if ((asks || asked_) && on_time_) {
+      if (const auto reason = detectable_.at(t_s)) {
+        if (asks && !asked_) run_.broken["I1"] = "a request begins in spite of: " + reason->what;
+        if (asks && t_s - reason->since_s > kReaction_s) {
+          run_.broken["G4"] = "a request stands " + std::to_string(t_s - reason->since_s) +
+                              " s after: " + reason->what;
+        }
+        if (!asks) run_.reactions.push_back({reason->what, reason->since_s, t_s, inactive_s_});
+      }
+    }
+    asked_ = asks;
+  }
+
   const sim::VehiclePort& port_;
+  const daemon::Pipeline& pipeline_;
+  daemon::PipelineCounters counters_;
+  bool on_time_;
+  const Detectable& detectable_;
+  const double& inactive_s_;
   Invariants& invariants_;
   LoopRun& run_;
   bool asked_ = false;
@@ -102,17 +153,29 @@ daemon::Config vehicle_config(const sim::VehicleScenario& scenario,
 LoopRun run_closed(const sim::VehicleScenario& scenario, const daemon::Config& config,
                    std::uint64_t seed) {
   LoopRun run;
+  double inactive_s = -1.0;  // the first inactive clamp frame since the last active one
   Invariants invariants(config);
-  sim::VehiclePort port(
-      scenario, seed,
-      {[&run](const sim::VehicleSimulation& vehicle) { note_slip(vehicle, run); },
-       [&invariants](std::int64_t, const can::CanFrame& frame) { invariants.on_sent(frame); }});
-  Recorder recorder(port, invariants, run);
+  sim::VehiclePort::Observers observers;
+  observers.on_step = [&run](const sim::VehicleSimulation& vehicle) { note_slip(vehicle, run); };
+  Detectable detectable(config);
+  observers.on_sent = [&](std::int64_t t_ns, const can::CanFrame& frame) {
+    const double t_s = static_cast<double>(t_ns) * 1e-9;
+    invariants.on_sent(frame);
+    detectable.on_sent(t_s, frame);
+    mix(run.sent_hash, static_cast<std::uint64_t>(t_ns));
+    for (const std::uint8_t byte : frame.payload()) mix(run.sent_hash, byte);
+    if (frame.id.value == kClamp && frame.data[2] == 0 && inactive_s < 0.0) inactive_s = t_s;
+    if (frame.id.value == kClamp && frame.data[2] == 1) inactive_s = -1.0;
+  };
+  observers.on_received = [&](const daemon::RxFrame& frame) { detectable.on_received(frame); };
+  observers.on_unsent = [&invariants] { invariants.on_unsent(); };
+  sim::VehiclePort port(scenario, seed, observers);
   daemon::Pipeline pipeline(config);
+  Recorder recorder(port, pipeline, detectable, inactive_s, invariants, run);
   daemon::run_loop(port, pipeline, config.estimator.sample_rate_hz,
                    estimator::StopReason::kShutdown, &recorder);
   port.run_alone();
-  run.broken = invariants.problems();
+  run.broken.insert(invariants.problems().begin(), invariants.problems().end());
   finish(port.vehicle(), run);
   return run;
 }

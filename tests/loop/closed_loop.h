@@ -17,16 +17,25 @@ namespace beltgrip::test {
 daemon::Config vehicle_config(const sim::VehicleScenario& scenario,
                               const std::map<std::string, std::string>& settings = {});
 
+// The end of a request for which the received frames gave a reason.
+struct Reaction {
+  std::string what;
+  double since_s = 0.0;    // from when on the frames showed it
+  double decided_s = 0.0;  // sample without a request
+  double wire_s = -1.0;    // RequestActive = 0 is on the bus; < 0: it never was
+};
+
 struct LoopRun {
   std::vector<daemon::ExperimentResult> results;
   std::vector<sim::RequestTruth> requests;
   std::map<std::string, std::string> broken;  // invariants
   std::vector<double> slip_bins;              // largest |slip| of each kBin_s
   std::vector<double> speed_bins;             // and slip speed, m/s
-  std::vector<double> request_end_s;          // sample at which each request ended
-  std::uint32_t inhibits = 0;                 // all that were ever set once a trigger was near
-  std::uint32_t faults = 0;                   // all that were ever set
+  std::vector<Reaction> reactions;
+  std::uint32_t inhibits = 0;  // all that were ever set once a trigger was near
+  std::uint32_t faults = 0;    // all that were ever set
   daemon::State last_state = daemon::State::kInhibited;
+  std::uint64_t sent_hash = 1469598103934665603U;  // of every byte on the bus and its instant
   int stalls = 0;
   double finite_until_s = -1.0;  // >= 0: the plant's state was no number from there on
 

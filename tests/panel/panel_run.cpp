@@ -14,19 +14,30 @@ estimator::EstimatorSettings settings_of(const Scenario& scenario, estimator::Me
 }
 
 Outcome run(const Scenario& scenario, const Trace& trace, const RunOptions& options) {
+  estimator::EstimatorSettings settings = settings_of(scenario, options.method);
+  if (options.confidence_width > 0.0) {
+    settings.stop_rule = estimator::StopRule::kConfidence;
+    settings.confidence_width = options.confidence_width;
+  }
   const auto estimator = estimator::make_slip_curve_estimator(
-      settings_of(scenario, options.method), scenario.variator,
+      settings, scenario.variator,
       options.with_accuracies ? scenario.accuracies : estimator::SensorAccuracies{});
   Outcome out;
   out.has_peak = trace.peak_reached;
   const double sample_s = 1.0 / scenario.sample_rate_hz;
   std::size_t last = 0;
   for (std::size_t i = 0; i < trace.samples.size(); ++i) {
-    const double t = static_cast<double>(i) * sample_s;
-    if (t > options.until_s) break;
     last = i;
     const estimator::CurveEstimate& now = estimator->step(trace.samples[i]);
     out.mu_reached = std::max(out.mu_reached, trace.mu[i]);
+    for (std::size_t k = 0; k < std::size(kForecastAt); ++k) {
+      if (!out.has_peak || out.expected[k].reached ||
+          trace.slip[i] < kForecastAt[k] * scenario.curve.slip_peak) {
+        continue;
+      }
+      out.expected[k] = {true, now.mu_max_expected, now.mu_max_low, now.mu_max_high,
+                         out.mu_reached};
+    }
     if (now.stop != estimator::StopReason::kNone) {
       out.stopped = true;
       out.reason = now.stop;
@@ -34,6 +45,7 @@ Outcome run(const Scenario& scenario, const Trace& trace, const RunOptions& opti
     }
   }
   out.stop_s = static_cast<double>(last) * sample_s;
+  out.slip_share_at_stop = trace.slip[last] / scenario.curve.slip_peak;
   out.peak_passed = trace.peak_reached && out.stop_s >= trace.t_peak_s;
   out.delay_s = out.stop_s - trace.t_peak_s;
   out.early = out.stopped && out.stop_s < trace.t_reached_s;
@@ -44,6 +56,7 @@ Outcome run(const Scenario& scenario, const Trace& trace, const RunOptions& opti
                               : out.slip_past_peak_percent;
   do {
     ++out.conclude_calls;
+    if (++last < trace.samples.size()) estimator->step(trace.samples[last]);
   } while (!estimator->conclude() && out.conclude_calls < 1000000);
   out.peak = estimator->peak();
   if (out.peak.kind == estimator::PeakKind::kValue) {

@@ -10,7 +10,10 @@ namespace beltgrip::panel {
 
 class Random {
  public:
-  explicit Random(std::uint64_t seed) : state_(seed * 0x9E3779B97F4A7C15ULL + 0x1234567ULL) {}
+  // The seed is mixed first: neighbouring seeds would else give the same numbers, one place on.
+  explicit Random(std::uint64_t seed) : state_(seed ^ 0x6A09E667F3BCC908ULL) {
+    state_ = bits() * 0xD1342543DE82EF95ULL + seed;
+  }
   std::uint64_t bits() {
     std::uint64_t z = (state_ += 0x9E3779B97F4A7C15ULL);
     z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;

@@ -82,6 +82,32 @@ class CurveTable {
   std::vector<double> values_;
 };
 
+// Root of a function that rises with its argument, near start: bracket, then regula falsi with
+// halving (Illinois).
+template <typename Function>
+double solve(double start, Function function) {
+  double low = start - 0.02, high = start + 0.02;
+  double f_low = function(low), f_high = function(high);
+  while (f_low > 0.0 && low > start - 50.0) f_low = function(low -= 4.0 * (high - low));
+  while (f_high < 0.0 && high < start + 50.0) f_high = function(high += 4.0 * (high - low));
+  for (int i = 0; i < 60 && high - low > 1e-10; ++i) {
+    const double middle =
+        i % 8 == 7 ? 0.5 * (low + high) : high - f_high * (high - low) / (f_high - f_low);
+    const double f = function(middle);
+    if (std::abs(f) < 1e-10) return middle;
+    if (f > 0.0) {
+      high = middle;
+      f_high = f;
+      f_low *= 0.5;
+    } else {
+      low = middle;
+      f_low = f;
+      f_high *= 0.5;
+    }
+  }
+  return 0.5 * (low + high);
+}
+
 struct Point {
   double radius, ratio, sign, cosine;
 };
@@ -227,6 +253,25 @@ void plant_sensor_errors(Scenario& s) {
   s.planted.omega_s.gain = s.accuracies.omega_s.gain * r.normal();
 }
 
+const char* disturbance_name(Disturbance disturbance) {
+  constexpr const char* kNames[kDisturbances] = {"none", "friction", "ratio", "torque", "rattle"};
+  return kNames[static_cast<int>(disturbance)];
+}
+
+void plant_disturbance(Scenario& s, Disturbance disturbance) {
+  Random r(s.seed ^ 0x66666666ULL);
+  s.disturbance = disturbance;
+  s.disturbed_from = r.between(0.75, 0.97);
+  const double sign = r.chance(0.5) ? -1.0 : 1.0;
+  constexpr double kLargest[kDisturbances] = {0.0, 0.08, 0.01, 0.1, 0.01};
+  const double largest = kLargest[static_cast<int>(disturbance)];
+  s.disturbed_by = sign * r.between(0.5 * largest, largest);
+}
+
+double mu_max_of(const Scenario& s) {
+  return s.curve.mu_max * (s.disturbance == Disturbance::kFriction ? 1.0 - s.disturbed_by : 1.0);
+}
+
 Trace simulate(const Scenario& s) {
   Random r(s.seed ^ 0x3C3C3C3C3CULL);
   const Point p = point_of(s);
@@ -268,6 +313,8 @@ Trace simulate(const Scenario& s) {
   double next_sample_s = 0.0;
   double end_s = 1e9;
   double slip = 0.0;
+  double disturbed_s = 1e9;  // since then
+  double friction = 1.0;
   for (std::int64_t k = 0; k < 400000; ++k) {
     const double t = static_cast<double>(k) * kStep_s;
     const double take_up = s.take_up_s > 0.0 ? std::min(1.0, 0.05 + t / s.take_up_s) : 1.0;
@@ -277,52 +324,54 @@ Trace simulate(const Scenario& s) {
     if (t > s.hold_s)
       command = std::max(force_floor, force_start - s.ramp_N_per_s * (t - s.hold_s));
     force += (command - force) * kStep_s / s.hydraulic_lag_s;
-    const double ratio = true_ratio(force);
+    const double disturbed = t > disturbed_s ? s.disturbed_by : 0.0;
+    constexpr double kDrift_s = 0.3;
+    const double drift = s.disturbance == Disturbance::kRatio
+                             ? disturbed * std::min(1.0, (t - disturbed_s) / kDrift_s)
+                             : 0.0;
+    const double ratio = true_ratio(force) * (1.0 - drift);
+    if (s.disturbance == Disturbance::kFriction) friction = 1.0 - disturbed;
     // Implicit step in the speed that gives way (rig: secondary, car: primary); the other one is
     // held (rig) or slow (car).
     const auto belt = [&](double wp, double ws) {
       slip = p.sign * 100.0 * (1.0 - ws / (ratio * wp));
-      return p.sign * 2.0 * table.value(slip) * force * p.radius / p.cosine;
+      return p.sign * 2.0 * friction * table.value(slip) * force * p.radius / p.cosine;
     };
     if (car) {
-      double low = omega_p - 20.0, high = omega_p + 20.0;
-      for (int i = 0; i < 48; ++i) {
-        const double middle = 0.5 * (low + high);
-        const double rest =
-            middle - omega_p - kStep_s / primary_inertia * (torque - belt(middle, omega_s));
-        (rest > 0.0 ? high : low) = middle;
-      }
-      omega_p = 0.5 * (low + high);
+      omega_p = solve(omega_p, [&](double trial) {
+        return trial - omega_p - kStep_s / primary_inertia * (torque - belt(trial, omega_s));
+      });
       belt_Nm = belt(omega_p, omega_s);
       const double road_Nm = 0.97 * s.torque_Nm * p.sign / p.ratio;
       omega_s += kStep_s / s.secondary_inertia * (belt_Nm / p.ratio - road_Nm) -
                  kStep_s * (s.overrun ? 0.5 : 0.0);
     } else {
-      double low = omega_s - 20.0, high = omega_s + 20.0;
-      for (int i = 0; i < 48; ++i) {
-        const double middle = 0.5 * (low + high);
-        const double rest =
-            middle - omega_s -
-            kStep_s / s.secondary_inertia * (belt(omega_p, middle) - torque) / p.ratio;
-        (rest > 0.0 ? high : low) = middle;
-      }
-      omega_s = 0.5 * (low + high);
+      omega_s = solve(omega_s, [&](double trial) {
+        return trial - omega_s -
+               kStep_s / s.secondary_inertia * (belt(omega_p, trial) - torque) / p.ratio;
+      });
       belt_Nm = belt(omega_p, omega_s);
     }
     const double centrifugal = s.variator.secondary_centrifugal_N_s2 * omega_s * omega_s;
     const double pressure = (force - s.variator.secondary_spring_force_N - centrifugal) /
                             s.variator.secondary_piston_area_m2;
     const double shaft_Nm = s.plant == PlantKind::kCarEngine ? torque : belt_Nm;
-    const double truth[4] = {omega_p, omega_s, pressure, shaft_Nm};
+    const double read_Nm =
+        shaft_Nm * (1.0 + (s.disturbance == Disturbance::kTorque ? disturbed : 0.0));
+    constexpr double kRattle_hz = 17.0;
+    const double rattle =
+        s.disturbance == Disturbance::kRattle ? disturbed * std::sin(kTurn * kRattle_hz * t) : 0.0;
+    const double truth[4] = {omega_p * (1.0 + rattle), omega_s * (1.0 - 0.5 * rattle), pressure,
+                             read_Nm};
     const double previous_t = k == 0 ? 0.0 : t - kStep_s;
     if (k == 0) std::copy(std::begin(truth), std::end(truth), std::begin(previous));
-    omega_p_sensor.advance(t, omega_p, previous_t, previous[0]);
-    omega_s_sensor.advance(t, omega_s, previous_t, previous[1]);
+    omega_p_sensor.advance(t, truth[0], previous_t, previous[0]);
+    omega_s_sensor.advance(t, truth[1], previous_t, previous[1]);
     pressure_sensor.advance(t, pressure, previous_t, previous[2]);
-    torque_sensor.advance(t, shaft_Nm, previous_t, previous[3]);
+    torque_sensor.advance(t, read_Nm, previous_t, previous[3]);
     std::copy(std::begin(truth), std::end(truth), std::begin(previous));
 
-    const double mu = table.value(slip);
+    const double mu = friction * table.value(slip);
     const double slip_star = p.sign * 100.0 * (1.0 - omega_s / omega_p / p.ratio);
     const double mu_star = std::abs(belt_Nm) * p.cosine / (2.0 * p.radius * force);
     if (!monotone && out.t_reached_s > 1e8 && slip >= slip_reached) out.t_reached_s = t;
@@ -331,6 +380,7 @@ Trace simulate(const Scenario& s) {
       out.t_peak_s = t;
       out.slip_star_peak = slip_star;
     }
+    if (disturbed_s > 1e8 && mu >= s.disturbed_from * curve.mu_max) disturbed_s = t;
     if (!monotone && slip >= slip_reached && mu >= 0.995 * curve.mu_max) {
       out.slip_star_leave = std::max(out.slip_star_leave, slip_star);
     }
@@ -344,9 +394,10 @@ Trace simulate(const Scenario& s) {
       out.mu_largest = std::max(out.mu_largest, mu);
       next_sample_s += sample_s;
     }
-    // The trace goes on to 30 % of slip; or two seconds on the floor where that ends it.
+    // The trace goes on to 30 % of slip; or five seconds on the floor, thirty beyond the peak.
     const bool on_floor = command <= force_floor && t > s.hold_s;
     if (end_s > 1e8 && on_floor) end_s = t + 5.0;
+    if (end_s < 1e8 && out.peak_reached) end_s = std::max(end_s, out.t_peak_s + 30.0);
     if (slip > 30.0 || t > end_s) break;
     if (car && (omega_p < 20.0 || omega_s < 5.0)) break;
   }

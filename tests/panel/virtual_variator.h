@@ -20,6 +20,11 @@ const char* noise_name(NoiseClass noise);
 enum class PlantKind { kRig, kRigHeavy, kCarSensor, kCarEngine };
 const char* plant_name(PlantKind plant);
 
+// What goes wrong for good in the middle of an experiment, once mu* has come to a share of its top.
+enum class Disturbance { kNone, kFriction, kRatio, kTorque, kRattle };
+inline constexpr int kDisturbances = 5;
+const char* disturbance_name(Disturbance disturbance);
+
 struct ChannelNoise {
   double white = 0.0;    // standard deviation of each frame's value
   double quantum = 0.0;  // then rounded to this
@@ -48,6 +53,10 @@ struct Scenario {
   double hydraulic_lag_s = 0.08;
   double sample_rate_hz = 200.0;
   ChannelNoise omega_p, omega_s, pressure, torque;
+  Disturbance disturbance = Disturbance::kNone;
+  double disturbed_from = 0.0;  // of mu_max
+  double disturbed_by = 0.0;    // relative: fall of friction, of the ratio, rise of the torque's
+                                // reading; amplitude of the speeds' readings (rattle)
   // Constant errors of the sensors, as drawn: measured = (1 + gain) true + bias.
   estimator::SensorAccuracies planted;
   // The widths they were drawn with: what the user configures.
@@ -75,6 +84,10 @@ Scenario paper_scenario(std::uint64_t seed, double mu_max);
 void set_noise(Scenario& scenario, NoiseClass noise);
 // Draws constant sensor errors with the widths that a careful user would configure.
 void plant_sensor_errors(Scenario& scenario);
+// Draws when and how much.
+void plant_disturbance(Scenario& scenario, Disturbance disturbance);
+// mu_max at the end: after a step of the friction.
+double mu_max_of(const Scenario& scenario);
 Trace simulate(const Scenario& scenario);
 std::string describe(const Scenario& scenario);
 

@@ -1,5 +1,6 @@
 #include "tests/support/invariants.h"
 
+#include <bit>
 #include <cmath>
 
 namespace beltgrip::test {
@@ -12,6 +13,7 @@ namespace {
 
 constexpr std::uint32_t kClamp = 0x6A2;
 constexpr double kFloorTolerance_N = 1e-6;
+constexpr std::size_t kLinesMost = 10;
 constexpr daemon::Duration kMs = daemon::kMillisecond;
 
 // With one of these no request may stand (I3).
@@ -49,11 +51,19 @@ void Invariants::broken(const std::string& which, const std::string& how) {
 
 void Invariants::on_sent(const can::CanFrame& frame) { frames_.push_back(frame); }
 
+void Invariants::on_unsent() {
+  unsent_ = true;
+  counters_.clear();
+  results_.reset();
+}
+
 void Invariants::on_report(const daemon::SampleReport& now) noexcept {
   check_report(now);
   check_request(now);
   check_frames(now);
+  check_events(now);
   frames_.clear();
+  unsent_ = false;
   before_ = now;
   any_ = true;
 }
@@ -62,6 +72,11 @@ void Invariants::check_report(const daemon::SampleReport& now) {
   // The end is reported at the present instant, which may be that of the last sample.
   const bool end = now.t == before_.t && now.state == State::kInhibited;
   if (any_ && now.t <= before_.t && !end) broken("I8", "the time of a sample does not increase");
+  const auto period = std::llround(1e9 / config_.estimator.sample_rate_hz);
+  if (any_ && now.t > before_.t && now.t - before_.t != period && now.state != State::kInhibited &&
+      (now.faults & fault_bit(Fault::kSampleLate)) == 0) {
+    broken("I8", "a sample is missing without being counted");
+  }
   for (const double value :
        {now.curve.mu_star, now.curve.sigma_star_percent, now.curve.friction_slope,
         now.curve.clamp_force_N, now.curve.torque_p_Nm, now.curve.slip_energy_J,
@@ -133,6 +148,91 @@ void Invariants::check_clamp(const can::CanFrame& frame, const daemon::SampleRep
   last_clamp_ = now.t;
 }
 
+// I9: a line for each change of state, of the stop flag, of a fault, and for each result; none
+// without; a stop and an end have a cause; at most ten a second.
+void Invariants::check_events(const daemon::SampleReport& now) {
+  events_.on_report(now);
+  int states = 0, stops = 0, results = 0, faults = 0;
+  daemon::Event event;
+  while (ring_.pop(event)) {
+    if (budget_.take(event)) lines_.push_back(now.t);
+    if (budget_.left_out(event.t) > 0) lines_.push_back(now.t);
+    switch (event.id) {
+      case daemon::EventId::kState:
+        ++states;
+        if (event.from != static_cast<std::uint8_t>(before_.state) ||
+            event.to != static_cast<std::uint8_t>(now.state)) {
+          broken("I9", "an event of another change of state");
+        }
+        break;
+      case daemon::EventId::kStop:
+        ++stops;
+        if (event.reason == estimator::StopReason::kNone) broken("I9", "a stop without a cause");
+        break;
+      case daemon::EventId::kResult:
+        ++results;
+        if (event.to == static_cast<std::uint8_t>(daemon::Outcome::kAborted) &&
+            event.reason == estimator::StopReason::kNone) {
+          broken("I9", "an end without a cause");
+        }
+        break;
+      case daemon::EventId::kFaultRaised:
+      case daemon::EventId::kFaultCleared:
+        ++faults;
+        break;
+      case daemon::EventId::kInhibit:
+        break;
+    }
+    if (daemon::text_of(event).empty()) broken("I9", "an event without words");
+  }
+  while (!lines_.empty() && now.t - lines_.front() >= daemon::kSecond) lines_.pop_front();
+  if (lines_.size() > kLinesMost) broken("I9", std::to_string(lines_.size()) + " lines a second");
+  const bool changed = any_ ? now.state != before_.state : now.state != State::kInhibited;
+  if (states != (changed ? 1 : 0)) broken("I9", "a change of state without its event");
+  if (stops != (now.macro_slip_stop && !(any_ && before_.macro_slip_stop) ? 1 : 0)) {
+    broken("I9", "a stop without its event");
+  }
+  if (results != (now.new_result ? 1 : 0)) broken("I9", "a result without its event");
+  if (faults != std::popcount(now.faults ^ (any_ ? before_.faults : 0U))) {
+    broken("I9", "a fault without its event");
+  }
+}
+
+// I13: what is published is the last result that was worth it, to the last digit of the frame.
+void Invariants::check_estimate(const can::CanFrame& frame, const daemon::SampleReport& now) {
+  const unsigned kind = frame.data[1] >> 4 & 3U;
+  const double mu = (frame.data[2] | (frame.data[3] & 0x7FU) << 8) * 1e-5;
+  const unsigned count = ((static_cast<unsigned>(frame.data[6]) << 8 | frame.data[5]) >> 3) & 0xFFU;
+  const bool has_value = now.result.peak.kind == estimator::PeakKind::kValue &&
+                         now.result.outcome == daemon::Outcome::kCompleted;
+  if (now.new_result && has_value &&
+      (kind != 1 || std::abs(mu - now.result.peak.mu_max) > 0.6e-5)) {
+    broken("I13", "the frame says " + text(mu) + ", the result " + text(now.result.peak.mu_max));
+  }
+  if (now.new_result && now.result.outcome == daemon::Outcome::kAborted &&
+      count != results_.value_or(count)) {
+    broken("I13", "an aborted experiment counts");
+  }
+  if (now.new_result && has_value && results_ && count != (*results_ + 1) % 256) {
+    broken("I13", "a result does not count");
+  }
+  if (!now.new_result && count != results_.value_or(count))
+    broken("I13", "a count without a result");
+  results_ = count;
+}
+
+void Invariants::check_status(const can::CanFrame& frame, const daemon::SampleReport& now) {
+  const unsigned state = frame.data[1] >> 4;
+  const unsigned outcome = frame.data[2] & 3U, reason = frame.data[2] >> 2 & 31U;
+  const auto faults =
+      static_cast<unsigned>(frame.data[3] | frame.data[4] << 8 | frame.data[5] << 16);
+  if (state != static_cast<unsigned>(now.state) ||
+      outcome != static_cast<unsigned>(now.result.outcome) ||
+      reason != static_cast<unsigned>(now.result.stop_reason) || faults != now.faults) {
+    broken("I13", "the status frame says something else than the report");
+  }
+}
+
 void Invariants::check_frames(const daemon::SampleReport& now) {
   bool slip_sent = false;
   for (const can::CanFrame& frame : frames_) {
@@ -151,6 +251,8 @@ void Invariants::check_frames(const daemon::SampleReport& now) {
     }
     counters_[id] = counter;
     if (id == kClamp) check_clamp(frame, now);
+    if (id == 0x6A0) check_estimate(frame, now);
+    if (id == 0x6A3) check_status(frame, now);
     if (id == 0x6A0) {
       const unsigned kind = frame.data[1] >> 4 & 3U;
       const bool valid = (frame.data[1] & 0x40U) != 0;
@@ -163,19 +265,20 @@ void Invariants::check_frames(const daemon::SampleReport& now) {
       if (((frame.data[1] & 0x10U) != 0) != now.macro_slip_stop) broken("I5", "another stop flag");
     }
   }
-  if (any_ && now.macro_slip_stop != before_.macro_slip_stop && !slip_sent &&
-      (now.faults & kGaps) == 0) {
+  if (unsent_) inactive_due_ = 0;
+  const bool gaps = unsent_ || (now.faults & kGaps) != 0;
+  if (any_ && now.macro_slip_stop != before_.macro_slip_stop && !slip_sent && !gaps) {
     broken("I5", "MacroSlipStop changed without a frame");
   }
   const bool ended = any_ && before_.request_force_N > 0.0 && !(now.request_force_N > 0.0);
-  if (ended && (now.faults & kGaps) == 0) {
+  if (ended && !gaps) {
     bool inactive = false;
     for (const can::CanFrame& frame : frames_) {
       inactive = inactive || (frame.id.value == kClamp && frame.data[2] == 0);
     }
     if (!inactive) broken("I3", "no inactive frame at once");
   }
-  if (inactive_due_ > 0 && now.t - request_ended_ > 60 * kMs && (now.faults & kGaps) == 0) {
+  if (inactive_due_ > 0 && now.t - request_ended_ > 60 * kMs && !gaps) {
     broken("I5", "fewer than five inactive frames");
   }
 }

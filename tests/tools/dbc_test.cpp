@@ -66,6 +66,38 @@ TEST_F(Dbc, DecodeWritesOneLineAFrame) {
                         "\n");
 }
 
+TEST_F(Dbc, DecodeGivesUtf8WhateverTheInterfaceIsCalled) {
+  const RunResult result = decode("(1.0) can\xB0 123#0A00\n(2.0) can\xC2\xB0 123#0A00\n");
+  std::istringstream stream(result.out);
+  for (std::string line; std::getline(stream, line);) {
+    EXPECT_EQ(json::parse(line)["iface"], "can\xC2\xB0");
+  }
+  EXPECT_EQ(lines(result.out), 2);
+}
+
+TEST_F(Dbc, ShowLosesNoNumberOfAnAttribute) {
+  place_.write("b.dbc", R"(BS_: BU_: A
+BO_ 1 M: 8 A
+BA_DEF_ BO_ "Whole" INT 0 0;
+BA_DEF_ BO_ "Negative" INT 0 0;
+BA_DEF_ BO_ "Half" FLOAT 0 0;
+BA_DEF_ BO_ "Huge" FLOAT 0 0;
+BA_DEF_ BO_ "Text" HEX 0 0;
+BA_ "Whole" BO_ 1 18446744073709551615;
+BA_ "Negative" BO_ 1 -9223372036854775807;
+BA_ "Half" BO_ 1 5e-1;
+BA_ "Huge" BO_ 1 1e999;
+BA_ "Text" BO_ 1 "nan";
+)");
+  const RunResult result = beltgrip({"dbc", "show", path("b.dbc"), "--json", "-"});
+  const json attributes = json::parse(result.out)["messages"][0]["attributes"];
+  EXPECT_EQ(attributes["Whole"], 18446744073709551615U);
+  EXPECT_EQ(attributes["Negative"], -9223372036854775807);
+  EXPECT_EQ(attributes["Half"], 0.5);
+  EXPECT_EQ(attributes["Huge"], "1e999");
+  EXPECT_EQ(attributes["Text"], "nan");
+}
+
 TEST_F(Dbc, DecodeWithRawValues) {
   const RunResult result = decode(
       "(1.0) can0 123#FFFFFFFFFFFFFFFF\n"
@@ -195,15 +227,39 @@ TEST_F(Dbc, ShowNamesTheFieldsOfTheInterface) {
   EXPECT_EQ(all["messages"][2]["extended"], true);
 }
 
+TEST_F(Dbc, DecodeTakesSeveralLogsOfAnyFormat) {
+  place_.write("b.asc", "base hex  timestamps absolute\n   0.500000 1  123 Rx d 2 0A 00\n");
+  place_.write("c.trc", ";$FILEVERSION=1.1\n     1)      1059.9  Rx         0123  2  14 00\n");
+  place_.write("d.csv", "Time,ID,Data\n0.5,0x123,1E00\n");
+  const RunResult all =
+      decode("(1.0) can0 123#0000\n", {path("b.asc"), path("c.trc"), path("d.csv")});
+  EXPECT_EQ(all.status, 0) << all.err;
+  std::vector<double> speeds;
+  std::istringstream stream(all.out);
+  for (std::string line; std::getline(stream, line);) {
+    speeds.push_back(json::parse(line)["signals"]["Speed"]);
+  }
+  EXPECT_EQ(speeds, (std::vector<double>{-3.0, 10 * 0.1 - 3, 20 * 0.1 - 3, 30 * 0.1 - 3}));
+  // One that cannot be used does not hide the others.
+  const RunResult missing = decode("(1.0) can0 123#0000\n", {path("none.log"), path("b.asc")});
+  EXPECT_EQ(missing.status, 66);
+  EXPECT_EQ(lines(missing.out), 2);
+}
+
 TEST_F(Dbc, ShowForReadersPrintsEveryMessageAndSignal) {
   const RunResult result = beltgrip({"dbc", "show", path("a.dbc")});
   EXPECT_EQ(result.status, 0);
   EXPECT_NE(result.out.find("0x123 Engine, 8 bytes, every 10 ms\n"), std::string::npos);
-  EXPECT_NE(result.out.find(
-                "  First: bit 8, 8 bits, little endian, factor 1, offset 0, selected by Page"),
+  EXPECT_NE(result.out.find("  First: bit 8, 8 bits, little endian, unsigned, factor 1, offset 0, "
+                            "selected by Page = 1\n"),
             std::string::npos)
       << result.out;
-  EXPECT_EQ(lines(result.out), 3 + 9);
+  EXPECT_NE(result.out.find("big endian, signed, factor 1, offset 0, from -8 to 7\n"
+                            "      -1 = reverse\n      1 = first\n"),
+            std::string::npos)
+      << result.out;
+  EXPECT_NE(result.out.find("\n      \"of the \"engine\"\"\n"), std::string::npos);
+  EXPECT_EQ(lines(result.out), 3 + 9 + 2 + 1);
 }
 
 TEST_F(Dbc, CheckPrintsEachProblemWithItsPlace) {
@@ -235,6 +291,7 @@ TEST_F(Dbc, CheckStrictRefusesWarnings) {
   const RunResult good = beltgrip({"dbc", "check", "--strict", path("good.dbc")});
   EXPECT_EQ(good.status, 0);
   EXPECT_EQ(good.out, "");
+  EXPECT_EQ(good.err, path("good.dbc") + ": no problems; 1 message, 0 signals read\n");
   EXPECT_EQ(beltgrip({"dbc", "check", path("missing.dbc")}).status, 66);
   EXPECT_EQ(beltgrip({"dbc", "check", path("")}).status, 66);  // a directory
   place_.write("none.dbc", "VERSION \"\"\n");

@@ -34,7 +34,7 @@ std::string program_path() { return BELTGRIP_PROGRAM; }
 
 RunResult beltgrip(std::vector<std::string> arguments, const std::string& stdin_file) {
   arguments.insert(arguments.begin(), program_path());
-  return run(arguments, Milliseconds{60000}, stdin_file);
+  return run(arguments, Milliseconds{240000}, stdin_file);
 }
 
 long lines(std::string_view text) { return std::count(text.begin(), text.end(), '\n'); }

@@ -106,7 +106,8 @@ TEST(LogTimeline, AClockSetBackOrFarAheadIsTakenOut) {
 TEST(ReplayPort, StampsAreTheClock) {
   LogTimeline log = timeline({{{10 * kMs, 1}, {12 * kMs, 2}, {15 * kMs, 3}, {21 * kMs, 4}}});
   std::vector<std::int64_t> sent;
-  ReplayPort port(log, [&](daemon::MonoTime t, const can::CanFrame&) { sent.push_back(t); });
+  ReplayPort port(
+      log, [&](daemon::MonoTime t, const can::CanFrame&, std::uint8_t) { sent.push_back(t); });
   EXPECT_EQ(port.now(), 10 * kMs);
   std::array<daemon::RxFrame, 2> two;
   EXPECT_EQ(port.receive(two), 1u);  // the first one has arrived
@@ -122,8 +123,14 @@ TEST(ReplayPort, StampsAreTheClock) {
   EXPECT_EQ(port.wait_until(20 * kMs), daemon::Wake::kDeadline);
   EXPECT_EQ(port.send({}), daemon::SendResult::kSent);
   EXPECT_EQ(port.wait_until(25 * kMs), daemon::Wake::kFrames);
+  EXPECT_EQ(port.now(), 20 * kMs);
+  EXPECT_EQ(port.receive(two), 1u);  // what was sent is confirmed first, at once
+  EXPECT_TRUE(two[0].own_echo);
+  EXPECT_EQ(two[0].t, 20 * kMs);
+  EXPECT_EQ(port.wait_until(25 * kMs), daemon::Wake::kFrames);
   EXPECT_EQ(port.now(), 21 * kMs);
   EXPECT_EQ(port.receive(two), 1u);
+  EXPECT_FALSE(two[0].own_echo);
   EXPECT_EQ(port.wait_until(25 * kMs), daemon::Wake::kClosed);
   EXPECT_EQ(port.now(), 21 * kMs);
   EXPECT_EQ(sent, (Stamps{20 * kMs}));

@@ -223,6 +223,65 @@ TEST_F(Replay, InterfaceSelects) {
   EXPECT_NE(none.err.find("can7"), std::string::npos);
 }
 
+// The rig's messages as parameter groups of J1939: 0xFF10 and so on, broadcast.
+struct Group {
+  const char* rig_id;  // in the log
+  const char* dbc_id;  // in the DBC, decimal
+  std::uint32_t group_id;
+};
+constexpr std::array<Group, 4> kGroups{{{"110", "272", 0x18FF1000},
+                                        {"120", "288", 0x18FF1100},
+                                        {"130", "304", 0x18FF1200},
+                                        {"300", "768", 0x18FF1300}}};
+
+std::string in_all(std::string text, const std::string& from, const std::string& to) {
+  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size()) {
+    text.replace(at, from.size(), to);
+  }
+  return text;
+}
+
+TEST_F(Replay, J1939MessagesMatchByParameterGroup) {
+  std::string dbc = place_->read("vehicle.dbc");
+  std::string log = trace();
+  for (const Group& group : kGroups) {
+    const std::string old_id = std::string("_ ") + group.dbc_id + " ";
+    dbc = in_all(dbc, old_id, "_ " + std::to_string(0x8000'0000U + group.group_id + 0xFE) + " ");
+    // Another source and priority than the DBC's.
+    std::array<char, 16> id{};
+    std::snprintf(id.data(), id.size(), " %08X#", (group.group_id ^ 0x14000000U) + 0x31);
+    log = in_all(log, " " + std::string(group.rig_id) + "#", id.data());
+  }
+  dbc +=
+      "BA_DEF_ \"ProtocolType\" STRING ;\nBA_DEF_DEF_ \"ProtocolType\" \"\";\n"
+      "BA_ \"ProtocolType\" \"J1939\";\n";
+  const auto j1939 = [&](const std::string& content) {
+    place_->write("groups.dbc", dbc);
+    place_->write("groups.toml",
+                  in_all(place_->read("beltgrip.toml"), "vehicle.dbc", "groups.dbc"));
+    place_->write("groups.log", content);
+    return beltgrip({"replay", path("groups.log"), "--config", path("groups.toml"), "--json", "-"});
+  };
+  const json truth = nameless(parse(json_of_trace())[0]);
+  const RunResult one = j1939(log);
+  ASSERT_EQ(one.status, 0) << one.err;
+  EXPECT_EQ(nameless(parse(one.out)[0]), truth);
+
+  // A second source of the speeds that says something else all the time.
+  std::string two;
+  std::istringstream stream(log);
+  for (std::string line; std::getline(stream, line);) {
+    two += line + '\n';
+    const std::size_t at = line.find("0CFF1031#");
+    if (at == std::string::npos) continue;
+    two += line.substr(0, at) + "0CFF1045#4000400000000000\n";
+  }
+  ASSERT_NE(two, log);
+  const RunResult both = j1939(two);
+  ASSERT_EQ(both.status, 0) << both.err;
+  EXPECT_EQ(nameless(parse(both.out)[0]), truth);
+}
+
 TEST_F(Replay, LogsThatCannotBeUsed) {
   EXPECT_EQ(beltgrip(with_config({path("missing.log")})).status, 66);
   EXPECT_EQ(beltgrip(with_config({path("")})).status, 66);  // a directory

@@ -126,12 +126,31 @@ TEST_F(OwnFrameView, TableGrowsWithTimeAndChange) {
   estimate(1020 * kMs, 0.1047);
   slip(1100 * kMs, 3.1, estimator::Phase::kPeak, true);  // after the stop no row of its own
   const std::string text = table_out_.text();
-  EXPECT_EQ(rows(text), 5) << text;
+  EXPECT_EQ(rows(text), 4) << text;  // an excited phase alone is no change to speak of
   EXPECT_NE(
-      text.find("1.020 s  -           macro slip   0.1000    3.00    0.0000  STOP  0.1047 std "
-                "0.0004"),
+      text.find(
+          "1.020 s  -                -  macro slip   0.1000    3.00    0.0000  STOP  0.1047 std "
+          "0.0004"),
       std::string::npos)
       << text;
+}
+
+TEST_F(OwnFrameView, TableShowsTheRequestAndIsQuietWhileNothingGoesOn) {
+  daemon::StatusValues idle;
+  idle.state = daemon::State::kIdle;
+  show(0, frames_.pack(idle, 0));
+  for (int i = 0; i < 9; ++i) slip(i * 200 * kMs, 2.0, estimator::Phase::kQuiet, false);
+  EXPECT_EQ(rows(table_out_.text()), 1);
+  daemon::ClampValues clamp;
+  clamp.request_active = true;
+  clamp.secondary_force_N = 2345.0;
+  show(1900 * kMs, frames_.pack(clamp, 0));
+  daemon::StatusValues ramping;
+  ramping.state = daemon::State::kRamping;
+  show(1901 * kMs, frames_.pack(ramping, 1));
+  slip(1910 * kMs, 2.0, estimator::Phase::kQuiet, false);
+  EXPECT_NE(table_out_.text().find("ramping       2345  quiet"), std::string::npos)
+      << table_out_.text();
 }
 
 TEST_F(OwnFrameView, WrongProtectionIsShownNotBelieved) {

@@ -8,6 +8,8 @@
 #include <csignal>
 #include <cstdio>
 #include <fstream>
+#include <memory>
+#include <sstream>
 
 #include "tests/vcan/rig.h"
 
@@ -109,6 +111,26 @@ TEST_P(StopSignal, EndsItWithTheInterfaceGone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(, StopSignal, testing::Values(SIGTERM, SIGINT));
+
+// The experiment that a stop request ends is in the history, beside that of the run before.
+TEST_F(Daemon, KeepsEveryExperimentInItsStateDirectory) {
+  const std::string config =
+      write_rig_config(folder(), "vcan0", "[daemon]\nstate_dir = \"state\"\n");
+  for (int runs = 1; runs <= 2; ++runs) {
+    const BusSocket bus("vcan0");
+    const Process player(canplayer(write_steady_log(folder()), "vcan0", true));
+    Process daemon({program("beltgripd"), "--config", config});
+    PublishedFrames published;
+    ASSERT_TRUE(listen(bus, published, in_experiment)) << daemon.err();
+    daemon.signal(SIGTERM);
+    ASSERT_EQ(daemon.wait(kStopLimit), 0) << daemon.err();
+    const RunResult history =
+        run({program("beltgrip"), "history", "--config", config, "--csv", "-"}, kLimit);
+    EXPECT_EQ(history.status, 0) << history.err;
+    EXPECT_EQ(std::count(history.out.begin(), history.out.end(), '\n'), runs + 1) << history.out;
+    EXPECT_NE(history.out.find("inconclusive,shutdown,"), std::string::npos) << history.out;
+  }
+}
 
 TEST_F(Daemon, MissingInterfaceIsOneLineAndStatus69) {
   const RunResult result = run(argv("vcan7"), kLimit);
@@ -297,6 +319,147 @@ TEST_F(Daemon, BusOffIsAFaultUntilFramesComeAgain) {
   EXPECT_TRUE(listen(bus, published, [](const PublishedFrames& seen) {
     return has_inputs(seen) && !fault(seen, "BusOff");
   }));
+}
+
+// --- SIGHUP and the log's level ---------------------------------------------------------------
+
+constexpr canid_t kOtherStatus = 0x6B3;
+
+bool sees(const BusSocket& bus, canid_t id) {
+  return bus.receive_until([&](const SeenFrame& seen) { return seen.frame.can_id == id; }, kLimit)
+      .has_value();
+}
+
+class Reloading : public Daemon {
+ protected:
+  // Writes it anew, with the status under this identifier.
+  void configure(canid_t status, const std::string& more = "") {
+    path_ = write_rig_config(folder(), "vcan0", more);
+    std::stringstream text;
+    text << std::ifstream(path_).rdbuf();
+    std::string toml = text.str();
+    char line[64];
+    std::snprintf(line, sizeof line, "identifiers = { status = 0x%X }\n", status);
+    toml.insert(toml.find("[signals]"), line);
+    if (by_signal_) {
+      toml.replace(toml.find("\"always\""), 8, "\"signal\"");
+      toml.insert(toml.find("[experiment]"),
+                  "experiment_active = { signal = \"RIG_State.ExperimentActive\", "
+                  "period_ms = 1000 }\n");
+    }
+    std::ofstream(path_) << toml;
+  }
+  std::vector<std::string> argv() const { return {program("beltgripd"), "--config", path_}; }
+
+  bool by_signal_ = false;
+  std::string path_;
+};
+
+TEST_F(Reloading, TakesWhatIsRightAndKeepsTheOldOtherwise) {
+  configure(0x6A3);
+  const BusSocket bus("vcan0");
+  Process daemon(argv());
+  ASSERT_TRUE(sees(bus, 0x6A3)) << daemon.err();
+  configure(kOtherStatus, "no_such_key = 1\n");
+  daemon.signal(SIGHUP);
+  ASSERT_TRUE(
+      daemon.wait_for_error("reload refused, the old configuration stays: " + path_, kLimit))
+      << daemon.err();
+  EXPECT_NE(daemon.err().find("no_such_key"), std::string::npos) << daemon.err();
+  const BusSocket after("vcan0");
+  EXPECT_TRUE(sees(after, 0x6A3));
+  configure(kOtherStatus);
+  daemon.signal(SIGHUP);
+  ASSERT_TRUE(daemon.wait_for_error("reload: " + path_ + " is in force", kLimit)) << daemon.err();
+  EXPECT_TRUE(sees(after, kOtherStatus));
+  const BusSocket later("vcan0");
+  later.receive_until(
+      [](const SeenFrame& seen) {
+        EXPECT_NE(seen.frame.can_id, 0x6A3U);
+        return seen.frame.can_id == kOtherStatus;
+      },
+      kLimit);
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(kStopLimit), 0) << daemon.err();
+}
+
+TEST_F(Reloading, WaitsForTheEndOfTheExperiment) {
+  constexpr canid_t kState = 0x300;  // its second byte: experiment_active
+  by_signal_ = true;
+  configure(0x6A3);
+  const std::string log = write_steady_log(folder());
+  std::ofstream(log, std::ios::app) << "(0.999000) vcan0 300#00010000\n";
+  const BusSocket bus("vcan0");
+  auto player = std::make_unique<Process>(canplayer(log, "vcan0", true));
+  Process daemon(argv());
+  ASSERT_TRUE(daemon.wait_for_error("-> Ramping", kLimit)) << daemon.err();
+  configure(kOtherStatus);
+  daemon.signal(SIGHUP);
+  ASSERT_TRUE(daemon.wait_for_error("waits for the end of the experiment", kLimit)) << daemon.err();
+  const BusSocket during("vcan0");
+  ASSERT_TRUE(sees(during, 0x6A3));
+  EXPECT_EQ(daemon.err().find("is in force"), std::string::npos) << daemon.err();
+  player.reset();
+  bus.send(kState, {0, 0, 0, 0});
+  EXPECT_TRUE(daemon.wait_for_error("is in force", kLimit)) << daemon.err();
+  EXPECT_LT(daemon.err().find("stop reason"), daemon.err().find("is in force")) << daemon.err();
+  const BusSocket after("vcan0");
+  EXPECT_TRUE(sees(after, kOtherStatus));
+}
+
+// A load of frames, and an identifier that changes each time: the last one is in force in the end,
+// nothing was missed for long, and the memory has not grown.
+TEST_F(Reloading, AHundredInARowUnderLoad) {
+  configure(0x6A3);
+  const Process load({"cangen", "vcan0", "-g", "2", "-I", "110", "-L", "8", "-D", "r"});
+  Process daemon(argv());
+  ASSERT_TRUE(daemon.wait_for_error("fault", kLimit)) << daemon.err();
+  const auto resident_kB = [&] {
+    std::ifstream status("/proc/" + std::to_string(daemon.pid()) + "/status");
+    for (std::string line; std::getline(status, line);) {
+      if (line.starts_with("VmRSS:")) return std::stol(line.substr(6));
+    }
+    return 0L;
+  };
+  long before_kB = 0;
+  for (int i = 1; i <= 100; ++i) {
+    configure(i % 2 == 1 ? kOtherStatus : canid_t{0x6A3});
+    daemon.signal(SIGHUP);
+    const auto in_force = [&](const Process& seen) {
+      int count = 0;
+      for (std::size_t at = 0; (at = seen.err().find("is in force", at)) != std::string::npos; ++at)
+        ++count;
+      return count >= i;
+    };
+    ASSERT_TRUE(daemon.wait_until(in_force, kLimit)) << daemon.err();
+    if (i == 20) before_kB = resident_kB();
+  }
+  EXPECT_LE(resident_kB(), before_kB + 2048);
+  // And in a burst, which is one or a few.
+  configure(kOtherStatus);
+  for (int i = 0; i < 100; ++i) daemon.signal(SIGHUP);
+  const BusSocket bus("vcan0");
+  EXPECT_TRUE(sees(bus, kOtherStatus)) << daemon.err();
+  EXPECT_EQ(daemon.err().find("refused, the old"), std::string::npos) << daemon.err();
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(kStopLimit), 0) << daemon.err();
+}
+
+TEST_F(Reloading, TheLogSaysMoreOrLessOnASignal) {
+  configure(0x6A3);
+  Process daemon(argv());
+  ASSERT_TRUE(daemon.wait_for_error("fault", kLimit)) << daemon.err();
+  EXPECT_EQ(daemon.err().find("samples, "), std::string::npos);
+  daemon.signal(SIGUSR1);
+  EXPECT_TRUE(daemon.wait_for_error("log level debug", kLimit)) << daemon.err();
+  EXPECT_TRUE(daemon.wait_for_error(" frames taken", kLimit)) << daemon.err();
+  daemon.signal(SIGUSR2);
+  EXPECT_TRUE(daemon.wait_for_error("log level info", kLimit)) << daemon.err();
+  daemon.signal(SIGUSR2);
+  EXPECT_TRUE(daemon.wait_for_error("log level warning", kLimit)) << daemon.err();
+  daemon.signal(SIGTERM);
+  EXPECT_EQ(daemon.wait(kStopLimit), 0);
+  EXPECT_EQ(daemon.err().find("stopped: "), std::string::npos) << "an info line";
 }
 
 // What cannot be foreseen: every kind of frame that can-utils make, as fast as they can.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <linux/can/error.h>
 
+#include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <filesystem>
@@ -155,6 +156,67 @@ TEST_F(Live, ThePapersExperimentComesBackAsFrames) {
   std::snprintf(text, sizeof text, "%.4f", estimate.at("MuMax"));
   EXPECT_NE(text_of(shown).find(text), std::string::npos) << text_of(shown);
   EXPECT_NE(text_of(shown).find("STOP"), std::string::npos);
+}
+
+// What the flight recorder kept of a run, replayed, gives the frames that were on the bus: the same
+// bytes in the same order, on whatever machine and however late its samples were.
+TEST_F(Live, TheFlightRecordersRunIsReplayedByteByByte) {
+  ASSERT_NO_FATAL_FAILURE(simulate("signal", {"--duration", "12"}));
+  const std::string kept = folder() + "/kept";
+  const BusSocket bus("vcan0");
+  std::vector<std::string> argv = daemon();
+  argv.insert(argv.end(), {"--record", kept});
+  Process beltgripd(argv);
+  PublishedFrames published;
+  std::string live;
+  const auto take = [&](const SeenFrame& seen) {
+    if (seen.frame.can_id >= 0x6A0 && seen.frame.can_id <= 0x6A3) {
+      live += std::to_string(seen.frame.can_id);
+      for (int i = 0; i < seen.frame.len; ++i) live += ' ' + std::to_string(seen.frame.data[i]);
+      live += '\n';
+    }
+    return published.take(seen);
+  };
+  // The fault of inputs that have not come yet begins the record, at the daemon's first sample.
+  ASSERT_TRUE(beltgripd.wait_for_error("recording to " + kept, kLimit)) << log_of(beltgripd);
+  Process player(canplayer(trace(), "vcan0"));
+  ASSERT_TRUE(bus.receive_until(
+      [&](const SeenFrame& seen) {
+        if (!take(seen)) return false;
+        const auto status = published.last("BeltGripStatus").signals;
+        return !status.empty() && status.at("Outcome") != 0 && !stop_is_set(published);
+      },
+      kLimit))
+      << log_of(beltgripd);
+  beltgripd.signal(SIGTERM);
+  EXPECT_EQ(beltgripd.wait(kLimit), 0) << beltgripd.err();
+  player.signal(SIGTERM);
+  player.wait(kLimit);
+  while (const auto seen = bus.receive(Milliseconds(100))) take(*seen);
+
+  std::vector<std::string> files;
+  for (const auto& each : std::filesystem::directory_iterator(kept)) files.push_back(each.path());
+  ASSERT_EQ(files.size(), 1U);
+  const std::string sent = folder() + "/sent.log";
+  const RunResult replay = run({program("beltgrip"), "replay", files[0], "--config", config(),
+                                "--json", "-", "--log-out", sent},
+                               kLimit);
+  ASSERT_EQ(replay.status, 0) << replay.err;
+  EXPECT_EQ(json::parse(replay.out.substr(0, replay.out.find('\n'))).at("type"), "experiment");
+  std::string replayed;
+  std::ifstream log(sent);
+  for (std::string stamp, interface, frame; log >> stamp >> interface >> frame;) {
+    const std::size_t hash = frame.find('#');
+    replayed += std::to_string(std::stoul(frame.substr(0, hash), nullptr, 16));
+    for (std::size_t i = hash + 1; i + 1 < frame.size(); i += 2) {
+      replayed += ' ' + std::to_string(std::stoul(frame.substr(i, 2), nullptr, 16));
+    }
+    replayed += '\n';
+  }
+  EXPECT_GT(std::count(live.begin(), live.end(), '\n'), 500);
+  EXPECT_EQ(replayed, live);
+  const std::string late = beltgripd.err().substr(beltgripd.err().find("stopped: "));
+  RecordProperty("daemon", late.substr(0, late.find('\n')));
 }
 
 // Frames that carry an input's number but are not that input, and such as other nodes send.

@@ -19,14 +19,16 @@ struct Published {
 
 class PublishedFrames {
  public:
-  PublishedFrames();  // reads can_dbc/beltgrip.dbc
+  enum class Control { kObserve, kCommand };
+  // Reads can_dbc/beltgrip.dbc.
+  explicit PublishedFrames(Control control = Control::kObserve);
 
   // Frames in order of arrival; those of other nodes are passed over. True if it was one of ours.
   bool take(const SeenFrame& seen);
   const std::vector<Published>& of(const std::string& message) const { return frames_.at(message); }
   // The last one, or none of its signals when there was none.
   Published last(const std::string& message) const;
-  // What is wrong with them: kind, length, CRC, counter, a clamp frame. Empty is right.
+  // What is wrong with them: kind, length, CRC, counter, in observe a clamp frame. Empty is right.
   const std::vector<std::string>& problems() const { return problems_; }
   // The next frame of each message may have any counter (after frames were lost on purpose).
   void forget_counters() { counters_.clear(); }
@@ -42,6 +44,7 @@ class PublishedFrames {
     std::string name;
     std::vector<Signal> signals;
   };
+  Control control_;
   std::map<canid_t, Message> messages_;
   std::map<std::string, std::vector<Published>> frames_;
   std::map<canid_t, unsigned> counters_;

@@ -97,8 +97,25 @@ TEST_F(Receiver, AnOldActiveFrameStartsNothing) {
   EXPECT_FALSE(give(request(3, 3000)));
   EXPECT_FALSE(give(request(4, 3000)));
   EXPECT_EQ(force(), 5000.0);
+  now_us_ += BELTGRIP_PAUSE_US;
   give(request(5, 0));
   EXPECT_TRUE(give(request(6, 3000)));
+}
+
+TEST_F(Receiver, NoRequestWithinASecondOfTheLast) {
+  for (const bool by_frame : {true, false}) {
+    SetUp();
+    start(3000);
+    now_us_ += by_frame ? 10'000 : 50'001;
+    give(request(3, 0));
+    force();
+    const std::uint32_t ended_us = now_us_;
+    EXPECT_FALSE(give(request(4, 3000)));
+    now_us_ = ended_us + BELTGRIP_PAUSE_US - 1;
+    EXPECT_FALSE(give(request(5, 3000)));
+    now_us_ = ended_us + BELTGRIP_PAUSE_US;
+    EXPECT_TRUE(give(request(6, 3000)));
+  }
 }
 
 TEST_F(Receiver, EveryCounterPair) {

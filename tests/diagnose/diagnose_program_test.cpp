@@ -1,0 +1,401 @@
+// beltgrip diagnose as users call it: the contract's JSON, the model that it writes, logs against
+// tables, the report, and input that is wrong in every way. Truth comes from the generator.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "tests/diagnose/generator.h"
+#include "tests/tools/program.h"
+
+namespace beltgrip::test {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kConfig = "[variator]\nprimary_inertia_kg_m2 = 0.18\n";
+
+// A rig with a varied plan; nothing planted unless said.
+blind::Trial rig(int runs, std::vector<blind::Planted> planted = {}) {
+  blind::Trial trial;
+  trial.seed = 4711;
+  blind::Random random(trial.seed);
+  trial.machine = blind::draw_machine(random);
+  trial.machine.setting = blind::Setting::kRig;
+  trial.machine.law = blind::Law::kTanh;
+  trial.plan = blind::draw_plan(random, trial.machine.setting, runs);
+  trial.planted = std::move(planted);
+  return trial;
+}
+
+class Diagnose : public testing::Test {
+ protected:
+  Diagnose() { place_.write("beltgrip.toml", kConfig); }
+
+  std::vector<std::string> write(const std::vector<std::string>& tables) {
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < tables.size(); ++i) {
+      const std::string name = "run" + std::to_string(i + 1) + ".csv";
+      place_.write(name, tables[i]);
+      names.push_back(place_.path(name));
+    }
+    return names;
+  }
+  RunResult run(std::vector<std::string> arguments, const std::string& config = "beltgrip.toml") {
+    arguments.insert(arguments.begin(), {"diagnose", "--config", place_.path(config)});
+    return beltgrip(arguments);
+  }
+  json answer(std::vector<std::string> arguments, const std::string& config = "beltgrip.toml") {
+    arguments.insert(arguments.end(), {"--json", "-"});
+    const RunResult result = run(arguments, config);
+    EXPECT_EQ(result.status, 0) << result.err;
+    return json::parse(result.out, nullptr, false);
+  }
+  json of(const std::vector<std::string>& tables) { return answer(write(tables)); }
+
+  Workplace place_;
+};
+
+// Rows of a table that `keep(t, cells)` keeps, changed by it.
+template <typename Change>
+std::string changed(const std::string& table, const Change& change) {
+  std::istringstream in(table);
+  std::string line, out;
+  std::getline(in, line);
+  out = line + "\n";
+  while (std::getline(in, line)) {
+    std::vector<std::string> cells;
+    std::istringstream row(line);
+    for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
+    if (!change(cells)) continue;
+    for (std::size_t i = 0; i < cells.size(); ++i) out += (i == 0 ? "" : ",") + cells[i];
+    out += "\n";
+  }
+  return out;
+}
+
+double number(const std::string& text) {
+  double value = 0.0;
+  std::istringstream(text) >> value;
+  return value;
+}
+
+std::string notes(const json& result) { return result.at("notes").dump(); }
+
+// No name and no other claim.
+void expect_silence(const json& result) {
+  EXPECT_EQ(result.at("findings").size(), 0U) << result.dump(1);
+  EXPECT_TRUE(result.at("unexplained").is_null()) << result.dump(1);
+}
+
+TEST_F(Diagnose, NamesTheCauseWritesTheModelAndIsContentWithIt) {
+  const auto recording = record(rig(12, {{"torque_loss", {{"per_kN_Nm", 0.6}}, ""}}));
+  const auto logs = write(recording.csv);
+  auto arguments = logs;
+  arguments.insert(arguments.end(), {"--model-out", place_.path("model.toml"), "--report",
+                                     place_.path("report.html")});
+  const json first = answer(arguments);
+  EXPECT_EQ(first.at("verdict"), "explained");
+  ASSERT_EQ(first.at("findings").size(), 1U) << first.at("findings").dump(1);
+  const json& finding = first.at("findings")[0];
+  EXPECT_EQ(finding.at("effect"), "torque_loss");
+  const json& size = finding.at("parameters").at("per_kN_Nm");
+  EXPECT_NEAR(size.at("value").get<double>(), 0.6, 0.06);
+  EXPECT_LT(size.at("ci95")[0].get<double>(), 0.62);
+  EXPECT_GT(size.at("ci95")[1].get<double>(), 0.58);
+  EXPECT_GT(finding.at("probability").get<double>(), 0.9);
+  for (const char* key : {"aliases", "separate_by", "gain"}) EXPECT_TRUE(finding.contains(key));
+  for (const char* key :
+       {"baseline", "unexplained", "not_identifiable", "held_out", "next_experiment"}) {
+    EXPECT_TRUE(first.contains(key)) << key;
+  }
+  for (const auto& [name, signal] : first.at("baseline").items()) {
+    for (const char* key : {"rmse", "noise_floor", "unexplained_share", "tests"}) {
+      EXPECT_TRUE(signal.contains(key)) << name << " " << key;
+    }
+  }
+  const json& torque = first.at("held_out").at("secondary_torque");
+  EXPECT_LT(torque.at("rmse_after").get<double>(), 0.2 * torque.at("rmse_before").get<double>());
+
+  const std::string page = place_.read("report.html");
+  EXPECT_EQ(page.find("<link"), std::string::npos);
+  EXPECT_EQ(page.find(" src="), std::string::npos);  // nothing beside the file
+  EXPECT_NE(page.find("<canvas"), std::string::npos);
+  EXPECT_NE(page.find("torque_loss"), std::string::npos);
+
+  auto again = logs;
+  again.insert(again.end(), {"--model", place_.path("model.toml")});
+  const json second = answer(again);
+  EXPECT_EQ(second.at("verdict"), "nothing_wrong") << second.at("findings").dump(1);
+}
+
+TEST_F(Diagnose, SaysNothingOfAHealthyMachine) {
+  const json result = of(record(rig(12)).csv);
+  EXPECT_EQ(result.at("verdict"), "nothing_wrong");
+  expect_silence(result);
+}
+
+TEST_F(Diagnose, JudgesTheGainOnHeldOutExperiments) {
+  const auto recording = record(rig(12, {{"torque_loss", {{"per_kN_Nm", 0.6}}, ""}}));
+  auto logs = write(recording.csv);
+  std::vector<std::string> arguments(logs.begin(), logs.end() - 3);
+  arguments.emplace_back("--held-out");
+  arguments.insert(arguments.end(), logs.end() - 3, logs.end());
+  const json result = answer(arguments);
+  EXPECT_EQ(result.at("experiments"), 9);
+  const json& torque = result.at("held_out").at("secondary_torque");
+  EXPECT_LT(torque.at("rmse_after").get<double>(), 0.3 * torque.at("rmse_before").get<double>());
+}
+
+// The table as a candump log: one message of 8 bytes a signal, 32 bits, little endian.
+std::string as_log(const std::string& table) {
+  std::string log;
+  changed(table, [&](const std::vector<std::string>& cells) {
+    const double t_s = number(cells[0]);
+    constexpr std::array<double, 6> kStep{1e-6, 1e-6, 0.01, 1e-6, 1e-6, 0.01};
+    for (std::size_t i = 1; i < cells.size() && i <= kStep.size(); ++i) {
+      const auto raw = static_cast<std::int64_t>(std::llround(number(cells[i]) / kStep[i - 1]));
+      const auto bits = static_cast<std::uint64_t>(raw) & 0xFFFFFFFFULL;
+      char line[80];
+      std::snprintf(line, sizeof line, "(%.6f) can0 %03X#%02X%02X%02X%02X00000000\n", 1.6e9 + t_s,
+                    0x100 + static_cast<unsigned>(i), static_cast<unsigned>(bits & 0xFF),
+                    static_cast<unsigned>((bits >> 8) & 0xFF),
+                    static_cast<unsigned>((bits >> 16) & 0xFF),
+                    static_cast<unsigned>((bits >> 24) & 0xFF));
+      log += line;
+    }
+    return true;
+  });
+  return log;
+}
+
+TEST_F(Diagnose, ALogWithADbcSaysTheSameAsATable) {
+  const auto recording = record(rig(8, {{"torque_loss", {{"per_kN_Nm", 0.9}}, ""}}));
+  const json direct = of(recording.csv);
+  std::string dbc = "VERSION \"\"\nNS_ :\nBS_:\nBU_: X\n", config = std::string(kConfig);
+  config += "[bus]\ndbc = [\"rig.dbc\"]\n[signals]\n";
+  struct Signal {
+    const char *role, *step, *unit;
+  };
+  constexpr std::array<Signal, 6> kSignals{{{"primary_speed", "1E-6", "rad/s"},
+                                            {"secondary_speed", "1E-6", "rad/s"},
+                                            {"secondary_pressure", "0.01", "Pa"},
+                                            {"primary_torque", "1E-6", "Nm"},
+                                            {"secondary_torque", "1E-6", "Nm"},
+                                            {"primary_pressure", "0.01", "Pa"}}};
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    const std::string index = std::to_string(i + 1);
+    dbc += "BO_ " + std::to_string(0x101 + i) + " M" + index + ": 8 X\n SG_ S" + index +
+           " : 0|32@1- (" + kSignals[i].step + ",0) [0|0] \"" + kSignals[i].unit + "\" X\n";
+    config += std::string(kSignals[i].role) + " = \"M" + index + ".S" + index + "\"\n";
+  }
+  place_.write("rig.dbc", dbc);
+  place_.write("log.toml", config);
+  std::vector<std::string> logs;
+  for (std::size_t i = 0; i < recording.csv.size(); ++i) {
+    const std::string name = "run" + std::to_string(i + 1) + ".log";
+    place_.write(name, as_log(recording.csv[i]));
+    logs.push_back(place_.path(name));
+  }
+  const json through_log = answer(logs, "log.toml");
+  ASSERT_EQ(through_log.at("findings").size(), 1U) << through_log.dump(1);
+  EXPECT_EQ(through_log.at("findings")[0].at("effect"), "torque_loss");
+  ASSERT_EQ(direct.at("findings").size(), 1U);
+  const auto size = [](const json& result) {
+    return result.at("findings")[0].at("parameters").at("per_kN_Nm").at("value").get<double>();
+  };
+  EXPECT_NEAR(size(through_log), size(direct), 0.03);
+}
+
+TEST_F(Diagnose, SaysTheSameForAnyNumberOfJobs) {
+  const auto logs = write(record(rig(5, {{"pulley_deformation", {{"per_kN", 8e-3}}, ""}})).csv);
+  auto with = [&](const char* jobs) {
+    auto arguments = logs;
+    arguments.insert(arguments.end(), {"--jobs", jobs, "--json", "-"});
+    return run(arguments);
+  };
+  const RunResult one = with("1");
+  EXPECT_EQ(one.status, 0) << one.err;
+  EXPECT_EQ(one.out, with("3").out);
+}
+
+// The last experiment comes through a pipe, so that the signal falls between start and analysis.
+TEST_F(Diagnose, AnInterruptedRunLeavesAValidPartialReport) {
+  const auto tables = record(rig(4, {{"torque_loss", {{"per_kN_Nm", 0.9}}, ""}})).csv;
+  auto arguments = write(std::vector<std::string>(tables.begin(), tables.end() - 1));
+  const std::string pipe = place_.path("last.csv");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  arguments.push_back(pipe);
+  arguments.insert(arguments.begin(),
+                   {program_path(), "diagnose", "--config", place_.path("beltgrip.toml")});
+  arguments.insert(arguments.end(),
+                   {"--json", place_.path("out.json"), "--report", place_.path("out.html"),
+                    "--model-out", place_.path("out.toml")});
+  std::vector<char*> argv;
+  for (std::string& each : arguments) argv.push_back(each.data());
+  argv.push_back(nullptr);
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    execv(argv[0], argv.data());
+    _exit(127);
+  }
+  {
+    std::ofstream last(pipe);  // returns once the program has opened it
+    EXPECT_EQ(kill(child, SIGINT), 0);
+    last << tables.back();
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status)) << status;
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  const json result = json::parse(place_.read("out.json"));
+  EXPECT_FALSE(result.at("complete").get<bool>());
+  EXPECT_EQ(result.at("experiments"), 4);
+  EXPECT_EQ(result.at("findings").size(), 0U);
+  EXPECT_NE(place_.read("out.html").find("</html>"), std::string::npos);
+  EXPECT_NE(place_.read("out.html").find("stopped before the end"), std::string::npos);
+}
+
+// --- input that is wrong --------------------------------------------------------------------
+
+TEST_F(Diagnose, TooLittleDataSaysSo) {
+  const auto table =
+      changed(record(rig(1)).csv[0], [](const auto& cells) { return number(cells[0]) < 17.0; });
+  const json result = of({table});
+  expect_silence(result);
+  EXPECT_NE(notes(result).find("too little data"), std::string::npos) << notes(result);
+  EXPECT_GT(result.at("not_identifiable").size(), 10U);
+}
+
+TEST_F(Diagnose, OneExperimentNamesNothingAndAsksForRepeats) {
+  const json result = of({record(rig(1)).csv[0]});
+  expect_silence(result);
+  EXPECT_NE(result.at("next_experiment").dump().find("repeat"), std::string::npos);
+}
+
+TEST_F(Diagnose, ConstantSignalsNameNothing) {
+  const auto table = changed(record(rig(1)).csv[0], [](auto& cells) {
+    cells[1] = "105", cells[2] = "235", cells[3] = "300000", cells[4] = "50";
+    return true;
+  });
+  expect_silence(of({table, table, table}));
+}
+
+TEST_F(Diagnose, AMissingRoleIsNamed) {
+  auto recording = record(rig(3));
+  for (std::string& table : recording.csv) {
+    table.replace(table.find("secondary_pressure["), 19, "unused_pressureXXX[");
+  }
+  const json result = of(recording.csv);
+  expect_silence(result);
+  EXPECT_NE(notes(result).find("no secondary_pressure"), std::string::npos) << notes(result);
+}
+
+TEST_F(Diagnose, GapsAreNotBridged) {
+  auto recording = record(rig(6));
+  for (std::string& table : recording.csv) {
+    table =
+        changed(table, [](const auto& cells) { return std::fmod(number(cells[0]), 12.0) > 2.0; });
+  }
+  expect_silence(of(recording.csv));
+}
+
+TEST_F(Diagnose, ASaturatedPressureIsLeftOutAndSaid) {
+  auto recording = record(rig(6));
+  for (std::string& table : recording.csv) {
+    table = changed(table, [](auto& cells) {
+      if (number(cells[3]) > 400000.0) cells[3] = "400000";
+      return true;
+    });
+  }
+  const json result = of(recording.csv);
+  expect_silence(result);
+  EXPECT_NE(notes(result).find("rests on its bound"), std::string::npos) << notes(result);
+}
+
+TEST_F(Diagnose, AWrongUnitIsAnErrorOrSaid) {
+  auto recording = record(rig(4));
+  // The dimension is wrong: refused, with file, line and what would be right.
+  std::string table = recording.csv[0];
+  table.replace(table.find("secondary_pressure[Pa]"), 22, "secondary_pressure[Nm]");
+  place_.write("wrong.csv", table);
+  const RunResult refused = run({place_.path("wrong.csv")});
+  EXPECT_EQ(refused.status, 65);
+  EXPECT_NE(refused.err.find("wrong.csv:1: column 'secondary_pressure[Nm]'"), std::string::npos)
+      << refused.err;
+  // Speeds in another unit than said: no ratio of this variator.
+  for (std::string& each : recording.csv) {
+    each.replace(each.find("secondary_speed[rad/s]"), 22, "secondary_speed[rpm]");
+  }
+  const json result = of(recording.csv);
+  expect_silence(result);
+  EXPECT_NE(notes(result).find("never near an end stop"), std::string::npos) << notes(result);
+}
+
+TEST_F(Diagnose, LogsOfTwoVehiclesAreNoOneMachine) {
+  auto recording = record(rig(4));
+  for (std::size_t i = 2; i < recording.csv.size(); ++i) {
+    recording.csv[i] = changed(recording.csv[i], [](auto& cells) {
+      cells[2] = std::to_string(0.96 * number(cells[2]));
+      return true;
+    });
+  }
+  const json result = of(recording.csv);
+  EXPECT_EQ(result.at("findings").size(), 0U) << result.dump(1);
+  EXPECT_NE(notes(result).find("cannot be of one machine"), std::string::npos) << notes(result);
+}
+
+// The torque comes from another recorder whose clock is late, or runs fast.
+TEST_F(Diagnose, ClocksThatDifferAreADelayOrNothing) {
+  struct Clock {
+    double late_s, fast;
+  };
+  for (const Clock clock : {Clock{0.3, 0.0}, Clock{0.0, 0.004}}) {
+    auto recording = record(rig(6));
+    for (std::string& table : recording.csv) {
+      std::vector<std::string> torque;
+      changed(table, [&](const auto& cells) {
+        torque.push_back(cells[4]);
+        return true;
+      });
+      table = changed(table, [&](auto& cells) {
+        const double t_s = number(cells[0]) - 12.5;
+        const double samples = 100.0 * (t_s - clock.late_s - clock.fast * t_s);
+        const auto at = std::clamp<double>(samples, 0.0, static_cast<double>(torque.size() - 1));
+        cells[4] = torque[static_cast<std::size_t>(at)];
+        return true;
+      });
+    }
+    const json result = of(recording.csv);
+    for (const json& finding : result.at("findings")) {
+      const std::string effect = finding.at("effect");
+      EXPECT_TRUE(effect == "torque_delay" || effect == "channel_skew") << result.dump(1);
+    }
+  }
+}
+
+TEST_F(Diagnose, WrongCommandLinesHaveTheirExitCodes) {
+  const auto logs = write({record(rig(1)).csv[0]});
+  EXPECT_EQ(run({place_.path("none.csv")}).status, 66);
+  EXPECT_EQ(run({logs[0], "--model", place_.path("none.toml")}).status, 66);
+  EXPECT_EQ(run({logs[0], "--json", place_.path("no/where.json")}).status, 73);
+  EXPECT_EQ(run({logs[0], "--jobs", "0"}).status, 64);
+  EXPECT_EQ(run({}).status, 64);
+  place_.write("bad.toml", "[effects.magic]\nsize = 1\n");
+  const RunResult bad = run({logs[0], "--model", place_.path("bad.toml")});
+  EXPECT_EQ(bad.status, 78);
+  EXPECT_NE(bad.err.find("effects.magic"), std::string::npos) << bad.err;
+}
+
+}  // namespace
+}  // namespace beltgrip::test

@@ -1,0 +1,28 @@
+// One seeded case of the fault campaign: a shipped scenario, a vehicle and sensors drawn around it,
+// and up to three faults of the catalogue (rows B, E, V, T, X), among them a belt that loses grip,
+// as the text of a scenario file, so that a case worth keeping can be kept as a file.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tools/sim/vehicle_parameters.h"
+
+namespace beltgrip::test {
+
+struct CampaignCase {
+  std::uint64_t seed = 0;
+  std::string base;                 // shipped scenario
+  std::string toml;                 // laid on it
+  std::vector<std::string> faults;  // names of their kinds
+  sim::VehicleScenario scenario;
+  // Promise G1 is for single faults, and not against a controller that never lets go.
+  bool guaranteed = true;
+};
+
+CampaignCase draw_case(std::uint64_t seed);
+// A kept case: file text whose first line is "# base NAME seed N".
+CampaignCase read_case(const std::string& text, const std::string& name);
+
+}  // namespace beltgrip::test

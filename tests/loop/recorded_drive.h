@@ -1,0 +1,24 @@
+// A scenario driven once in closed loop, kept as what the pipeline was given, so that a second
+// pipeline can be measured on the same frames and instants without the vehicle around it.
+#pragma once
+
+#include <vector>
+
+#include "daemon/core/config.h"
+#include "daemon/core/experiment.h"
+#include "daemon/core/port.h"
+#include "tools/sim/vehicle_parameters.h"
+
+namespace beltgrip::test {
+
+struct DriveStep {
+  bool is_frame = false;
+  daemon::RxFrame frame;
+  daemon::MonoTime t = 0;  // of a sample, and the state that it led to
+  daemon::State state{};
+};
+
+std::vector<DriveStep> record_drive(const sim::VehicleScenario& scenario,
+                                    const daemon::Config& config);
+
+}  // namespace beltgrip::test
