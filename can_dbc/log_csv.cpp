@@ -430,6 +430,7 @@ class CsvParser : public LineParser {
     }
     if (!bytes_read) return bad("unreadable data byte");
     if (!data.empty()) {
+      frame.data.fill(0);  // the whole payload wins over columns of single bytes
       // python-can writes base64, everybody else hexadecimal digits: the length decides.
       auto count = read_hex(data, frame);
       // A length code instead of a length.

@@ -503,6 +503,16 @@ TEST(CsvLog, HeaderBehindAPreamble) {
   EXPECT_EQ(log.frames[0].text(), "HS CAN 18FEF100#1122");
 }
 
+TEST(CsvLog, ThePayloadWinsOverColumnsOfItsBytes) {
+  const Log log = read(
+      "time,id,d0,d1,data\n"
+      "0.5,0x123,AA,BB,11\n");
+  EXPECT_EQ(log.stats.lines_bad, 0U);
+  ASSERT_EQ(log.frames.size(), 1U);
+  EXPECT_EQ(log.frames[0].text(), "1 123#11");
+  EXPECT_EQ(log.frames[0].frame.data[1], 0) << "bytes behind the payload are zero";
+}
+
 TEST(CsvLog, BrokenRowsAreCounted) {
   const Log log = read(
       "time,id,dlc,data\n"
