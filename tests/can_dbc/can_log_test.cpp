@@ -428,6 +428,17 @@ TEST(TrcLog, Versions2) {
   EXPECT_EQ(v21.frames[2].text(), "1 704#R1");
 }
 
+TEST(TrcLog, ARemoteRequestInCanFdDoesNotExist) {
+  const Log log = read(
+      ";$FILEVERSION=2.0\n"
+      ";$COLUMNS=N,O,T,I,d,l,D\n"
+      "      1      1059.900 FD     0300 Rx 2  RTR\n"
+      "      2      1060.900 DT     0300 Rx 2  RTR\n");
+  EXPECT_EQ(log.stats.lines_bad, 1U);
+  ASSERT_EQ(log.frames.size(), 1U);
+  EXPECT_EQ(log.frames[0].text(), "1 300#R2");
+}
+
 // --- .csv ----------------------------------------------------------------------------------------
 
 TEST(CsvLog, SavvyCan) {
