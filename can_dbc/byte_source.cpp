@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "can_dbc/can_log.h"
+#include "can_dbc/text_encoding.h"
 
 namespace beltgrip::can {
 
@@ -84,7 +85,7 @@ class PeekedSource : public ByteSource {
   std::size_t given_ = 0;
 };
 
-// What both unpackers share: packed bytes come in blocks, a fault ends the stream.
+// What the unpackers share: packed bytes come in blocks, a fault ends the stream.
 class PackedSource : public ByteSource {
  public:
   explicit PackedSource(std::unique_ptr<ByteSource> inner)
@@ -192,6 +193,53 @@ class ZstdSource : public PackedSource {
   bool pending_ = false;
 };
 
+// UTF-16, as a redirection in PowerShell writes it, to UTF-8.
+class Utf16Source : public PackedSource {
+ public:
+  using PackedSource::PackedSource;
+  std::size_t read(std::span<char> out) override {
+    while (given_ == text_.size()) {
+      if (!refill()) {
+        if (!pending_.empty() && fault_.empty()) fault_ = "UTF-16 text ends within a character";
+        pending_.clear();
+        return 0;
+      }
+      pending_.append(packed_.data(), end_);
+      begin_ = end_;
+      convert();
+    }
+    const std::size_t count = std::min(out.size(), text_.size() - given_);
+    std::memcpy(out.data(), text_.data() + given_, count);
+    given_ += count;
+    return count;
+  }
+  bool ready(int timeout_ms) override { return given_ < text_.size() || inner_->ready(timeout_ms); }
+
+ private:
+  // Whole characters; half of one waits for the next block.
+  void convert() {
+    if (order_.empty()) {
+      order_ = pending_.substr(0, 2);
+      pending_.erase(0, 2);
+    }
+    const bool little = order_[0] == '\xFF';
+    std::size_t whole = pending_.size() & ~std::size_t{1};
+    constexpr unsigned kHighSurrogate = 0xD8;
+    if (whole >= 2) {
+      const auto high = static_cast<unsigned char>(pending_[whole - (little ? 1 : 2)]);
+      if ((high & 0xFCU) == kHighSurrogate) whole -= 2;
+    }
+    text_ = utf8_from_utf16(order_ + pending_.substr(0, whole)).value_or("");
+    given_ = 0;
+    pending_.erase(0, whole);
+  }
+
+  std::string order_;    // the mark at the very start
+  std::string pending_;  // not converted yet
+  std::string text_;
+  std::size_t given_ = 0;
+};
+
 }  // namespace
 
 std::unique_ptr<ByteSource> ByteSource::open(const std::string& path) {
@@ -208,9 +256,11 @@ std::unique_ptr<ByteSource> ByteSource::open(const std::string& path) {
   const std::string_view magic = start;
   const bool gzip = magic.starts_with("\x1F\x8B");
   const bool zstd = magic.starts_with("\x28\xB5\x2F\xFD");
+  const bool utf16 = magic.starts_with("\xFF\xFE") || magic.starts_with("\xFE\xFF");
   auto source = std::make_unique<PeekedSource>(std::move(plain), std::move(start));
   if (gzip) return std::make_unique<GzipSource>(std::move(source));
   if (zstd) return std::make_unique<ZstdSource>(std::move(source));
+  if (utf16) return std::make_unique<Utf16Source>(std::move(source));
   return source;
 }
 

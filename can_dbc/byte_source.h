@@ -1,5 +1,6 @@
 // A file or standard input as a stream of bytes, unpacked on the way if its content is gzip or
-// zstd. Memory is flat in the length of the input. Tools only.
+// zstd, in UTF-8 if it begins with the mark of UTF-16. Memory is flat in the length of the input.
+// Tools only.
 #pragma once
 
 #include <cstddef>

@@ -573,6 +573,33 @@ TEST(AnyLog, UnpacksGzipAndZstdByContent) {
   EXPECT_EQ(zstd.stats.lines_bad, 0U);
 }
 
+std::string utf16(std::string_view ascii, bool little) {
+  std::string out = little ? "\xFF\xFE" : "\xFE\xFF";
+  for (const char c : ascii) out += little ? std::string{c, '\0'} : std::string{'\0', c};
+  return out;
+}
+
+TEST(AnyLog, ReadsUtf16WithItsMark) {
+  const std::string text = many_lines(20'000);
+  for (const bool little : {true, false}) {
+    const Log log = read(utf16(text, little));
+    EXPECT_EQ(log.stats.lines_bad, 0U);
+    ASSERT_EQ(log.frames.size(), 20'000U);
+    EXPECT_EQ(log.frames[19'999].text(), "can0 123#11");
+  }
+  // A character of two units counts as one bad letter of its line, wherever a block ends.
+  const std::string clef("\x34\xD8\x1E\xDD", 4);
+  const Log log = read(utf16("(1.0) can0 123#00\n", true) + clef + std::string("\n\0", 2) +
+                       utf16("(2.0) can0 123#00\n", true).substr(2));
+  EXPECT_EQ(log.frames.size(), 2U);
+  EXPECT_EQ(log.stats.lines_bad, 1U);
+  const Log cut = read(utf16("(1.0) can0 123#00\n", true) + "(");
+  EXPECT_EQ(cut.frames.size(), 1U);
+  ASSERT_EQ(cut.stats.lines_bad, 1U);
+  EXPECT_EQ(cut.stats.first_bad[0].reason, "UTF-16 text ends within a character");
+  EXPECT_TRUE(read("\xFF\xFE").frames.empty());
+}
+
 TEST(AnyLog, ReportsPackedDataThatEndEarlyOrAreDamaged) {
   const std::string text = many_lines(100'000);
   std::string cut = gzipped(text);
