@@ -1,6 +1,7 @@
 // The pressure from diagnostics, polled by beltgripd on a second vcan: an ECU of the test answers
 // with what the rig broadcasts on the first. Losses, refusals, a silent ECU, another tester, the
-// second interface going away. Plain frames: the kernel's ISO-TP has no part in this.
+// second interface going away. Plain frames on both sides; the kernel's ISO-TP as the ECU's side:
+// tests/qemu/isotp_test.cpp.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -11,14 +12,14 @@
 #include <sstream>
 #include <thread>
 
-#include "tests/vcan/rig.h"
+#include "tests/vcan/uds_rig.h"
 
 namespace beltgrip::test {
 namespace {
 
 using nlohmann::json;
 
-constexpr canid_t kRequest = 0x7E1, kAnswer = 0x7E9, kRigPressure = 0x130;
+constexpr canid_t kRequest = kUdsRequest, kAnswer = kUdsAnswer, kRigPressure = 0x130;
 const std::vector<std::uint8_t> kPoll{0x03, 0x22, 0x11, 0x01, 0xCC, 0xCC, 0xCC, 0xCC};
 
 // An ECU on vcan1 in a thread of its own. It knows the pressure from the rig's broadcast.
@@ -101,37 +102,15 @@ class Diagnostics : public Vcan {
     Vcan::SetUp();
     add_interface("vcan1");
   }
-  // A configuration of the rig with its pressure from diagnostics.
-  std::string with_uds(const std::string& path, bool polls) const {
-    std::string toml = text_of(path);
-    const std::string role = "\"RIG_Pressure.SecondaryPressure\"";
-    toml.replace(toml.find(role), role.size(),
-                 "{ uds = { request = 0x7E1, response = 0x7E9, did = 0x1101, start = 0, length = "
-                 "16, byte_order = \"little\", scale = 0.001 }, unit = \"bar\", period_ms = 50, "
-                 "bus = \"diag\" }");
-    toml.insert(toml.find("[signals]"), std::string(polls ? "diagnostics = \"poll\"\n" : "") +
-                                            "[bus.diag]\ninterface = \"vcan1\"\n");
-    std::ofstream(path) << toml;
-    return path;
-  }
   std::vector<std::string> steady_daemon(bool polls) const {
-    return {program("beltgripd"), "--config", with_uds(write_rig_config(folder(), "vcan0"), polls)};
+    return {program("beltgripd"), "--config",
+            take_pressure_from_uds(write_rig_config(folder(), "vcan0"), polls)};
   }
   std::vector<std::string> steady_rig() const {
     return canplayer(write_steady_log(folder()), "vcan0", true);
   }
 };
 
-bool is_set(const PublishedFrames& published, const char* fault) {
-  const auto status = published.last("BeltGripStatus").signals;
-  return !status.empty() && status.at(fault) != 0;
-}
-// Traction is known, so the pressure is.
-bool pressure_valid(const PublishedFrames& published) {
-  constexpr double kNotAvailable = -0.32768;
-  const auto slip = published.last("BeltGripSlip").signals;
-  return !slip.empty() && slip.at("MuStar") > kNotAvailable + 5e-6;
-}
 auto status_count(std::size_t count) {
   return [count](const PublishedFrames& published) {
     return published.of("BeltGripStatus").size() >= count;
@@ -153,7 +132,8 @@ TEST_F(Diagnostics, ThePapersExperimentWithPolledPressure) {
   const double mu_max = json::parse(text_of(folder() + "/truth.json")).at("mu_max");
   const BusSocket bus("vcan0");
   const Ecu ecu(Mood::kLong);
-  Process daemon({program("beltgripd"), "--config", with_uds(folder() + "/beltgrip.toml", true)});
+  Process daemon({program("beltgripd"), "--config",
+                  take_pressure_from_uds(folder() + "/beltgrip.toml", true)});
   PublishedFrames published;
   ASSERT_TRUE(listen(bus, published, status_count(1)));
   Process player(canplayer(folder() + "/trace.log", "vcan0"));
