@@ -31,10 +31,10 @@ constexpr double kLambdaFactor = 1.35;
 constexpr std::size_t kCorners = 20;
 constexpr double kCornersOver = 0.75;  // of the span, from its upper end
 constexpr std::size_t kMostForms = 16 * (kCorners + 1) + kCorners * kCorners;
-constexpr double kReachedDeviations = 2.7;
 constexpr double kFormTolerance = 0.002;  // of mu: no friction is quite one of the forms
 constexpr double kNearTop = 0.98;
 constexpr double kHealthFrom = 0.6;        // of the top of mu*
+constexpr double kStandsStill = 0.02;      // of the clamp force
 constexpr std::size_t kLargestGroup = 16;  // points
 
 double square(double x) { return x * x; }
@@ -273,6 +273,7 @@ void PeakFit::add_point(std::size_t begin, std::size_t end) noexcept {
   torque /= point.duration_s;
   const double noise = record_->torque_noise();
   double variance = noise / point.duration_s;
+  point.torque_variance = variance;
   if (inertia_ > 0.0) {
     // The engine's torque changes slowly: of its line and the readings, by their variances.
     const Line& held = record_->torque_line();
@@ -283,15 +284,18 @@ void PeakFit::add_point(std::size_t begin, std::size_t end) noexcept {
       torque += share * (held.at(point.t_s) - torque);
       point.held_share = share;
       variance = square(share) * variation + square(1.0 - share) * variance;
+      point.torque_variance = variance;
     }
     double t_0, t_1, weight_0, weight_1;
     const double speed_0 = speed_at_edge(begin, t_0, weight_0);
     const double speed_1 = speed_at_edge(end, t_1, weight_1);
     const double span_s = std::max(1e-3, t_1 - t_0);
     torque -= inertia_ * (speed_1 - speed_0) / span_s;
-    variance +=
-        square(inertia_ / span_s) * record_->omega_noise() * (1.0 / weight_0 + 1.0 / weight_1);
+    point.speed_variance_begin = record_->omega_noise() / weight_0;
+    point.speed_variance_end = record_->omega_noise() / weight_1;
+    variance += square(inertia_ / span_s) * (point.speed_variance_begin + point.speed_variance_end);
   }
+  point.torque_Nm = torque;
   const double traction = c_ / point.force_N;
   point.mu = traction * torque;
   point.variance = std::max(square(traction) * variance, 1e-12);
@@ -353,25 +357,52 @@ void PeakFit::find_stretch() noexcept {
   }
 }
 
+// Of the mean clamp force over a stretch of time: of the line, or of the readings where it does not
+// reach.
+double PeakFit::force_variance(double begin_s, double end_s) const noexcept {
+  const Line& line = record_->force_line();
+  const double readings = record_->force().density(end_s - begin_s) / (end_s - begin_s);
+  return begin_s < line.begin_s ? readings : line.variance_at(0.5 * (begin_s + end_s));
+}
+
+// Mean torque by mean force is a mean of mu*, weighted by force: its largest was no less. Within a
+// window the speeds at its points' ends cancel, all but the first and the last.
 void PeakFit::find_reached(std::size_t length) noexcept {
-  double weight = 0.0, mu = 0.0, slip = 0.0;
+  double time_s = 0.0, torque = 0.0, force = 0.0, slip = 0.0, squares = 0.0;
+  const auto count_in = [&](const Point& point, double sign) {
+    const double weight_s = sign * point.duration_s;
+    time_s += weight_s;
+    torque += weight_s * point.torque_Nm;
+    force += weight_s * point.force_N;
+    slip += weight_s * point.slip;
+    squares += weight_s * point.duration_s * point.torque_variance;
+  };
   for (std::size_t i = first_; i < point_count_; ++i) {
-    const double w = 1.0 / points_[i].variance;
-    weight += w;
-    mu += w * points_[i].mu;
-    slip += w * points_[i].slip;
-    if (i >= first_ + length) {
-      const Point& old = points_[i - length];
-      weight -= 1.0 / old.variance;
-      mu -= old.mu / old.variance;
-      slip -= old.slip / old.variance;
-    }
+    count_in(points_[i], 1.0);
+    if (i >= first_ + length) count_in(points_[i - length], -1.0);
     if (i + 1 < first_ + length) continue;
-    const double reached = mu / weight - kReachedDeviations / std::sqrt(weight);
-    if (reached > result_.reached) {
-      result_.reached = reached;
-      result_.reached_slip = slip / weight;
+    const Point& begin = points_[i + 1 - length];
+    const Point& end = points_[i];
+    const double mu = c_ * torque / force;
+    if (mu < result_.reached * (1.0 - kReachedDeviations * result_.reached_deviation)) continue;
+    const double T = torque / time_s, F = force / time_s;
+    double torque_variance =
+        (squares + square(inertia_) * (begin.speed_variance_begin + end.speed_variance_end)) /
+        square(time_s);
+    if (inertia_ > 0.0) {
+      torque_variance += square(end.held_share) * record_->torque_line().variance_at(end.t_s);
     }
+    const double deviation =
+        std::sqrt(torque_variance / square(T) + force_variance(begin.t_s - 0.5 * begin.duration_s,
+                                                               end.t_s + 0.5 * end.duration_s) /
+                                                    square(F));
+    const double surely = mu * (1.0 - kReachedDeviations * deviation);
+    if (!(surely > result_.reached * (1.0 - kReachedDeviations * result_.reached_deviation))) {
+      continue;
+    }
+    result_.reached = mu;
+    result_.reached_deviation = deviation;
+    result_.reached_slip = slip / time_s;
   }
 }
 
@@ -591,8 +622,18 @@ void PeakFit::finish() noexcept {
   result_.valid = std::isfinite(result_.mu) && result_.mu > 0.0;
 }
 
+// Where the clamp force has come to a stand, the load alone moves slip and mu* to and fro, by less
+// than slip's noise: that is no curve to be tested.
+double PeakFit::tested_until_s() const noexcept {
+  const Line& line = record_->force_line();
+  const double end_s = record_->duration_s();
+  const bool stands = std::abs(line.slope) * (end_s - line.begin_s) < kStandsStill * line.at(end_s);
+  return stands ? line.begin_s : end_s;
+}
+
 // From where mu* came to a share of its top, to where the curve has its top.
 void PeakFit::sum_for_health() noexcept {
+  const double until_s = std::min(result_.t_s, tested_until_s());
   std::size_t begin = first_;
   const std::size_t oldest = point_count_ > kMostPoints ? point_count_ - kMostPoints : 0;
   while (begin > oldest && points_[begin - 1].mu > kHealthFrom * mu_top_) --begin;
@@ -600,7 +641,7 @@ void PeakFit::sum_for_health() noexcept {
   health_count_ = 1;
   for (std::size_t i = begin; i < point_count_; ++i) {
     const Point& point = points_[i];
-    if (point.t_s > result_.t_s) break;
+    if (point.t_s > until_s) break;
     const double w = 1.0 / point.variance;
     const CurveSums& before = health_sums_[health_count_ - 1];
     health_sums_[health_count_++] = {.weight = before.weight + w,
@@ -616,8 +657,9 @@ void PeakFit::test_best_form() noexcept {
     const Eigen::Vector4d terms(1.0, -best_rise_.at(x), -x, -std::max(0.0, x - best_corner_));
     return mu_top_ + terms.dot(best_theta_);
   };
+  const double until_s = tested_until_s();
   std::size_t used = 0;
-  for (std::size_t i = first_; i < point_count_; ++i) {
+  for (std::size_t i = first_; i < point_count_ && points_[i].t_s < until_s; ++i) {
     const Point& point = points_[i];
     const double fitted = fitted_at(point.slip - slip_high_);
     // Further down deformation makes of it what is no function of slip any more.

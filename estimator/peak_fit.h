@@ -22,6 +22,9 @@
 
 namespace beltgrip::estimator {
 
+// By so many deviations what mu* has reached is lowered: the largest of many windows is taken.
+inline constexpr double kReachedDeviations = 2.7;
+
 struct PeakFitResult {
   bool valid = false;
   double mu = 0.0;        // largest value of the curve within the data
@@ -34,8 +37,10 @@ struct PeakFitResult {
   double fall = 0.0;    // from there to the end of the data
   double fall_variance = 0.0;
   double duration_s = 0.0;  // of the data that were used
-  // Largest mean of neighbouring points less three of its deviations: mu* was at least this.
+  // What mu* has surely reached: the mean over that window, of any length, whose lower end is
+  // largest; its relative deviation by the noise of torque, speed and clamp force.
   double reached = 0.0;
+  double reached_deviation = 0.0;
   double reached_slip = 0.0;
   // Do the points lie on one curve? In deviations (curve_health.h).
   double below_chord = 0.0;
@@ -57,6 +62,10 @@ class PeakFit {
     double t_s, slip, mu, force_N, duration_s;
     double variance;  // of mu, with what the noise in slip does to it
     double held_share;
+    double torque_Nm;             // that the belt carries
+    double torque_variance;       // of it, without
+    double speed_variance_begin;  // that of the speeds at its ends, which the neighbour shares
+    double speed_variance_end;
   };
   struct Form {
     double chi2, prior, mu, variance, slip, fall, fall_variance;
@@ -105,6 +114,7 @@ class PeakFit {
   void find_course() noexcept;
   void find_stretch() noexcept;
   void find_reached(std::size_t length) noexcept;
+  double force_variance(double begin_s, double end_s) const noexcept;
   double span() const noexcept { return std::max(0.3, slip_high_ - slip_low_); }
   double corner(std::size_t index) const noexcept;
   void begin_rise(const Rise& rise) noexcept;
@@ -115,6 +125,7 @@ class PeakFit {
   void solve(double corner, bool has_corner) noexcept;
   void average() noexcept;
   void finish() noexcept;
+  double tested_until_s() const noexcept;
   void sum_for_health() noexcept;
   void test_best_form() noexcept;
   double speed_at_edge(std::size_t cell, double& t_s, double& weight_s) const noexcept;

@@ -230,7 +230,6 @@ class RobustEstimator final : public SlipCurveEstimator {
   void judge() noexcept {
     if (out_.stop == StopReason::kInputs || out_.stop == StopReason::kRatio) return;
     const PeakFitResult& fit = fit_.result();
-    const double end_s = record_.duration_s();
     // Torque that fades is no friction that falls.
     const bool seen = out_.stop == StopReason::kSlope
                           ? fit.inside >= kInsideAfterStop
@@ -249,13 +248,25 @@ class RobustEstimator final : public SlipCurveEstimator {
       peak_.ci95_high = fit.mu + kNormal95 * peak_.mu_max_std;
       peak_.sigma_peak_percent = fit.slip;
     } else if (fit.reached > 0.0) {
-      const double common = std::sqrt(common_variance(fit.reached, end_s, 1.0));
-      const double fitted = fit.valid ? fit.mu - kFittedDeviations * std::sqrt(fit.variance) : 0.0;
-      const bool better = fitted > fit.reached;
-      peak_.kind = PeakKind::kLowerBound;
-      peak_.mu_max = (better ? fitted : fit.reached) * (1.0 - kBoundDeviations * common);
-      peak_.sigma_peak_percent = better ? fit.slip : fit.reached_slip;
+      take_lower_bound(fit);
     }
+  }
+
+  // Surely reached in some window; or the fit, which leans on all of the curve. The larger.
+  void take_lower_bound(const PeakFitResult& fit) noexcept {
+    const double F = record_.force_line().at(record_.duration_s());
+    const double sensors = relative_sensor_deviation(
+        variator_, accuracies_, fit.reached * F / traction_, F, omega_s_rad_s_);
+    const double surely =
+        fit.reached *
+        (1.0 - std::hypot(kReachedDeviations * fit.reached_deviation, kBoundDeviations * sensors));
+    const double fit_variance =
+        fit.variance + fit.mu * fit.mu * common_variance(fit.mu, fit.t_s, fit.held_share);
+    const double fitted = fit.valid ? fit.mu - kFittedDeviations * std::sqrt(fit_variance) : 0.0;
+    const bool better = fitted > surely;
+    peak_.kind = PeakKind::kLowerBound;
+    peak_.mu_max = better ? fitted : surely;
+    peak_.sigma_peak_percent = better ? fit.slip : fit.reached_slip;
   }
 
   bool contradictory(const PeakFitResult& fit) const noexcept {

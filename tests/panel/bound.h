@@ -11,6 +11,9 @@ namespace beltgrip::panel {
 // curve's parameters, the deformation and the force's line. 0 where there is no peak.
 double mu_max_bound(const Scenario& scenario, const Trace& trace, double stop_s);
 
+// The same for the largest mu* up to stop_s, where the slip is told without noise.
+double reached_bound(const Scenario& scenario, const Trace& trace, double stop_s);
+
 struct DetectionBound {
   double delay_s = 0.0;            // after the peak
   double slip_past_percent = 0.0;  // beyond the peak by then

@@ -17,6 +17,7 @@ struct Judged {  // one trace
   bool has_peak = false;
   Outcome paper, robust;
   double bound = 0.0;  // of the relative deviation of mu_max, from the data up to robust's stop
+  double reached_bound = 0.0;  // the same of the largest mu*, where there is no peak
   DetectionBound detection;
 };
 
@@ -45,10 +46,13 @@ struct Figures {
   double bound = 0.0;        // root mean square, of the values whose bound is below kBoundCounts
   double sd_by_bound = 0.0;  // root mean square of their errors, divided by it
   // Of the traces without a peak:
-  double other_value = 0.0;  // wrongly a value
-  double bound_right = 0.0;  // lower bounds that are
-  double bound_share = 0.0;  // lower bounds of at least 0.97 of what was reached
-  double bound_p1 = 0.0;     // bound / reached that 99 % exceed
+  double other_value = 0.0;     // wrongly a value
+  double bound_right = 0.0;     // lower bounds that are
+  double bound_share = 0.0;     // lower bounds of at least 0.97 of what was reached
+  double bound_possible = 0.0;  // of the traces, what an efficient estimate's 99 % bounds come to
+  double bound_share_carried = 0.0;  // bound_share where the data carry it in 99 %
+  double bound_p1 = 0.0;             // bound / reached that 99 % exceed
+  int carried = 0;
 };
 
 // A stop at the very peak leaves data that do not determine mu_max at all.

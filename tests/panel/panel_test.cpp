@@ -20,7 +20,7 @@ constexpr int kTraces = 36, kBiasedTraces = 12, kBelts = 2;
 #else
 constexpr int kTraces = 90, kBiasedTraces = 40, kBelts = 8;
 #endif
-constexpr int kDisturbedTraces = 30;
+constexpr int kDisturbedTraces = 30, kFloorTraces = 40;
 
 TEST(Panel, RobustKeepsToItsFiguresAndPaperDoesNot) {
   const auto traces = judge_many(draw_scenario, kFirst, kTraces, 1, {});
@@ -51,6 +51,20 @@ TEST(Panel, RobustKeepsToItsFiguresAndPaperDoesNot) {
   EXPECT_LT(paper.stopped, 98.0);
   EXPECT_GT(paper.past_p90, 1.8);
   EXPECT_GT(paper.beyond_10, 0.0);
+}
+
+TEST(Panel, OnTheForceFloorTheBoundComesToWhatTheDataCarry) {
+  const auto on_floor = [](std::uint64_t seed) {
+    Scenario scenario = draw_scenario(seed);
+    scenario.mu_floor = 0.9 * scenario.curve.mu_max;
+    return scenario;
+  };
+  const Figures robust =
+      figures(judge_many(on_floor, kFirst, kFloorTraces, 1, {.paper = false}), Method::kRobust, {});
+  EXPECT_GE(robust.others, kFloorTraces * 3 / 4);
+  EXPECT_GE(robust.bound_right, 97.0);
+  EXPECT_GE(robust.bound_share, 85.0);
+  EXPECT_GE(robust.bound_share_carried, 95.0);
 }
 
 TEST(Panel, PlantedSensorErrorsAreInTheInterval) {
