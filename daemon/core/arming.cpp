@@ -14,6 +14,7 @@ constexpr double kPeakSlipOverdrive = 0.020;
 constexpr double kPeakSlipLow = 0.035;
 constexpr double kDetection_s = 0.03;  // filters and sampler
 constexpr double kBeyondPeak_s = 1.0;  // acquisition at the start, and slip until it is seen
+constexpr double kSlipMean = 100.0;    // samples
 constexpr double kSecondsPerTick = 1e-9;
 
 }  // namespace
@@ -71,6 +72,14 @@ bool Arming::steady(const Now& now) const noexcept {
 }
 
 void Arming::look(const Now& now) noexcept {
+  const SlipShown& shown = now.shown;
+  const double grown_max_percent =
+      std::max(kSlipLeast_percent, kSlipShare * (shown.peak_percent - shown.own_percent));
+  if (shown.peak_percent > 0.0 && slip_percent_ - shown.own_percent > grown_max_percent) {
+    search_ = {};
+    unclear_ = inhibit_bit(Inhibit::kGrip);
+    return;
+  }
   const bool low = now.omega_s_rad_s / now.omega_p_rad_s < 1.0;
   RampPoint point;
   point.torque_Nm = std::abs(now.torque_Nm);
@@ -129,7 +138,10 @@ void Arming::step(const Now& now) noexcept {
     unclear_ = 0;
     looked_ = cleared_ = false;
     search_ = {};
+    slip_percent_ = slip_samples_ = 0.0;
   }
+  slip_samples_ = std::min(slip_samples_ + 1.0, kSlipMean);
+  slip_percent_ += (now.slip_percent - slip_percent_) / slip_samples_;
   const Duration held = now.t - held_since_;
   settled_ = held >= kSettle;
   if (!settled_ || control_ != Control::kCommand) return;

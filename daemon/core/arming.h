@@ -34,12 +34,13 @@ enum class Inhibit : std::uint8_t {
   kCooldown,     // time or distance since the last request
   kUnreachable,  // the force floor lies above the peak's clamping force
   kRamp,         // no ramp whose worst-case reaction stays inside the slip limits
-  kTime          // the ramp would outlast the coast-down or the longest request
+  kTime,         // the ramp would outlast the coast-down or the longest request
+  kGrip          // friction has fallen so far that the own force hardly holds the belt
 };
-inline constexpr std::size_t kInhibitCount = 14;
+inline constexpr std::size_t kInhibitCount = 15;
 inline constexpr std::array<std::string_view, kInhibitCount> kInhibitNames{
-    "inputs", "fault", "permission", "pedal",     "brake",       "lock-up", "ratio",
-    "torque", "speed", "oil",        "cool-down", "unreachable", "ramp",    "time"};
+    "inputs", "fault", "permission", "pedal",       "brake", "lock-up", "ratio", "torque",
+    "speed",  "oil",   "cool-down",  "unreachable", "ramp",  "time",    "grip"};
 
 constexpr std::uint32_t inhibit_bit(Inhibit inhibit) {
   return std::uint32_t{1} << static_cast<unsigned>(inhibit);
@@ -55,6 +56,15 @@ struct Conditions {
   double oil_degC = 80.0;
 };
 
+// Slip of the last experiment with a value since the start of the daemon, under the controller's
+// own force and at the peak. The law of that force knows nothing of friction: where the belt slips
+// more under it than it did, friction has fallen. A request ends in that force, which then must
+// still hold the belt.
+struct SlipShown {
+  double own_percent = 0.0;
+  double peak_percent = 0.0;  // 0: there was none
+};
+
 class Arming {
  public:
   static constexpr Duration kSettle = 1500 * kMillisecond;
@@ -64,6 +74,10 @@ class Arming {
   static constexpr double kRatioDrift = 0.01;
   static constexpr double kTorqueDrift = 0.25;
   static constexpr double kTorqueDrift_Nm = 4.0;
+  // Of the way from own_percent to peak_percent: on a tanh curve the own force is then at 90 % of
+  // the peak, less than the friction of a cylinder and a falling engine torque may take away.
+  static constexpr double kSlipShare = 0.4;
+  static constexpr double kSlipLeast_percent = 0.15;  // beyond what sensors and deformation explain
 
   explicit Arming(const Config& config);
 
@@ -76,7 +90,9 @@ class Arming {
     double omega_s_rad_s = 0.0;
     double torque_Nm = 0.0;  // on the belt, signed
     double clamp_force_N = 0.0;
+    double slip_percent = 0.0;  // in the direction of the torque
     double mu_max_known = 0.0;  // the last value; 0: none
+    SlipShown shown;            // at this direction and end stop
     Duration stale = 0;         // how long the slowest input may be silent
     Conditions conditions;
   };
@@ -89,15 +105,17 @@ class Arming {
   bool cleared() const noexcept { return cleared_ && inhibits_ == 0; }
   std::uint32_t inhibits() const noexcept { return inhibits_; }
   const Ramp& ramp() const noexcept { return ramp_; }
+  // Mean since the trigger holds, of the last half second.
+  double slip_percent() const noexcept { return slip_percent_; }
 
   // The force below which no request goes, at this secondary speed.
   double floor_N(double omega_s_rad_s) const noexcept;
   bool at_end_stop(double ratio) const noexcept;
 
  private:
-  static constexpr std::uint32_t kClearance = inhibit_bit(Inhibit::kUnreachable) |
-                                              inhibit_bit(Inhibit::kRamp) |
-                                              inhibit_bit(Inhibit::kTime);
+  static constexpr std::uint32_t kClearance =
+      inhibit_bit(Inhibit::kUnreachable) | inhibit_bit(Inhibit::kRamp) |
+      inhibit_bit(Inhibit::kTime) | inhibit_bit(Inhibit::kGrip);
   std::uint32_t preconditions(const Now& now) const noexcept;
   void look(const Now& now) noexcept;
   std::uint32_t clearance(const Now& now) const noexcept;
@@ -122,6 +140,8 @@ class Arming {
   double ratio_since_ = 0.0;
   double torque_since_ = 0.0;
   double omega_p_since_ = 0.0;
+  double slip_percent_ = 0.0;
+  double slip_samples_ = 0.0;
   RampSearch search_;
   Ramp ramp_;  // found by the last search
 };

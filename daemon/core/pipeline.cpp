@@ -52,6 +52,13 @@ StopReason reason_of(SafetyVerdict verdict) noexcept {
   }
 }
 
+// Why an experiment was refused.
+StopReason reason_of(std::uint32_t inhibits) noexcept {
+  if ((inhibits & inhibit_bit(Inhibit::kUnreachable)) != 0) return StopReason::kForceFloor;
+  if ((inhibits & inhibit_bit(Inhibit::kGrip)) != 0) return StopReason::kSlip;
+  return StopReason::kTime;
+}
+
 }  // namespace
 
 // --- frames ---------------------------------------------------------------------------------
@@ -153,6 +160,12 @@ double Pipeline::Parts::friction_known() const noexcept {
   return estimate.kind == PeakKind::kValue ? estimate.mu_max : 0.0;
 }
 
+SlipShown& Pipeline::Parts::shown(estimator::Direction direction,
+                                  estimator::EndStop end_stop) noexcept {
+  return slip_shown[direction == estimator::Direction::kDrive ? 0 : 1]
+                   [end_stop == estimator::EndStop::kOverdrive ? 0 : 1];
+}
+
 bool Pipeline::Parts::by_conditions() const noexcept {
   return config.trigger == Trigger::kCoastDown || config.trigger == Trigger::kSteady;
 }
@@ -222,7 +235,9 @@ void Pipeline::Parts::arm(MonoTime t) noexcept {
   now.omega_s_rad_s = last.sample.omega_s_rad_s;
   now.torque_Nm = last.curve.torque_p_Nm;
   now.clamp_force_N = measured_force_N();
+  now.slip_percent = last.curve.sigma_star_percent;
   now.mu_max_known = estimate.kind == PeakKind::kValue ? estimate.mu_max : 0.0;
+  now.shown = shown(last.curve.direction, last.curve.end_stop);
   now.stale = slowest_stale();
   now.conditions = conditions;
   arming.step(now);
@@ -367,6 +382,10 @@ void Pipeline::Parts::publish_result(Outcome outcome) noexcept {
   estimate.mu_max_std = running.peak.mu_max_std;
   ++estimate.experiment_count;
   estimate_changed = true;
+  if (commands() && running.peak.kind == PeakKind::kValue) {
+    shown(running.direction, running.end_stop) = {slip_own_percent,
+                                                  running.peak.sigma_peak_percent};
+  }
 }
 
 void Pipeline::Parts::apply(const Transition& transition, MonoTime t) noexcept {
@@ -382,6 +401,7 @@ void Pipeline::Parts::apply(const Transition& transition, MonoTime t) noexcept {
       estimator->reset();
       running = {};
       running.start = t;
+      slip_own_percent = arming.slip_percent();
       refused = false;
       break;
     case Action::kRefuse:
@@ -389,9 +409,7 @@ void Pipeline::Parts::apply(const Transition& transition, MonoTime t) noexcept {
       running.start = t;
       refused = true;
       request.end(t);
-      stop(t, (arming.inhibits() & inhibit_bit(Inhibit::kUnreachable)) != 0
-                  ? StopReason::kForceFloor
-                  : StopReason::kTime);
+      stop(t, reason_of(arming.inhibits()));
       break;
     case Action::kStop:
       macro_slip_stop = true;
@@ -587,6 +605,7 @@ void Pipeline::Parts::go_on_from(const Parts& before, bool keeps_results) noexce
   estimate = before.estimate;
   result = before.result;
   learned = before.learned;
+  slip_shown = before.slip_shown;
 }
 
 void Pipeline::give_way_to(Pipeline& next, bool keeps_results) noexcept {

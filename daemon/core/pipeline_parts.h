@@ -45,6 +45,7 @@ struct Pipeline::Parts {
   Outcome judged_outcome() const noexcept;
   void raise_history_faults(MonoTime t) noexcept;
   double friction_known() const noexcept;
+  SlipShown& shown(estimator::Direction direction, estimator::EndStop end_stop) noexcept;
   void report(MonoTime t) noexcept;
   Publication publication() const noexcept;
   void pass_gate(const Outbox& wanted, Outbox& outbox) noexcept;
@@ -80,6 +81,9 @@ struct Pipeline::Parts {
   EstimateValues estimate;             // the last that had a result
   estimator::LearnedFriction learned;  // over all experiments, where they are kept
   bool contradictory = false;          // the last result, in itself
+  double slip_own_percent = 0.0;       // of the experiment under way, before it began
+  // By direction and end stop.
+  std::array<std::array<SlipShown, 2>, 2> slip_shown{};
 
   struct BusHealth {
     bool needed = false;                      // an experiment cannot go on without it

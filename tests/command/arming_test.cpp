@@ -179,6 +179,35 @@ TEST_F(ArmingTest, AKnownBeltNeedsLessReach) {
   EXPECT_EQ(arming.inhibits(), 0U);
 }
 
+TEST_F(ArmingTest, NoRequestWhereTheOwnForceHardlyHoldsTheBelt) {
+  now_.shown = {0.6, 1.6};
+  now_.slip_percent = 0.99;  // 40 % of the way to the peak: 1.0 %
+  run(2 * kSecond);
+  EXPECT_EQ(arming_.inhibits(), 0U);
+  EXPECT_TRUE(arming_.cleared());
+  EXPECT_NEAR(arming_.slip_percent(), 0.99, 1e-9);
+  now_.slip_percent = 1.02;
+  run(3 * kSecond);
+  EXPECT_EQ(arming_.inhibits(), inhibit_bit(Inhibit::kGrip));
+  EXPECT_TRUE(arming_.triggered());
+  EXPECT_FALSE(arming_.cleared());
+  now_.slip_percent = 0.7;  // it was something else
+  run(3 * kSecond);
+  EXPECT_TRUE(arming_.cleared());
+}
+
+TEST_F(ArmingTest, SlipOfTheOwnForceIsJudgedAgainstAPeakOnly) {
+  now_.slip_percent = 3.0;
+  run(2 * kSecond);
+  EXPECT_TRUE(arming_.cleared());
+  now_.shown = {2.9, 3.0};  // a narrow one: noise is no loss of grip
+  run(2 * kSecond);
+  EXPECT_TRUE(arming_.cleared());
+  now_.slip_percent = 3.06;
+  run(4 * kSecond);
+  EXPECT_EQ(arming_.inhibits(), inhibit_bit(Inhibit::kGrip));
+}
+
 TEST_F(ArmingTest, NoRampWhereTheSlipWouldRunAway) {
   now_.torque_Nm = -90.0;
   now_.clamp_force_N = 9000.0;
