@@ -42,15 +42,39 @@ daemon::Config configuration(const CampaignCase& given) {
   return config;
 }
 
+bool beyond_limits(const sim::RequestTruth& request, bool has_peak) {
+  // Without a peak there is no macro slip whose energy could be counted.
+  return request.slip_max > kSlip || request.slip_speed_max_m_s > kSlipSpeed_m_s ||
+         (has_peak && request.macro_energy_J > kEnergy_J);
+}
+
+// The run again, but the controller ends the request one cycle before its belt passes the peak.
+void judge_at_once(const CampaignCase& given, const sim::RequestTruth& broken,
+                   CampaignVerdict& verdict) {
+  sim::VehicleScenario scenario = given.scenario;
+  sim::FaultStep end;
+  end.kind = FaultKind::kTcuWithdraws;
+  end.at_s = broken.peak_passed_s - scenario.tcu.cycle_s;
+  end.for_s = scenario.duration_s;
+  scenario.faults.push_back(end);
+  for (const sim::RequestTruth& request :
+       run_closed(scenario, configuration(given), given.seed).requests) {
+    if (request.begin_s != broken.begin_s) continue;
+    verdict.at_once_slip_percent = 100.0 * request.slip_max;
+    verdict.at_once_energy_J = request.macro_energy_J;
+    verdict.broken_at_once = beyond_limits(request, verdict.has_peak);
+  }
+}
+
 void judge_slip(const CampaignCase& given, const LoopRun& run, CampaignVerdict& verdict) {
   bool beyond = run.stalls > 0;
+  const sim::RequestTruth* broken = nullptr;
   for (const sim::RequestTruth& request : run.requests) {
     verdict.slip_max_percent = std::max(verdict.slip_max_percent, 100.0 * request.slip_max);
     verdict.slip_speed_max_m_s = std::max(verdict.slip_speed_max_m_s, request.slip_speed_max_m_s);
     verdict.slip_stop_percent = std::max(verdict.slip_stop_percent, 100.0 * request.slip_at_end);
     verdict.energy_J = std::max(verdict.energy_J, request.macro_energy_J);
-    beyond = beyond || request.slip_max > kSlip || request.slip_speed_max_m_s > kSlipSpeed_m_s ||
-             request.macro_energy_J > kEnergy_J;
+    beyond = beyond || beyond_limits(request, true);
   }
   if (!beyond) return;
   const LoopRun alone = run_alone(given.scenario, given.seed);
@@ -60,6 +84,7 @@ void judge_slip(const CampaignCase& given, const LoopRun& run, CampaignVerdict& 
     const double alone_slip = alone.slip_max(request.begin_s, end_s);
     worst = std::max(worst, alone_slip);
     if (!given.guaranteed || request.slip_max <= alone_slip + kAlone) continue;
+    if (beyond_limits(request, verdict.has_peak)) broken = &request;
     if (request.slip_max > kSlip) {
       verdict.violations.push_back("G1: slip " + text(100.0 * request.slip_max) + " %, alone " +
                                    text(100.0 * alone_slip) + " %");
@@ -68,7 +93,6 @@ void judge_slip(const CampaignCase& given, const LoopRun& run, CampaignVerdict& 
         std::max(kSlipSpeed_m_s, alone.slip_speed_max(request.begin_s, end_s))) {
       verdict.violations.push_back("G1: slip speed " + text(request.slip_speed_max_m_s) + " m/s");
     }
-    // Without a peak there is no macro slip whose energy could be counted.
     if (verdict.has_peak && request.macro_energy_J > kEnergy_J) {
       verdict.violations.push_back("G1: energy " + text(request.macro_energy_J) + " J");
     }
@@ -77,6 +101,7 @@ void judge_slip(const CampaignCase& given, const LoopRun& run, CampaignVerdict& 
   if (run.stalls > alone.stalls && given.guaranteed) {
     verdict.violations.push_back("G1: the engine stalled");
   }
+  if (broken != nullptr) judge_at_once(given, *broken, verdict);
 }
 
 void judge_results(const LoopRun& run, CampaignVerdict& verdict) {
@@ -152,6 +177,11 @@ std::string to_json(const CampaignVerdict& v) {
                              {"has_peak", v.has_peak},
                              {"violations", v.violations}};
   if (v.alone_slip_percent) out["alone_slip_percent"] = rounded(*v.alone_slip_percent);
+  if (v.at_once_slip_percent) {
+    out["at_once"] = {{"slip_percent", rounded(*v.at_once_slip_percent)},
+                      {"energy_J", rounded(*v.at_once_energy_J)},
+                      {"broken", v.broken_at_once}};
+  }
   out["experiments"] = nlohmann::ordered_json::array();
   for (const CampaignVerdict::Experiment& each : v.experiments) {
     nlohmann::ordered_json row{{"outcome", each.outcome}, {"stop_reason", each.stop_reason}};

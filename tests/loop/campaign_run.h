@@ -31,6 +31,10 @@ struct CampaignVerdict {
   double energy_J = 0.0;  // beyond the peak's slip
   bool has_peak = true;
   std::optional<double> alone_slip_percent;  // the same instants without the daemon
+  // Where G1 is broken: had the controller taken its force back as the belt passed its peak, before
+  // any reaction can.
+  std::optional<double> at_once_slip_percent, at_once_energy_J;
+  bool broken_at_once = false;  // and G1 is broken even then
   std::vector<Reaction> reactions;
   std::vector<std::string> violations;
 };

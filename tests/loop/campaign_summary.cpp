@@ -77,7 +77,7 @@ bool part_of_the_daemon(const json& row) {
 }  // namespace
 
 int summarise(const CampaignResults& results) {
-  int broken = 0, completed = 0, covered = 0;
+  int broken = 0, at_once = 0, completed = 0, covered = 0;
   Slips nominal, single, any;
   std::map<std::string, Shares> shares;
   std::map<std::string, std::vector<double>> decided;
@@ -88,6 +88,12 @@ int summarise(const CampaignResults& results) {
       std::printf("broken: seed %llu, %s, %s: %s\n", static_cast<unsigned long long>(seed),
                   row["base"].get<std::string>().c_str(), row["faults"].dump().c_str(),
                   row["violations"].dump().c_str());
+      if (row.contains("at_once")) {
+        at_once += row["at_once"]["broken"] ? 1 : 0;
+        std::printf("  with the force taken back as the belt passed its peak: %.1f %%, %.0f J\n",
+                    row["at_once"]["slip_percent"].get<double>(),
+                    row["at_once"]["energy_J"].get<double>());
+      }
     }
     const std::size_t faults = row["faults"].size();
     if (row["requests"] > 0) any.add(row);
@@ -109,7 +115,8 @@ int summarise(const CampaignResults& results) {
       errors.push_back(std::abs(each["mu_error_percent"].get<double>()));
     }
   }
-  std::printf("cases %zu, broken %d\n", results.size(), broken);
+  std::printf("cases %zu, broken %d, of these %d by any reaction that comes after the peak\n",
+              results.size(), broken, at_once);
   nominal.print("nothing wrong");
   single.print("single fault, without those that slip as far without the daemon");
   any.print("all");

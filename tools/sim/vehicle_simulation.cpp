@@ -189,6 +189,7 @@ void VehicleSimulation::observe(double t_s) {
   if (!request.peak_passed) {
     request.mu_max = belt.mu_max;
     request.peak_passed = slip >= belt.peak_slip;
+    request.peak_passed_s = t_s;
   }
   request.slip_max = std::max(request.slip_max, slip);
   request.slip_speed_max_m_s = std::max(request.slip_speed_max_m_s, belt.slip_speed_m_s);

@@ -58,6 +58,7 @@ struct RequestTruth {
   bool over = false;
   double mu_max = 0.0;  // of the belt when it peaked, or at the end
   bool peak_passed = false;
+  double peak_passed_s = 0.0;
   double slip_max = 0.0;  // fraction, magnitude
   double slip_speed_max_m_s = 0.0;
   double slip_at_end = 0.0;     // when the controller took its force back
