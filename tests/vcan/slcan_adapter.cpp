@@ -10,6 +10,7 @@
 #include <array>
 #include <cerrno>
 #include <cstdlib>
+#include <string_view>
 #include <system_error>
 
 namespace beltgrip::test {
@@ -45,6 +46,10 @@ SlcanAdapter::SlcanAdapter() : master_(posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXE
 }
 
 SlcanAdapter::~SlcanAdapter() {
+  if (SlcanAdapter* const other = other_) {
+    const std::lock_guard lock(other->mutex_);  // its thread may be passing something on to here
+    other->other_ = nullptr;
+  }
   ending_ = true;
   thread_.join();
   close(slave_);
@@ -54,6 +59,18 @@ SlcanAdapter::~SlcanAdapter() {
 void SlcanAdapter::say(const std::string& line) {
   const std::string text = line + "\r";
   if (write(master_, text.data(), text.size()) != static_cast<ssize_t>(text.size())) fail("write");
+}
+
+void SlcanAdapter::join(SlcanAdapter& one, SlcanAdapter& other) {
+  one.other_ = &other;
+  other.other_ = &one;
+}
+
+void SlcanAdapter::pass_on(const std::string& line) {
+  SlcanAdapter* const other = other_;
+  const bool is_frame =
+      !line.empty() && std::string_view("tTrR").find(line[0]) != std::string::npos;
+  if (is_frame && other != nullptr && !cut_off_ && !other->cut_off_) other->say(line);
 }
 
 void SlcanAdapter::pump() {
@@ -68,6 +85,7 @@ void SlcanAdapter::pump() {
     const std::lock_guard lock(mutex_);
     for (std::size_t end; (end = rest.find('\r')) != std::string::npos; rest.erase(0, end + 1)) {
       lines_.push_back(rest.substr(0, end));
+      pass_on(lines_.back());
     }
     came_.notify_all();
   }

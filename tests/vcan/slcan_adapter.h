@@ -27,6 +27,10 @@ class SlcanAdapter {
   void say(const std::string& line);
   // While stuck, nothing that the driver sends is taken.
   void stick(bool stuck) { stuck_ = stuck; }
+  // Two nodes of one bus: what the driver sends here arrives at `other`, and the other way round.
+  static void join(SlcanAdapter& one, SlcanAdapter& other);
+  // While cut off, this node neither hears nor is heard.
+  void cut_off(bool off) { cut_off_ = off; }
   // True once `done` holds for the lines that came from the driver since the last forget().
   bool wait(const std::function<bool(const std::vector<std::string>&)>& done,
             std::chrono::milliseconds limit);
@@ -34,10 +38,12 @@ class SlcanAdapter {
 
  private:
   void pump();
+  void pass_on(const std::string& line);
 
   int master_ = -1, slave_ = -1;
   std::string interface_;
-  std::atomic<bool> stuck_{false}, ending_{false};
+  std::atomic<bool> stuck_{false}, ending_{false}, cut_off_{false};
+  std::atomic<SlcanAdapter*> other_{nullptr};
   std::mutex mutex_;
   std::condition_variable came_;
   std::vector<std::string> lines_;

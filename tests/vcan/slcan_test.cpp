@@ -11,12 +11,15 @@
 #include <atomic>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <thread>
 
 #include "tests/vcan/rig.h"
 #include "tests/vcan/slcan_adapter.h"
+#include "tests/vcan/watch.h"
 
 namespace beltgrip::test {
 namespace {
@@ -85,6 +88,21 @@ class Controller : public testing::Test {
   std::unique_ptr<Process> daemon() const {
     return std::make_unique<Process>(std::vector<std::string>{
         program("beltgripd"), "--config", write_rig_config(folder_, interface())});
+  }
+  // The scenario's own configuration, with this interface.
+  std::string vehicle_config(const std::string& scenario) const {
+    const RunResult made = run({program("beltgrip"), "simulate", "--scenario", scenario,
+                                "--duration", "0.2", "--out-dir", folder_},
+                               kLimit);
+    EXPECT_EQ(made.status, 0) << made.err;
+    const std::string path = folder_ + "/beltgrip.toml";
+    std::stringstream text;
+    text << std::ifstream(path).rdbuf();
+    std::string toml = text.str();
+    const std::string given = "\"vcan0\"";
+    toml.replace(toml.find(given), given.size(), '"' + interface() + '"');
+    std::ofstream(path) << toml;
+    return path;
   }
   // Frames of BeltGrip's status leave through the adapter.
   bool publishes() const {
@@ -179,6 +197,49 @@ TEST_F(Controller, BusOffEndsTheExperimentAndTrafficResumesAfterwards) {
   EXPECT_TRUE(publishes());
   running->signal(SIGTERM);
   EXPECT_EQ(running->wait(kLimit), 0);
+}
+
+// The virtual vehicle is the bus's other node and obeys; its own account of its belt is the judge.
+TEST_F(Controller, BusOffEndsARequestAndAnotherOneComesThrough) {
+  SlcanAdapter vehicles;
+  const std::string scenario = BELTGRIP_SOURCE_DIR "/tests/vcan/downhill.toml";
+  ASSERT_EQ(
+      can({"up", vehicles.interface(), "--bitrate", "500000", "--queue-length", "1000"}).status, 0);
+  // Long enough for a guest that stands still now and then; a queue that is full is another test.
+  ASSERT_EQ(can({"up", interface(), "--bitrate", "500000", "--queue-length", "1000"}).status, 0);
+  SlcanAdapter::join(adapter(), vehicles);
+  const std::string config = vehicle_config(scenario);
+  const BusSocket far(vehicles.interface());
+  Process vehicle(
+      {program("beltgrip"), "simulate", "--scenario", scenario, "--bus", vehicles.interface()});
+  Process running({program("beltgripd"), "--config", config});
+  Watch before;
+  // In the midst of a request: half a second of it has been on the bus.
+  ASSERT_TRUE(before.until(far, [](const Watch& now) { return active_at_end(now) >= 50; }))
+      << running.err();
+
+  adapter().cut_off(true);
+  adapter().say("sb256000");
+  EXPECT_TRUE(running.wait_for_error("experiment Aborted, stop reason Bus", kLimit))
+      << running.err();
+  EXPECT_EQ(status().at("state"), "bus-off");
+  adapter().say("sa000000");
+  ASSERT_EQ(can({"down", interface()}).status, 0);
+  adapter().cut_off(false);
+  ASSERT_NO_FATAL_FAILURE(up());
+  EXPECT_TRUE(running.wait_for_error("fault BusOff gone", kLimit)) << running.err();
+
+  // It asks again, and the vehicle hears it.
+  const BusSocket again(vehicles.interface());
+  Watch after;
+  ASSERT_TRUE(after.until(again, asks)) << running.err();
+  running.signal(SIGTERM);
+  EXPECT_EQ(running.wait(kLimit), 0);
+  vehicle.signal(SIGTERM);
+  ASSERT_EQ(vehicle.wait(kLimit), 0) << vehicle.err();
+  const auto truth = nlohmann::json::parse(vehicle.out());
+  EXPECT_EQ(truth.at("requests_outside_limits"), 0) << truth.dump(1);
+  EXPECT_GE(truth.at("requests").size(), 1U) << truth.dump(1);
 }
 
 TEST_F(Controller, AFullQueueIsAFaultAndPasses) {

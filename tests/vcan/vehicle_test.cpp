@@ -12,6 +12,7 @@
 #include <random>
 
 #include "tests/vcan/rig.h"
+#include "tests/vcan/watch.h"
 
 namespace beltgrip::test {
 namespace {
@@ -20,9 +21,6 @@ using nlohmann::json;
 
 constexpr canid_t kClamp = 0x6A2;
 constexpr double kMuMax = 0.105;
-constexpr std::int64_t kMs = 1'000'000;
-// An experiment every 7 s; one that a busy machine spoils is followed by another.
-constexpr Milliseconds kExperiments{60000};
 
 class Vehicle : public Vcan {
  protected:
@@ -57,58 +55,6 @@ class Vehicle : public Vcan {
   static constexpr const char* kScenario = BELTGRIP_SOURCE_DIR "/tests/vcan/downhill.toml";
   std::optional<Process> vehicle_;
 };
-
-// What one daemon says on the bus.
-struct Watch {
-  PublishedFrames published{PublishedFrames::Control::kCommand};
-  std::int64_t last_ns = 0;  // of any frame
-
-  bool take(const SeenFrame& seen) {
-    last_ns = seen.t_ns;
-    return published.take(seen);
-  }
-  double clamp(const char* signal) const {
-    const auto signals = published.last("BeltGripClamp").signals;
-    return signals.empty() ? 0.0 : signals.at(signal);
-  }
-  double estimate(const char* signal) const {
-    const auto signals = published.last("BeltGripEstimate").signals;
-    return signals.empty() ? 0.0 : signals.at(signal);
-  }
-  double status(const char* signal) const {
-    const auto signals = published.last("BeltGripStatus").signals;
-    return signals.empty() ? 0.0 : signals.at(signal);
-  }
-  bool asking() const { return clamp("RequestActive") == 1.0; }
-  bool until(const BusSocket& bus, const std::function<bool(const Watch&)>& done,
-             Milliseconds limit = kExperiments) {
-    return bus
-        .receive_until(
-            [&](const SeenFrame& seen) {
-              take(seen);
-              return done(*this);
-            },
-            limit)
-        .has_value();
-  }
-  // The bus's own time passes; the vehicle sends all the while.
-  bool pass(const BusSocket& bus, std::int64_t for_ns) {
-    const std::int64_t end_ns = last_ns + for_ns;
-    return until(bus, [end_ns](const Watch& now) { return now.last_ns >= end_ns; });
-  }
-};
-
-bool asks(const Watch& watch) { return watch.asking(); }
-bool has_value(const Watch& watch) { return watch.estimate("MuMaxValid") == 1.0; }
-
-// The last frames of a request: this many inactive ones in a row.
-std::size_t inactive_at_end(const Watch& watch) {
-  const std::vector<Published>& all = watch.published.of("BeltGripClamp");
-  const auto active = std::find_if(all.rbegin(), all.rend(), [](const Published& frame) {
-    return frame.signals.at("RequestActive") == 1.0;
-  });
-  return static_cast<std::size_t>(active - all.rbegin());
-}
 
 TEST_F(Vehicle, AnExperimentFromTheRequestToTheResult) {
   const BusSocket bus("vcan0");
