@@ -17,10 +17,14 @@ namespace {
 
 constexpr double kPublished_hz = 8.0;  // low-pass of the published mu* and slip only
 constexpr double kExcitationWindow_s = 1.0;
-constexpr double kInsideAfterStop = 0.5;    // probability that the data contain the peak: with a
-constexpr double kInsideWithoutStop = 0.9;  // stop by the slope, and with any other end
-constexpr double kFallDeviations = 3.0;     // by which mu* must then have fallen
-constexpr double kFormDeviation = 5e-4;     // of mu: what the forms of the fit leave
+// Probability that the data contain the peak: with a stop by the slope, and with any other end.
+// Peaks lie at 1 to 4 percent of slip: beyond the usual, a curve that is level within its noise
+// rather rises on, by a factor e of the odds for each percent.
+constexpr double kInsideAfterStop = 0.5;
+constexpr double kInsideWithoutStop = 0.9;
+constexpr double kUsualPeak_percent = 2.5;
+constexpr double kFallDeviations = 3.0;  // by which mu* must then have fallen
+constexpr double kFormDeviation = 5e-4;  // of mu: what the forms of the fit leave
 constexpr int kNarrowInARow = 4;
 constexpr double kClimb = 1.05;    // mu* at the stop, of the first one; or
 constexpr double kLowered = 0.99;  // the clamp force
@@ -33,6 +37,12 @@ constexpr double kSwing_percent = 0.3, kSwingDeviations = 3.0, kSwingShare = 0.4
 constexpr double kInnovation = 5.0;
 constexpr double kRuns = 4.5;
 constexpr double kBoundDeviations = 2.33;  // 99 %, one-sided
+
+double inside_needed(double slip_percent) {
+  constexpr double kOdds = kInsideAfterStop / (1.0 - kInsideAfterStop);
+  const double odds = kOdds * std::exp(std::max(0.0, slip_percent - kUsualPeak_percent));
+  return odds / (1.0 + odds);
+}
 
 class RobustEstimator final : public SlipCurveEstimator {
  public:
@@ -232,7 +242,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     const PeakFitResult& fit = fit_.result();
     // Torque that fades is no friction that falls.
     const bool seen = out_.stop == StopReason::kSlope
-                          ? fit.inside >= kInsideAfterStop
+                          ? fit.inside >= inside_needed(fit.slip)
                           : out_.stop != StopReason::kTorque && fit.inside >= kInsideWithoutStop &&
                                 fit.fall > kFallDeviations * std::sqrt(fit.fall_variance);
     peak_.samples = std::lround(fit.duration_s * sample_rate_hz_);

@@ -20,7 +20,7 @@ constexpr int kTraces = 36, kBiasedTraces = 12, kBelts = 2;
 #else
 constexpr int kTraces = 90, kBiasedTraces = 40, kBelts = 8;
 #endif
-constexpr int kDisturbedTraces = 30, kFloorTraces = 40;
+constexpr int kDisturbedTraces = 30, kFloorTraces = 40, kRisingTraces = 60;
 
 TEST(Panel, RobustKeepsToItsFiguresAndPaperDoesNot) {
   const auto traces = judge_many(draw_scenario, kFirst, kTraces, 1, {});
@@ -65,6 +65,20 @@ TEST(Panel, OnTheForceFloorTheBoundComesToWhatTheDataCarry) {
   EXPECT_GE(robust.bound_right, 97.0);
   EXPECT_GE(robust.bound_share, 85.0);
   EXPECT_GE(robust.bound_share_carried, 95.0);
+}
+
+TEST(Panel, ACurveThatRisesForEverSeldomGivesAValue) {
+  const auto rising = [](std::uint64_t seed) {
+    Scenario scenario = draw_scenario(seed);
+    scenario.curve.family = Family::kMonotone;
+    scenario.curve.shape = 0.15;
+    return scenario;
+  };
+  const Figures robust =
+      figures(judge_many(rising, kFirst, kRisingTraces, 1, {.paper = false}), Method::kRobust, {});
+  EXPECT_EQ(robust.peaks, 0);
+  EXPECT_LE(robust.other_value, 10.0);
+  EXPECT_GE(robust.bound_right, 97.0);
 }
 
 TEST(Panel, PlantedSensorErrorsAreInTheInterval) {
