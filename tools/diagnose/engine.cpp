@@ -138,11 +138,21 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
   }
   std::vector<int> columns(parameters.size());
   for (std::size_t i = 0; i < columns.size(); ++i) columns[i] = static_cast<int>(i);
-  const auto summaries_at = [&](const ModelState& state, const std::vector<int>& wanted) {
+  const auto residuals_at = [&](const ModelState& state) {
+    std::vector<Residuals> out(campaign.runs.size());
+    for (std::size_t e = 0; e < out.size(); ++e) {
+      if (campaign.runs[e].valid_count == 0) continue;
+      out[e] = residuals_of(campaign, static_cast<int>(e), state);
+    }
+    return out;
+  };
+  const auto summaries_at = [&](const ModelState& state, const std::vector<Residuals>& at,
+                                const std::vector<int>& wanted) {
     std::vector<Summary> out;
     for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
       if (campaign.runs[e].valid_count == 0) continue;
-      out.push_back(summarise(campaign, static_cast<int>(e), state, wanted, scales, whitening));
+      out.push_back(
+          summarise(campaign, static_cast<int>(e), state, at[e], wanted, scales, whitening));
     }
     return out;
   };
@@ -155,7 +165,8 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
   };
   Optimum best;
   best.state = start;
-  best.summaries = summaries_at(start, parameters);
+  std::vector<Residuals> at = residuals_at(start);
+  best.summaries = summaries_at(start, at, parameters);
   best.fit =
       fit_linear(best.summaries, columns, prior(parameters, start), scatter, scatter_iterations);
   best.objective = standing(start, best.summaries, best.fit.scatter);
@@ -175,13 +186,17 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
       const Fit step = fit_linear(best.summaries, columns, damped, best.fit.scatter, 0);
       ModelState next = best.state;
       move(parameters, step.step, 1.0, next);
-      gained = standing(next, summaries_at(next, {}), best.fit.scatter) - best.objective;
+      std::vector<Residuals> there = residuals_at(next);
+      gained = standing(next, summaries_at(next, there, {}), best.fit.scatter) - best.objective;
       moved = gained > 0.0;
       damping = std::clamp(moved ? 0.1 * damping : 10.0 * damping, 1e-5, 1e6);
-      if (moved) best.state = next;
+      if (moved) {
+        best.state = next;
+        at = std::move(there);
+      }
     }
     if (!moved) break;
-    best.summaries = summaries_at(best.state, parameters);
+    best.summaries = summaries_at(best.state, at, parameters);
     best.fit = fit_linear(best.summaries, columns, prior(parameters, best.state), best.fit.scatter,
                           scatter_iterations);
     best.objective = standing(best.state, best.summaries, best.fit.scatter);
@@ -288,8 +303,9 @@ void Engine::update_noise() {
   std::vector<RawColumns> raw;
   raw.reserve(campaign_.runs.size());
   for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
-    raw.push_back(
-        raw_columns(campaign_, static_cast<int>(e), state_, summary_parameters_, scales, true));
+    const auto run = static_cast<int>(e);
+    raw.push_back(raw_columns(campaign_, run, state_, residuals_of(campaign_, run, state_),
+                              summary_parameters_, scales, true));
   }
   for (int pass = 0; pass < 2; ++pass) whitening_ = fit_whitening(campaign_, raw, all, whitening_);
   summaries_.clear();

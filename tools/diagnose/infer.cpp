@@ -71,11 +71,16 @@ void whiten(const ExperimentData& data, const Whitening::Filter& filter, const A
     }
     if (const Index rest = end - k - warm; rest > 0) {
       auto block = out.segment(row, rest);
-      block = in.segment(k + warm, rest);
       const VectorXd& a = filter.coefficient.back();
-      for (int i = 0; i < full; ++i)
-        block.noalias() -= a[i] * in.segment(k + warm - 1 - i, rest).matrix();
-      block /= filter.sigma.back();
+      const auto delayed = [&](int by) { return in.segment(k + warm - by, rest).matrix(); };
+      static_assert(Whitening::kOrder == 6);  // one pass over the samples
+      if (full == Whitening::kOrder) {
+        block = (delayed(0) - a[0] * delayed(1) - a[1] * delayed(2) - a[2] * delayed(3) -
+                 a[3] * delayed(4) - a[4] * delayed(5) - a[5] * delayed(6)) /
+                filter.sigma.back();
+      } else {  // not fitted yet: order 0
+        block = delayed(0) / filter.sigma.back();
+      }
       row += rest;
     }
     k = end;
@@ -139,26 +144,47 @@ std::vector<int> kinds_of(const Campaign& campaign) {
   return kinds;
 }
 
-// Rows: valid samples, kind after kind.
-MatrixXd whitened(const Campaign& campaign, int run, const RawColumns& raw,
-                  const Whitening& whitening) {
+bool is_zero(const ArrayXd& column) {
+  return std::all_of(column.begin(), column.end(), [](double v) { return v == 0.0; });
+}
+
+// One block per kind of residual; rows: valid samples.
+std::vector<WhiteBlock> whitened(const Campaign& campaign, int run, const RawColumns& raw,
+                                 const Whitening& whitening) {
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   const std::vector<int> kinds = kinds_of(campaign);
   const Index rows = data.valid_count;
-  MatrixXd out(rows * static_cast<Index>(kinds.size()), static_cast<Index>(raw.columns.size()));
-  if (rows == 0) return out;
   const auto& weight = whitening.weight[static_cast<std::size_t>(run)];
-  for (Index j = 0; j < out.cols(); ++j) {
-    for (std::size_t i = 0; i < kinds.size(); ++i) {
-      const auto kind = static_cast<std::size_t>(kinds[i]);
-      auto block = out.col(j).segment(static_cast<Index>(i) * rows, rows);
-      whiten(data, whitening.filter[kind], raw.columns[static_cast<std::size_t>(j)][kind], block);
-      block.array() *= weight[kind];
+  std::vector<WhiteBlock> out(kinds.size());
+  const bool mixed = campaign.has_balance && whitening.cross != 0.0;
+  for (std::size_t i = kinds.size(); i-- > 0;) {  // friction last: the balance's goes into it
+    const auto kind = static_cast<std::size_t>(kinds[i]);
+    WhiteBlock& block = out[i];
+    const std::vector<int>* beside = mixed && kind == kFrictionResidual ? &out[1].columns : nullptr;
+    for (std::size_t j = 0; j < raw.columns.size(); ++j) {
+      const auto column = static_cast<int>(j);
+      if (!is_zero(raw.columns[j][kind]) ||
+          (beside != nullptr && std::binary_search(beside->begin(), beside->end(), column))) {
+        block.columns.push_back(column);
+      }
     }
-    if (campaign.has_balance && whitening.cross != 0.0) {
-      const double clean = std::sqrt(1.0 - whitening.cross * whitening.cross);
-      auto friction = out.col(j).segment(0, rows);
-      friction = (friction - whitening.cross * out.col(j).segment(rows, rows)) / clean;
+    block.rows.resize(rows, static_cast<Index>(block.columns.size()));
+    std::size_t next = 0;
+    for (Index c = 0; c < block.rows.cols(); ++c) {
+      const int column = block.columns[static_cast<std::size_t>(c)];
+      const ArrayXd& in = raw.columns[static_cast<std::size_t>(column)][kind];
+      auto to = block.rows.col(c);
+      if (in.size() == 0) {
+        to.setZero();
+      } else {
+        whiten(data, whitening.filter[kind], in, to);
+        to.array() *= weight[kind];
+      }
+      if (beside == nullptr) continue;
+      if (next < beside->size() && (*beside)[next] == column) {
+        to -= whitening.cross * out[1].rows.col(static_cast<Index>(next++));
+      }
+      to /= std::sqrt(1.0 - whitening.cross * whitening.cross);
     }
   }
   return out;
@@ -166,12 +192,12 @@ MatrixXd whitened(const Campaign& campaign, int run, const RawColumns& raw,
 
 }  // namespace
 
-RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& state,
+RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& state, Residuals at,
                        const std::vector<int>& parameters, const VectorXd& scale, bool with_random,
                        const ExtraColumns& extra) {
   RawColumns out;
   out.with_random = with_random;
-  const Residuals at = residuals_of(campaign, run, state, with_random || !parameters.empty());
+  if (with_random || !parameters.empty()) prepare_derivatives(campaign, run, state, at);
   for (std::size_t j = 0; j < parameters.size(); ++j) {
     ResidualColumns column = derivative(campaign, run, state, at, parameters[j]);
     for (ArrayXd& each : column) each *= scale[static_cast<Index>(j)];
@@ -197,28 +223,51 @@ Summary summary_of(const Campaign& campaign, int run, const RawColumns& raw,
     return {MatrixXd::Zero(count, count), MatrixXd::Zero(kRandomEffects, count),
             MatrixXd::Zero(kRandomEffects, kRandomEffects), 0};
   }
-  const MatrixXd all = whitened(campaign, run, raw, whitening);
-  const Index n = all.cols() - (raw.with_random ? kRandomEffects : 0);
-  const MatrixXd& kept = raw.with_random ? all : whitening.random[static_cast<std::size_t>(run)];
-  const auto columns = all.leftCols(n);
-  const auto random = kept.rightCols(kRandomEffects);
-  Summary out;
-  out.aa = MatrixXd::Zero(n, n);
-  out.aa.selfadjointView<Eigen::Lower>().rankUpdate(columns.transpose());
-  out.aa = MatrixXd(out.aa.selfadjointView<Eigen::Lower>());
-  out.ua = random.transpose() * columns;
-  out.uu = random.transpose() * random;
-  out.samples = static_cast<int>(all.rows());
+  const std::vector<WhiteBlock> all = whitened(campaign, run, raw, whitening);
+  const int n = static_cast<int>(raw.columns.size()) - (raw.with_random ? kRandomEffects : 0);
+  Summary out{MatrixXd::Zero(n, n), MatrixXd::Zero(kRandomEffects, n),
+              MatrixXd::Zero(kRandomEffects, kRandomEffects), 0};
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const WhiteBlock& block = all[i];
+    const auto own = std::lower_bound(block.columns.begin(), block.columns.end(), n);
+    const std::vector<int> columns(block.columns.begin(), own);
+    const auto count = static_cast<Index>(columns.size());
+    // The random effects: behind the others, or kept from before.
+    const WhiteBlock& holder =
+        raw.with_random ? block : whitening.random[static_cast<std::size_t>(run)][i];
+    std::vector<int> effects(raw.with_random
+                                 ? holder.columns.begin() + static_cast<std::ptrdiff_t>(count)
+                                 : holder.columns.begin(),
+                             holder.columns.end());
+    const auto random = holder.rows.rightCols(static_cast<Index>(effects.size()));
+    if (raw.with_random) {
+      for (int& effect : effects) effect -= n;
+    }
+    const auto rows = block.rows.leftCols(count);
+    MatrixXd aa = MatrixXd::Zero(count, count);
+    aa.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
+    out.aa(columns, columns) += MatrixXd(aa.selfadjointView<Eigen::Lower>());
+    out.ua(effects, columns) += random.transpose() * rows;
+    out.uu(effects, effects) += random.transpose() * random;
+    out.samples += static_cast<int>(block.rows.rows());
+  }
   return out;
+}
+
+Summary summarise(const Campaign& campaign, int run, const ModelState& state, Residuals at,
+                  const std::vector<int>& parameters, const VectorXd& scale,
+                  const Whitening& whitening, const ExtraColumns& extra) {
+  return summary_of(campaign, run,
+                    raw_columns(campaign, run, state, std::move(at), parameters, scale,
+                                whitening.random.empty(), extra),
+                    whitening);
 }
 
 Summary summarise(const Campaign& campaign, int run, const ModelState& state,
                   const std::vector<int>& parameters, const VectorXd& scale,
                   const Whitening& whitening, const ExtraColumns& extra) {
-  return summary_of(
-      campaign, run,
-      raw_columns(campaign, run, state, parameters, scale, whitening.random.empty(), extra),
-      whitening);
+  return summarise(campaign, run, state, residuals_of(campaign, run, state), parameters, scale,
+                   whitening, extra);
 }
 
 Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& columns,
@@ -356,16 +405,14 @@ Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>&
   const Whitening plain = out;
   for (std::size_t e = 0; e < runs; ++e) {
     const ExperimentData& data = campaign.runs[e];
-    const Index rows = data.valid_count;
-    if (rows == 0) continue;
-    const MatrixXd columns = whitened(campaign, static_cast<int>(e), raw[e], plain);
+    if (data.valid_count == 0) continue;
+    const std::vector<WhiteBlock> blocks = whitened(campaign, static_cast<int>(e), raw[e], plain);
     const VectorXd u = -(summaries[e].uu + inverse).llt().solve(summaries[e].ua * full);
-    VectorXd weights(columns.cols());
+    VectorXd weights(full.size() + u.size());
     weights << full, u;
-    const VectorXd left = columns * weights;
     for (std::size_t i = 0; i < kinds.size(); ++i) {
       const auto q = static_cast<std::size_t>(kinds[i]);
-      const auto block = left.segment(static_cast<Index>(i) * rows, rows);
+      const VectorXd block = blocks[i].rows * weights(blocks[i].columns);
       rest[q][e].assign(block.data(), block.data() + block.size());
       // Clipped: a few outliers must not make the noise look white.
       std::vector<double> size;

@@ -14,6 +14,13 @@ namespace beltgrip::diagnose {
 // ratio, zero of the torque, slip at the peak, zero of the secondary torque, zero of the tracking.
 inline constexpr int kRandomEffects = 6;
 
+// Whitened columns of one residual; those that are zero there (the other end stop's, what another
+// residual alone sees) are left out: half of them.
+struct WhiteBlock {
+  std::vector<int> columns;
+  Eigen::MatrixXd rows;  // one column per entry
+};
+
 // Prediction-error filter per residual: order p from the data, lower orders for the first samples
 // of a segment. Weights: Huber, per sample, fixed for all hypotheses.
 struct Whitening {
@@ -27,7 +34,7 @@ struct Whitening {
   std::vector<std::array<Eigen::ArrayXd, kResidualKinds>> weight;  // per experiment
   // Columns of the random effects per experiment, whitened; the same for all hypotheses. Empty:
   // from the state at hand.
-  std::vector<Eigen::MatrixXd> random;
+  std::vector<std::vector<WhiteBlock>> random;
 };
 
 // Whitened normal equations of one experiment. Columns: parameters asked for, then the residual.
@@ -90,12 +97,16 @@ struct RawColumns {
   std::vector<ResidualColumns> columns;
   bool with_random = false;
 };
-RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& state,
+// at: the residuals of this state.
+RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& state, Residuals at,
                        const std::vector<int>& parameters, const Eigen::VectorXd& scale,
                        bool with_random, const ExtraColumns& extra = {});
 Summary summary_of(const Campaign& campaign, int run, const RawColumns& raw,
                    const Whitening& whitening);
-// Both at once.
+// Both at once, with the residuals or without.
+Summary summarise(const Campaign& campaign, int run, const ModelState& state, Residuals at,
+                  const std::vector<int>& parameters, const Eigen::VectorXd& scale,
+                  const Whitening& whitening, const ExtraColumns& extra = {});
 Summary summarise(const Campaign& campaign, int run, const ModelState& state,
                   const std::vector<int>& parameters, const Eigen::VectorXd& scale,
                   const Whitening& whitening, const ExtraColumns& extra = {});

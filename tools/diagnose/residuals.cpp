@@ -40,7 +40,6 @@ double robust_sigma(std::vector<double>& values) {
 void move_to_foot(const Quantities& q, const ExperimentData& data,
                   const estimator::VariatorParameters& variator, const ArrayXd& force_share,
                   Residuals& out) {
-  out.slip = q.slip;
   out.force_N = q.force_N;
   out.ratio = q.ratio;
   out.clean_Nm = out.model_Nm;
@@ -62,8 +61,7 @@ void move_to_foot(const Quantities& q, const ExperimentData& data,
 
 }  // namespace
 
-Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state,
-                       bool for_derivatives) {
+Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state) {
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   const Quantities q = quantities(campaign, data, run, state);
   const auto curve = shapes(state.nuisance, q);
@@ -76,8 +74,6 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
   out.weight = ArrayXd::Zero(n);
   const double slip_variance = campaign.slip_noise(run) * campaign.slip_noise(run);
   const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
-  // Share of the misfit that is the clamp force's: its noise comes with the torque it carries.
-  ArrayXd force_share = ArrayXd::Zero(n);
   for (int k = 0; k < n; ++k) {
     if (!data.valid[static_cast<std::size_t>(k)]) continue;
     const auto stop = static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)]);
@@ -85,7 +81,7 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
     const double capacity = q.capacity[k];
     const double carried_Nm = q.belt_torque[k] * campaign.noise.force_N / q.force_N[k];
     const double torque_variance = sensor_variance + carried_Nm * carried_Nm;
-    force_share[k] = carried_Nm * carried_Nm / torque_variance;
+    const double slip_weight = 1.0 / slip_variance, torque_weight = 1.0 / torque_variance;
     double x = q.slip[k] / peak;
     double model = 0.0, slope = 0.0;
     // Foot point: Gauss-Newton, halved while the distance would grow.
@@ -95,14 +91,14 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
       slope = capacity * point.slope / peak;
       const double gap_slip = q.slip[k] - where * peak;
       const double gap_torque = q.belt_torque[k] - model;
-      return gap_slip * gap_slip / slip_variance + gap_torque * gap_torque / torque_variance;
+      return gap_slip * gap_slip * slip_weight + gap_torque * gap_torque * torque_weight;
     };
     double distance = at(x);
     for (int i = 0; i < 12; ++i) {
       const double gap_slip = q.slip[k] - x * peak;
       const double gap_torque = q.belt_torque[k] - model;
-      double step = (gap_slip / slip_variance + slope * gap_torque / torque_variance) /
-                    (1.0 / slip_variance + slope * slope / torque_variance) / peak;
+      double step = (gap_slip * slip_weight + slope * gap_torque * torque_weight) /
+                    ((slip_weight + slope * slope * torque_weight) * peak);
       step = std::clamp(step, -0.5, 0.5);
       const double before = x;
       for (int halving = 0; halving < 6; ++halving, step *= 0.4) {
@@ -127,7 +123,7 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
         (q.belt_torque[k] - model - slope * (q.slip[k] - x * peak)) * out.weight[k];
   }
   out.capacity = q.capacity;
-  if (for_derivatives) move_to_foot(q, data, campaign.variator, force_share, out);
+  out.slip = q.slip;
   out.balance_weight = ArrayXd::Zero(n);
   for (int k = 0; k < n; ++k) {
     const auto i = static_cast<std::size_t>(k);
@@ -148,17 +144,30 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
   return out;
 }
 
+void prepare_derivatives(const Campaign& campaign, int run, const ModelState& state,
+                         Residuals& at) {
+  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+  const Quantities q = quantities(campaign, data, run, state);
+  // Share of the misfit that is the clamp force's: its noise comes with the torque it carries.
+  const ArrayXd carried_variance = (q.belt_torque * campaign.noise.force_N / q.force_N).square();
+  const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
+  move_to_foot(q, data, campaign.variator, carried_variance / (sensor_variance + carried_variance),
+               at);
+}
+
 ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
                           const QuantityChange& change) {
   ResidualColumns out;
   const auto n = at.foot.size();
-  ArrayXd friction = ArrayXd::Zero(n);
-  if (change.torque.size() > 0) friction += change.torque;
-  if (change.slip.size() > 0) friction -= at.slope * change.slip;
-  if (change.ln_capacity.size() > 0) friction -= at.clean_Nm * change.ln_capacity;
-  out[kFrictionResidual] = (at.weight > 0.0).select(friction * at.weight, 0.0);
+  if (change.torque.size() + change.slip.size() + change.ln_capacity.size() > 0) {
+    ArrayXd friction = ArrayXd::Zero(n);
+    if (change.torque.size() > 0) friction += change.torque;
+    if (change.slip.size() > 0) friction -= at.slope * change.slip;
+    if (change.ln_capacity.size() > 0) friction -= at.clean_Nm * change.ln_capacity;
+    out[kFrictionResidual] = (at.weight > 0.0).select(friction * at.weight, 0.0);
+  }
   const auto other = [&](const ArrayXd& values, const auto& scale) -> ArrayXd {
-    if (values.size() == 0) return ArrayXd::Zero(n);
+    if (values.size() == 0) return {};
     return (at.weight > 0.0).select(values * scale, 0.0);
   };
   if (campaign.has_balance) {

@@ -64,19 +64,19 @@ struct Residuals {
   Eigen::ArrayXd foot;            // x = slip / slip at the peak, of the foot point
   Eigen::ArrayXd slope;           // dT/d(slip) there
   Eigen::ArrayXd model_Nm;        // curve at the foot point, at the measured clamp force
-  Eigen::ArrayXd clean_Nm;        // the same at the clamp force of the foot point
   Eigen::ArrayXd weight;          // 1 / (noise of the distance)
   Eigen::ArrayXd balance_weight;  // 1 / (noise of the balance)
-  Eigen::ArrayXd capacity;
-  Eigen::ArrayXd slip, force_N, ratio, output_torque;  // force and output torque at the foot point
+  Eigen::ArrayXd capacity, slip;  // as measured
+  // By prepare_derivatives only, at the clamp force of the foot point:
+  Eigen::ArrayXd clean_Nm, force_N, ratio, output_torque;
   ExperimentData clean;  // torques and pressure at the foot point: no noise in a regressor
 };
 
-// for_derivatives: with what derivative() needs.
-Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state,
-                       bool for_derivatives = true);
+Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state);
+// Adds what derivative() needs; at: the residuals of this state.
+void prepare_derivatives(const Campaign& campaign, int run, const ModelState& state, Residuals& at);
 
-// d(residual)/d(parameter). Parameters are numbered: nuisances first, then slots.
+// d(residual)/d(parameter); empty: zero. Parameters are numbered: nuisances first, then slots.
 using ResidualColumns = std::array<Eigen::ArrayXd, kResidualKinds>;
 ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& state,
                            const Residuals& at, int parameter);

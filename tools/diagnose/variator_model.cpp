@@ -92,7 +92,19 @@ Cubics cubics(const std::array<double, kEnds>& y) {
 }
 
 std::size_t interval_of(double x) {
-  std::size_t j = 0;
+  // Where to begin, per step of x no longer than the shortest interval.
+  constexpr double kPerUnit = 16.0;
+  static const std::vector<std::size_t> kFirst = [] {
+    std::vector<std::size_t> first;
+    for (int i = 0; i <= static_cast<int>(kEnd.back() * kPerUnit); ++i) {
+      std::size_t j = 0;
+      while (j + 2 < kEnds && kEnd[j + 1] < i / kPerUnit) ++j;
+      first.push_back(j);
+    }
+    return first;
+  }();
+  if (!(x < kEnd.back())) return kEnds - 2;
+  std::size_t j = kFirst[static_cast<std::size_t>(x * kPerUnit)];
   while (j + 2 < kEnds && kEnd[j + 1] < x) ++j;
   return j;
 }
@@ -220,10 +232,11 @@ Quantities evaluate(const ExperimentData& run, int experiment,
   c.belt_torque = c.torque - c.loss_Nm;
   c.ln_ratio = -nuisance[kDeformationPerkN] * 1e-3 * c.force_N;
   ArrayXd ln_ratio_0(n), radius(n);
+  const double ln_low = std::log(variator.ratio_low) + nuisance[kLnRatioLow];
+  const double ln_overdrive = std::log(variator.ratio_overdrive) + nuisance[kLnRatioOverdrive];
   for (int k = 0; k < n; ++k) {
     const bool low = run.stop[static_cast<std::size_t>(k)] == kLowStop;
-    ln_ratio_0[k] = std::log(low ? variator.ratio_low : variator.ratio_overdrive) +
-                    nuisance[low ? kLnRatioLow : kLnRatioOverdrive];
+    ln_ratio_0[k] = low ? ln_low : ln_overdrive;
     radius[k] = low ? variator.primary_radius_low_m : variator.primary_radius_overdrive_m;
   }
   apply(Stage::kRatio);
