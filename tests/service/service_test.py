@@ -8,6 +8,7 @@ import ctypes
 import json
 import os
 import pathlib
+import re
 import signal
 import socket
 import struct
@@ -161,6 +162,30 @@ trigger = "always"
         self.assertEqual((can["up"], can["driver"], can["controller"], can["state"]),
                          (True, "vcan", False, None))
 
+    def test_2c_the_daemons_own_tests_pass_inside_the_filter(self):
+        # The unit's system calls, address families and memory rules around all of daemon_test; as
+        # root, for it makes interfaces and namespaces, which its daemon does not.
+        found = properties()
+        inside = ["-p", "LimitMEMLOCK=64M"]
+        for name in ("SystemCallFilter", "SystemCallErrorNumber", "SystemCallArchitectures",
+                     "RestrictAddressFamilies", "MemoryDenyWriteExecute", "LockPersonality",
+                     "RestrictRealtime", "RestrictSUIDSGID"):
+            self.assertTrue(found[name], name)
+            inside += ["-p", f"{name}={found[name]}"]
+        # Where it was built, its programs are looked for under that path.
+        build = pathlib.Path(os.environ["SERVICE_BUILD"])
+        source = pathlib.Path(pathlib.Path("/run/vcan/cwd").read_text().strip())
+        source.mkdir(parents=True, exist_ok=True)
+        run("mount", "--bind", "/run/src", str(source))
+        begin = time.monotonic()
+        said = run("systemd-run", "-q", "--wait", "--pipe", *inside, "sh", "-c",
+                   f"grep '^Seccomp:' /proc/self/status; exec {build}/tests/daemon_test "
+                   "--gtest_brief=1")
+        self.assertRegex(said, r"Seccomp:\s+2\n")
+        passed = re.search(r"PASSED.* (\d+) tests", said)
+        self.assertTrue(passed and int(passed[1]) > 20, said)
+        print(f"inside the filter: {passed[1]} tests in {time.monotonic() - begin:.0f} s")
+
     def test_3_a_hung_loop_is_killed_and_comes_back(self):
         before = properties()
         pid = int(before["MainPID"])
@@ -259,6 +284,27 @@ trigger = "always"
         self.assertGreater(
             int(dict(line.split(":\t", 1) for line in pathlib.Path(f"/proc/{pid}/status")
                      .read_text().splitlines() if ":\t" in line)["VmLck"].split()[0]), 1000)
+
+    def test_7c_the_flight_recorder_of_the_example_keeps_what_replay_reads(self):
+        example = next(pathlib.Path("/usr/share/doc").glob("*/examples/beltgripd-record.conf"))
+        drop_in = pathlib.Path("/etc/systemd/system/beltgripd@.service.d")
+        drop_in.mkdir()
+        (drop_in / example.name).write_text(example.read_text())
+        run("systemctl", "daemon-reload")
+        run("systemctl", "restart", UNIT)
+        wait(lambda: "InputMissing" in active()["StatusText"], "a fault, which is kept")
+        run("systemctl", "stop", UNIT)
+        self.assertEqual(properties()["Result"], "success")
+        records = list(pathlib.Path("/var/lib/private/beltgrip/vcan0/record").iterdir())
+        self.assertTrue(records)
+        self.assertNotEqual(records[0].stat().st_uid, 0)  # the dynamic user's
+        said = json.loads(run("beltgrip", "replay", str(records[0]), "--config",
+                              "/etc/beltgrip/vcan0.toml", "--json", "-").splitlines()[-1])
+        self.assertEqual((said["type"], said["lines_bad"]), ("summary", 0))
+        (drop_in / example.name).unlink()
+        drop_in.rmdir()
+        run("systemctl", "daemon-reload")
+        run("systemctl", "start", UNIT)
 
     def test_8_a_wrong_configuration_is_not_tried_again(self):
         config = pathlib.Path("/etc/beltgrip/vcan0.toml")
