@@ -72,7 +72,8 @@ std::string TomlNode::found() const {
     case TomlType::kText: {
       std::string shown = text.size() > kTextMax ? text.substr(0, kTextMax) + "..." : text;
       std::replace_if(
-          shown.begin(), shown.end(), [](char c) { return c >= 0 && c < ' '; }, ' ');
+          shown.begin(), shown.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; },
+          ' ');
       return in_quotes(shown);
     }
     case TomlType::kInteger:
