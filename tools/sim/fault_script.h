@@ -68,9 +68,13 @@ enum class FaultKind : std::uint8_t {
   kDaemonDies      // the daemon is gone from here on (G5)
 };
 
+// What a fault's channel names; without one it acts on all of them.
+enum class FaultChannel : std::uint8_t { kNone, kSignal, kMessage };
+
 struct FaultKindRow {
   FaultKind kind;
   std::string_view name;  // in scenario files
+  FaultChannel channel = FaultChannel::kNone;
 };
 const std::vector<FaultKindRow>& fault_kinds();
 

@@ -43,6 +43,10 @@ struct ScenarioReader::Impl {
                                     : source + ":" + std::to_string(node.source().begin.line);
   }
 
+  static std::string row_name(const std::string& name, std::size_t row) {
+    return name + "[" + std::to_string(row) + "]";
+  }
+
   bool is_section(const std::string& name) const {
     const std::string prefix = name + ".";
     const auto inside = [&prefix](const auto& key) { return key.first.starts_with(prefix); };
@@ -61,7 +65,9 @@ struct ScenarioReader::Impl {
       return;
     }
     begin(nullptr);
+    std::size_t index = 0;
     for (const toml::node& row : *array) {
+      positions[row_name(name, index++)] = place(row);
       ScenarioReader reader;
       begin(&reader);
       reader.impl_->source = source;
@@ -168,9 +174,12 @@ void ScenarioReader::apply(const ScenarioLayer& layer) {
 }
 
 void ScenarioReader::contradiction(const std::string& name, const std::string& text) {
-  const auto position = impl_->positions.find(name);
-  errors_.push_back((position == impl_->positions.end() ? std::string() : position->second + ": ") +
-                    name + ": " + text);
+  errors_.push_back(impl_->positions.at(name) + ": " + name + ": " + text);
+}
+
+void ScenarioReader::row_contradiction(const std::string& name, std::size_t row,
+                                       const std::string& text) {
+  errors_.push_back(impl_->positions.at(Impl::row_name(name, row)) + ": " + name + ": " + text);
 }
 
 }  // namespace beltgrip::sim

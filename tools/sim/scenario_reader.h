@@ -32,6 +32,8 @@ class ScenarioReader {
   void apply(const ScenarioLayer& layer);
   // An error about a key as a whole, at the place where its value came from.
   void contradiction(const std::string& name, const std::string& text);
+  // The same about the row of [[name]] with this index.
+  void row_contradiction(const std::string& name, std::size_t row, const std::string& text);
   const std::vector<std::string>& errors() const { return errors_; }
 
  private:

@@ -247,6 +247,20 @@ const can::Database& vehicle_database() {
   return database;
 }
 
+std::vector<std::string> vehicle_signal_names() {
+  std::vector<std::string> names;
+  for (const ChannelRow& row : kChannels) names.emplace_back(row.signal);
+  return names;
+}
+
+std::vector<std::string> vehicle_message_names() {
+  std::vector<std::string> names;
+  for (const can::MessageDef& message : vehicle_database().messages) {
+    names.push_back(message.name);
+  }
+  return names;
+}
+
 std::string vehicle_configuration(const VehicleScenario& scenario, std::string_view interface,
                                   std::string_view dbc_file) {
   const VariatorParameters& v = scenario.variator;

@@ -81,6 +81,9 @@ class VehicleBus {
 
 // The vehicle's DBC, and the configuration of BeltGrip that fits the scenario.
 const can::Database& vehicle_database();
+// What a fault of a signal, or of a message, can act on.
+std::vector<std::string> vehicle_signal_names();
+std::vector<std::string> vehicle_message_names();
 std::string vehicle_configuration(const VehicleScenario& scenario, std::string_view interface,
                                   std::string_view dbc_file);
 

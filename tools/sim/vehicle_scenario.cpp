@@ -9,6 +9,7 @@
 #include "estimator/variator_geometry.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/scenario_reader.h"
+#include "tools/sim/vehicle_bus.h"
 
 namespace beltgrip::sim {
 
@@ -240,6 +241,26 @@ bool check_geometry(ScenarioReader& r, const VariatorParameters& v) {
   return right;
 }
 
+// A name that no one has would be a fault without effect.
+void check_channel(ScenarioReader& r, std::size_t row, const FaultStep& fault) {
+  if (fault.channel.empty()) return;
+  const auto kind =
+      std::find_if(fault_kinds().begin(), fault_kinds().end(),
+                   [&fault](const FaultKindRow& each) { return each.kind == fault.kind; });
+  const std::string found = "found channel = \"" + fault.channel + "\"";
+  if (kind->channel == FaultChannel::kNone) {
+    r.row_contradiction("fault", row, found + ", but " + std::string(kind->name) + " has none");
+    return;
+  }
+  std::string expected;
+  for (const std::string& name :
+       kind->channel == FaultChannel::kSignal ? vehicle_signal_names() : vehicle_message_names()) {
+    if (name == fault.channel) return;
+    expected += (expected.empty() ? "" : ", ") + name;
+  }
+  r.row_contradiction("fault", row, found + ", expected one of " + expected);
+}
+
 void check_whole(ScenarioReader& r, const VehicleScenario& s) {
   check_geometry(r, s.variator);
   if (s.engine.stall_rad_s >= s.engine.idle_rad_s) {
@@ -252,10 +273,14 @@ void check_whole(ScenarioReader& r, const VehicleScenario& s) {
                     "found " + number_text(s.hydraulics.pressure_floor_Pa) +
                         ", expected less than hydraulics.pressure_max_Pa");
   }
-  if (!std::is_sorted(s.driver.steps.begin(), s.driver.steps.end(),
-                      [](const DriverStep& a, const DriverStep& b) { return a.at_s < b.at_s; })) {
-    r.contradiction("driver.step", "the steps are not in order of time");
+  for (std::size_t i = 1; i < s.driver.steps.size(); ++i) {
+    if (s.driver.steps[i].at_s >= s.driver.steps[i - 1].at_s) continue;
+    r.row_contradiction("driver.step", i,
+                        "found at_s = " + number_text(s.driver.steps[i].at_s) + " after " +
+                            number_text(s.driver.steps[i - 1].at_s) +
+                            ": the steps are not in order of time");
   }
+  for (std::size_t i = 0; i < s.faults.size(); ++i) check_channel(r, i, s.faults[i]);
 }
 
 }  // namespace
