@@ -231,12 +231,11 @@ void complete(CampaignCase& out) {
     out.faults.emplace_back("two_peaks");
   }
   if (out.scenario.belt.overdrive.fall_at_once > 0.0) out.faults.emplace_back("fall_at_once");
-  // Friction that falls within a request is shown, but none of the catalogue's faults.
+  // Judged where friction falls before or after a request (campaign_run.cpp).
   if (out.scenario.belt.wear_step > 0.0 && out.base == "demo") {
     out.faults.emplace_back("peak_earlier");
   } else if (out.scenario.belt.wear_step > 0.0) {
     out.faults.emplace_back("wear_step");
-    out.guaranteed = false;
   }
   if (out.faults.size() > 1) out.guaranteed = false;
 }
