@@ -39,6 +39,14 @@ TEST(Simulate, ALateStartIsTheTailOfTheWhole) {
   EXPECT_NEAR(first_s, 80.0, 0.01);
 }
 
+TEST(Simulate, ARunThatEndsAsTheRequestBeginsSaysNothingOfFriction) {
+  const RunResult run =
+      beltgrip({"simulate", "--scenario", "coast-overdrive", "--duration", "7.8"});
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_NE(run.out.find("too short to say anything of mu_max"), std::string::npos) << run.out;
+  EXPECT_EQ(run.out.find("at least"), std::string::npos) << run.out;
+}
+
 // A frame of the log by the DBC that is written beside it: torque at bytes 0-1, little endian,
 // 0.02 Nm; speeds at bytes 0-1 and 2-3, big endian, 1/16 rpm; pressure little endian, 1 mbar.
 struct Means {

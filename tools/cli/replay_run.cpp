@@ -356,8 +356,10 @@ std::string text(const ReplayResult& result) {
                     e.peak.sigma_peak_percent);
     } else if (e.peak.contradictory) {
       out += "  no value: its points lie on no one friction curve\n";
-    } else if (e.outcome == daemon::Outcome::kInconclusive) {
+    } else if (e.outcome == daemon::Outcome::kInconclusive && e.peak.mu_max > 0.0) {
       out += format("  mu_max is at least %.4f\n", e.peak.mu_max);
+    } else if (e.outcome == daemon::Outcome::kInconclusive) {
+      out += "  too short to say anything of mu_max\n";
     }
   }
   if (result.experiments.empty()) out += "  no experiment\n";
