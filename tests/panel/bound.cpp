@@ -4,9 +4,13 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace beltgrip::panel {
 namespace {
+
+constexpr double kOneSided99 = 2.326;
+constexpr double kStep_percent = 0.02;
 
 // Variance of the mean over one second.
 double density(const ChannelNoise& noise) {
@@ -118,25 +122,106 @@ double reached_bound(const Scenario& s, const Trace& trace, double stop_s) {
          *top;
 }
 
+namespace {
+
+// The form of a curve by slip over that of its peak, with the shape changed.
+class Stretched {
+ public:
+  Stretched(FrictionCurve curve, double shape_factor) : slip_peak_(curve.slip_peak) {
+    curve.shape *= shape_factor;
+    for (int i = 0; i <= kSize; ++i) table_[i] = curve.value(slip_peak_ * kLast * i / kSize);
+    reached_ = curve.slip_reached(kNearTop) / slip_peak_;
+  }
+  double reached() const { return reached_; }  // in slips of the peak
+  double value(double slips) const {
+    const double place = std::clamp(slips / kLast, 0.0, 1.0 - 1e-9) * kSize;
+    const int i = static_cast<int>(place);
+    return table_[i] + (place - i) * (table_[i + 1] - table_[i]);
+  }
+  static constexpr double kNearTop = 0.005;
+
+ private:
+  static constexpr int kSize = 1024;
+  static constexpr double kLast = 1.6;  // no slip so far lies beyond
+  double table_[kSize + 1];
+  double slip_peak_, reached_;
+};
+
+struct Evidence {  // means over a few samples
+  double slip, mu, force;
+  double weight;  // of mu, by the noise of torque and slip
+};
+
+double square(double x) { return x * x; }
+
+}  // namespace
+
 DetectionBound detection_bound(const Scenario& s, const Trace& trace) {
   DetectionBound out;
   if (!trace.peak_reached) return out;
   const double radius =
       s.low ? s.variator.primary_radius_low_m : s.variator.primary_radius_overdrive_m;
   const double c = std::cos(s.variator.half_wedge_angle_rad) / (2.0 * radius);
-  const double sample_s = 1.0 / s.sample_rate_hz;
-  const double reached = s.curve.slip_reached(0.005);
-  const double slope = 0.005 * s.curve.mu_max / std::max(0.05, s.curve.slip_peak - reached);
-  double odds = 0.0;
-  const double variance = density(s.torque) / sample_s;
-  for (std::size_t i = static_cast<std::size_t>(trace.t_peak_s / sample_s); i < trace.slip.size();
-       ++i) {
-    const double rest = s.curve.value(trace.slip[i]) -
-                        (s.curve.mu_max + slope * (trace.slip[i] - s.curve.slip_peak));
-    odds += std::pow(trace.clamp_N[i] / c * rest, 2) / (2.0 * variance);
-    out.delay_s = static_cast<double>(i) * sample_s - trace.t_peak_s;
-    out.slip_past_percent = trace.slip_star[i] - trace.slip_star_peak;
-    if (odds > std::log(100.0)) break;
+  const bool engine = s.plant == PlantKind::kCarEngine;
+  constexpr std::size_t kSamples = 4;
+  const double cell_s = kSamples / s.sample_rate_hz;
+  const double omega_s =
+      s.omega_p_rad_s * (s.low ? s.variator.ratio_low : s.variator.ratio_overdrive);
+  const double slip_density =
+      1e4 * (density(s.omega_p) / square(s.omega_p_rad_s) + density(s.omega_s) / square(omega_s));
+  std::vector<Stretched> forms;
+  for (const double factor : {0.8, 0.9, 1.0, 1.1, 1.25}) {
+    if (factor == 1.0 || s.curve.family != Family::kBrush) forms.emplace_back(s.curve, factor);
+  }
+  const double top_slip = s.curve.slip_reached(Stretched::kNearTop);
+  std::vector<Evidence> seen;
+  double furthest = top_slip, power = 0.0;
+  out.delay_s = trace.t_reached_s - trace.t_peak_s;
+  out.stopped.fill(1.0);
+  std::size_t filled = 0;
+  for (std::size_t i = 0; i + kSamples <= trace.slip.size(); i += kSamples) {
+    const double slip = trace.slip[i + kSamples / 2];
+    const double force = trace.clamp_N[i + kSamples / 2];
+    const double slope = (s.curve.value(slip + 1e-3) - s.curve.value(slip - 1e-3)) / 2e-3;
+    const double noise = (engine ? 0.0 : density(s.torque) * square(c / force)) +
+                         square(slope) * slip_density + 1e-14;
+    seen.push_back({slip, s.curve.value(slip), force, cell_s / noise});
+    if (slip <= top_slip) continue;
+    // The least of what tells the curve from those of its family whose top lies further on.
+    if (slip > furthest + kStep_percent) {
+      furthest = slip;
+      double least = 1e300;
+      for (const Stretched& form : forms) {
+        const double per_slip = form.reached() / slip;
+        double ff = 0.0, fg = 0.0;
+        for (const Evidence& e : seen) {
+          const double g = form.value(e.slip * per_slip);
+          ff += e.weight * g * g;
+          fg += e.weight * g * e.mu;
+        }
+        const double height = fg / ff;
+        double odds = 0.0, omega = 0.0, sum = 0.0, squares = 0.0;
+        for (const Evidence& e : seen) {
+          const double rest = e.mu - height * form.value(e.slip * per_slip);
+          odds += e.weight * rest * rest;
+          omega += e.force / c * rest * cell_s / s.variator.primary_inertia_kg_m2;
+          sum += omega;
+          squares += omega * omega;
+        }
+        const auto n = static_cast<double>(seen.size());
+        if (engine) odds = (squares - sum * sum / n) * cell_s / density(s.omega_p);
+        least = std::min(least, odds);
+      }
+      power = 0.5 * std::erfc(-(std::sqrt(least) - kOneSided99) / std::sqrt(2.0));
+    }
+    const double past =
+        trace.slip_star[i + kSamples / 2] -
+        (s.curve.family == Family::kFlatTop ? trace.slip_star_leave : trace.slip_star_peak);
+    while (filled < kPastSteps && past > kPastStep_percent * static_cast<double>(filled)) {
+      out.stopped[filled++] = power;
+    }
+    if (power < 0.5) out.delay_s = static_cast<double>(i) / s.sample_rate_hz - trace.t_peak_s;
+    if (power > 0.9999 || filled == kPastSteps) break;
   }
   return out;
 }

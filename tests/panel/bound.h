@@ -1,6 +1,9 @@
 // What is possible at best on one trace, for the table.
 #pragma once
 
+#include <array>
+#include <cstddef>
+
 #include "virtual_variator.h"
 
 namespace beltgrip::panel {
@@ -14,13 +17,19 @@ double mu_max_bound(const Scenario& scenario, const Trace& trace, double stop_s)
 // The same for the largest mu* up to stop_s, where the slip is told without noise.
 double reached_bound(const Scenario& scenario, const Trace& trace, double stop_s);
 
+inline constexpr std::size_t kPastSteps = 401;
+inline constexpr double kPastStep_percent = 0.05;
+
+// What no detector can beat that stops early, before mu* has come within half a percent of its
+// top, on at most one in a hundred traces of any curve of the family: it is told the family, slip,
+// force, load and inertia, and sees the belt's torque (with an engine: the speed) with its noise.
+// By the lemma of Neyman and Pearson it has stopped with at most this probability by the time that
+// the data tell the curve so far from the likest of its family whose top lies further on.
 struct DetectionBound {
-  double delay_s = 0.0;            // after the peak
-  double slip_past_percent = 0.0;  // beyond the peak by then
+  double delay_s = 0.0;  // after the peak, median
+  // Probability to have stopped when slip is i kPastStep_percent past the peak (a flat top's end).
+  std::array<double, kPastSteps> stopped{};
 };
-// When a detector that knows the curve, the slip and the force exactly, and the torque before the
-// peak, has seen enough of the torque to prefer the true curve to one that stays at its top, or at
-// the slope that it had up to half a percent below, at odds of 100 to 1 in the mean.
 DetectionBound detection_bound(const Scenario& scenario, const Trace& trace);
 
 }  // namespace beltgrip::panel

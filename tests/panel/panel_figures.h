@@ -39,7 +39,7 @@ struct Figures {
   double stopped = 0.0, early = 0.0;
   double beyond_10 = 0.0;                                 // of all traces
   double past_p50 = 0.0, past_p90 = 0.0, past_p99 = 0.0;  // ramps up to 300 N/s
-  double detector_p90 = 0.0, detector_p99 = 0.0;          // of the optimal detector, the same
+  double detector_p90 = 0.0, detector_p99 = 0.0;          // what no detector can beat
   double delay_p50_s = 0.0, detector_delay_p50_s = 0.0;   // after the peak
   double value = 0.0;                                     // of the traces with a peak
   double bias = 0.0, sd = 0.0, p95 = 0.0, covered = 0.0;  // of the values

@@ -29,6 +29,8 @@ TEST(Panel, RobustKeepsToItsFiguresAndPaperDoesNot) {
   EXPECT_GE(robust.stopped, 98.0);
   EXPECT_LE(robust.early, 4.0);
   EXPECT_LE(robust.past_p90, 1.8);
+  EXPECT_GE(robust.past_p90, robust.detector_p90);  // a bound
+  EXPECT_GE(robust.past_p99, robust.detector_p99);
   EXPECT_EQ(robust.beyond_10, 0.0);
   EXPECT_GE(robust.value, 80.0);
   EXPECT_LE(std::abs(robust.bias), 0.6);
