@@ -181,8 +181,8 @@ class Run {
                             "fit; not named");
     }
     // What does not help on the experiments that the user has set aside is no finding either.
-    const bool refuted =
-        !request_.held_out.empty() && !gain.signals.empty() && !slots.empty() && !gain.proven();
+    const bool refuted = !request_.held_out.empty() && !gain.signals.empty() && !slots.empty() &&
+                         (!gain.better() || gain.worse(noise_floors(campaign, naming.nominal)));
     if (refuted) {
       out().notes.push_back(
           "what was found does not help to predict the held-out experiments; not named");

@@ -465,6 +465,21 @@ Hypothesis Engine::refine_from(const ModelState& from, const std::vector<int>& s
   return out;
 }
 
+bool Engine::curve_rises(const ModelState& state) {
+  constexpr double kStep = 0.05, kFall = 0.02;  // of mu_max
+  for (const int first : {kShapeOverdrive, kShapeLow}) {
+    const CurveShape curve(
+        std::span<const double, kShapeKnots>(state.nuisance.data() + first, kShapeKnots), 0.0);
+    double highest = 0.0;
+    for (double x = kStep; x < 1.0; x += kStep) {
+      const double here = curve.evaluate(x).value;
+      if (here < highest - kFall) return false;
+      highest = std::max(highest, here);
+    }
+  }
+  return true;
+}
+
 void Engine::accept(const Hypothesis& hypothesis) {
   accepted_ = hypothesis.slots;
   state_ = hypothesis.state;

@@ -62,6 +62,9 @@ class Engine {
   };
   Replacement add(const std::vector<int>& slots) const;
   Replacement replace(const std::vector<int>& slots, int instead_of) const;
+  // No friction falls before its peak. A fitted curve that does has been bent to explain something
+  // else; what it hides is no longer near the present state.
+  static bool curve_rises(const ModelState& state);
   // Makes the hypothesis the present state.
   void accept(const Hypothesis& hypothesis);
   // By how much the accepted effects predict experiments that were left out of the fit better than

@@ -102,14 +102,19 @@ std::string torque_name(const Campaign& campaign) {
 
 }  // namespace
 
-bool Gain::proven() const {
+bool Gain::better() const {
+  return std::any_of(signals.begin(), signals.end(),
+                     [](const auto& each) { return each.second.low > 0.0; });
+}
+
+bool Gain::worse(const std::map<std::string, double>& noise_floor) const {
   constexpr double kWorse = 1.1;
-  bool better = false;
-  for (const auto& [name, signal] : signals) {
-    better |= signal.low > 0.0;
-    if (signal.high < 0.0 && signal.after > kWorse * signal.before) return false;
-  }
-  return better;
+  return std::any_of(signals.begin(), signals.end(), [&](const auto& each) {
+    const auto& [name, signal] = each;
+    const auto floor = noise_floor.find(name);
+    const double level = floor == noise_floor.end() ? 0.0 : floor->second;
+    return signal.high < 0.0 && signal.after > kWorse * std::max(signal.before, level);
+  });
 }
 
 LeftOut leave_one_out(const Engine& engine, const ModelState& state,

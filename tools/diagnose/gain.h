@@ -31,8 +31,10 @@ std::map<std::string, double> noise_floors(const Campaign& campaign, const Model
 struct Gain {
   std::map<std::string, BeforeAfter> signals;
   std::optional<MuMaxError> mu_max;
-  // One signal is predicted better beyond chance, and none clearly worse.
-  bool proven() const;
+  // One signal is predicted better beyond chance.
+  bool better() const;
+  // One signal is predicted clearly worse: beyond chance, by a tenth and beyond its noise.
+  bool worse(const std::map<std::string, double>& noise_floor) const;
 };
 
 // The machine as all experiments but one say it is, by one linear step from the fit to all.

@@ -48,14 +48,14 @@ std::vector<int> plus(std::vector<int> set, int slot) {
 }
 
 // The slots to refit: by gain and by significance.
-std::vector<int> shortlist(const std::vector<Score>& scores, int count) {
+std::vector<int> shortlist(const std::vector<Score>& scores, int count, double in_curve_max) {
   std::vector<Score> by_gain = scores, by_chi2 = scores;
   std::sort(by_gain.begin(), by_gain.end(), [](auto& a, auto& b) { return a.gain > b.gain; });
   std::sort(by_chi2.begin(), by_chi2.end(), [](auto& a, auto& b) { return a.chi2 > b.chi2; });
   std::vector<int> out;
   for (std::size_t i = 0; i < scores.size() && static_cast<int>(out.size()) < count; ++i) {
     for (const Score* score : {&by_gain[i], &by_chi2[i]}) {
-      if (score->gain > 4.0 && score->in_curve < kInCurveMax &&
+      if (score->gain > 4.0 && score->in_curve < in_curve_max &&
           std::find(out.begin(), out.end(), score->slot) == out.end()) {
         out.push_back(score->slot);
       }
@@ -223,9 +223,15 @@ void drop_unconfirmed(Engine& engine, Naming& naming) {
     });
     if (worst == set.end()) return;
     const Hypothesis whole = engine.refine(set, 3);
-    const bool helps = engine.left_out_gain(*worst) > kLeftOutMin &&
-                       left_out_gain(engine, naming.nominal, whole.state, set).proven();
-    if (helps) return;
+    const Gain gain = left_out_gain(engine, naming.nominal, whole.state, set);
+    // A nominal curve that no friction has predicts as well as it was bent to; that it need not be
+    // bent any more counts as much.
+    const bool straightened =
+        !Engine::curve_rises(naming.nominal) && Engine::curve_rises(whole.state);
+    if (engine.left_out_gain(*worst) > kLeftOutMin && (gain.better() || straightened) &&
+        !gain.worse(noise_floors(engine.campaign(), naming.nominal))) {
+      return;
+    }
     naming.not_confirmed.push_back(*worst);
     std::vector<int> fewer = set;
     std::erase(fewer, *worst);
@@ -274,7 +280,7 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
   engine.fit_machine(jobs);
   engine.update_noise();
   for (int i = 0; i < 2; ++i) {
-    engine.accept(engine.refine({}));
+    engine.accept(engine.refine({}, kSettling));
     engine.update_noise();
   }
   out.nominal = engine.state();
@@ -287,21 +293,21 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
     out.last_screen = scores;
     const std::vector<int> set = engine.accepted();
     const Hypothesis base = engine.refine(set, 3);
-    // So far from the data, the linear says little of where an effect would lead.
-    const bool far = std::any_of(scores.begin(), scores.end(),
-                                 [](const Score& score) { return score.gain > kFar; });
+    // So far from the data, or with a curve that no friction has, the linear says little of where
+    // an effect would lead.
+    const bool rises = Engine::curve_rises(engine.state());
+    const bool far = !rises || std::any_of(scores.begin(), scores.end(),
+                                           [](const Score& score) { return score.gain > kFar; });
     Hypothesis best;
     bool found = false;
     // From the linear estimate, and where that leaves the range of the linear, from the present.
     const auto fitted = [&](const std::vector<int>& candidate, bool afar) {
       Hypothesis h = engine.refine_from(engine.add(candidate).state, candidate);
-      if (h.log_likelihood < base.log_likelihood) h = engine.refine(candidate);
-      if (afar) {
-        if (Hypothesis other = engine.refine_from_afar(candidate);
-            other.log_likelihood > h.log_likelihood) {
-          h = std::move(other);
-        }
-      }
+      const auto or_better = [&](Hypothesis other) {
+        if (other.log_likelihood > h.log_likelihood) h = std::move(other);
+      };
+      if (h.log_likelihood < base.log_likelihood) or_better(engine.refine(candidate));
+      if (afar) or_better(engine.refine_from_afar(candidate));
       return h;
     };
     const auto consider = [&](Hypothesis h) {
@@ -316,7 +322,7 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
         found = true;
       }
     };
-    const std::vector<int> candidates = shortlist(scores, kRefined);
+    const std::vector<int> candidates = shortlist(scores, kRefined, rises ? kInCurveMax : 2.0);
     const auto consider_all = [&](bool from_afar) {
       std::vector<std::optional<Hypothesis>> fits(candidates.size());
       in_parallel(jobs, candidates.size(), [&](std::size_t i) {
@@ -333,6 +339,8 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
     });
     if (!found && !far && plain) consider_all(true);
     if (!found) break;
+    // To its end, before anything is compared with it.
+    best = engine.refine_from(best.state, best.slots, kSettling);
     // A pair whose sum a third effect imitates: all pairs, linear, on the present matrices.
     if (set.empty()) {
       std::vector<std::pair<double, std::vector<int>>> pairs;
