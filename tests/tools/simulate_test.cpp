@@ -130,6 +130,14 @@ TEST(Simulate, SettingsAndMistakes) {
   EXPECT_NE(bad.err.find("bad.toml:4: sensor: "), std::string::npos);
   EXPECT_EQ(bad.out, "");
 
+  // A car's scenario that does not say so.
+  place.write("car.toml", "[belt]\nmu_max = 0.08\n");
+  const RunResult car = beltgrip({"simulate", "--scenario", place.path("car.toml")});
+  EXPECT_EQ(car.status, 78);
+  EXPECT_EQ(lines(car.err), 1);
+  EXPECT_NE(car.err.find("car.toml:1: belt: "), std::string::npos) << car.err;
+  EXPECT_NE(car.err.find("plant = \"vehicle\""), std::string::npos) << car.err;
+
   const RunResult missing = beltgrip({"simulate", "--scenario", "no-rig", "--log-out", "-"});
   EXPECT_EQ(missing.status, 66);
   EXPECT_NE(missing.err.find("paper-rig"), std::string::npos);

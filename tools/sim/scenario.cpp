@@ -154,7 +154,8 @@ class Parser {
     for (const auto& [key, node] : table) {
       const std::string name = prefix + std::string(key.str());
       if (!known(name, node)) {
-        error(name, node, "is not a key of a scenario");
+        error(name, node,
+              "is not a key of a rig's scenario; that of a car begins with plant = \"vehicle\"");
       }
     }
   }
@@ -169,7 +170,7 @@ class Parser {
       }
     }
     if (name == "name") return take_text(name, node, result_.scenario.name);
-    if (name == "belt") return take_text(name, node, result_.scenario.belt);
+    if (name == "belt" && !node.is_table()) return take_text(name, node, result_.scenario.belt);
     if (name == "operator.action") {
       return take_choice(name, node, kActions, result_.scenario.action);
     }
