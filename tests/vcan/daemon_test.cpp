@@ -68,6 +68,16 @@ TEST_F(Daemon, SeesItsInputsComeAndGo) {
   EXPECT_EQ(published.problems(), std::vector<std::string>{});
 }
 
+// A unit without FIFO: works, and says what it lacks.
+TEST_F(Daemon, RunsWithOrdinarySchedulingAndSaysSo) {
+  const BusSocket bus("vcan0");
+  Process daemon(
+      {"chrt", "-o", "0", program("beltgripd"), "--config", write_rig_config(folder(), "vcan0")});
+  PublishedFrames published;
+  ASSERT_TRUE(listen(bus, published, has_status));
+  EXPECT_TRUE(daemon.wait_for_error("ordinary scheduling", kLimit)) << daemon.err();
+}
+
 class StopSignal : public Daemon, public testing::WithParamInterface<int> {};
 
 TEST_P(StopSignal, EndsItWithStatusZero) {
