@@ -23,7 +23,7 @@
 namespace beltgrip::estimator {
 
 // By so many deviations what mu* has reached is lowered: the largest of many windows is taken.
-inline constexpr double kReachedDeviations = 2.7;
+inline constexpr double kReachedDeviations = 3.3;
 
 struct PeakFitResult {
   bool valid = false;

@@ -77,7 +77,7 @@ std::vector<Judged> judge_many(const std::function<Scenario(std::uint64_t)>& sce
 Figures figures(const std::vector<Judged>& traces, Method method, std::optional<NoiseClass> noise) {
   Figures f;
   int stopped = 0, early = 0, beyond = 0, values = 0, covered = 0, counted = 0;
-  int other_values = 0, bounds = 0, right = 0, close = 0, carried_close = 0;
+  int other_values = 0, all_bounds = 0, bounds = 0, right = 0, close = 0, carried_close = 0;
   double possible = 0.0;
   std::vector<double> past, delay, detector_delay, magnitude, ratio;
   std::array<double, kPastSteps> detector{};  // sum of probabilities
@@ -86,12 +86,15 @@ Figures figures(const std::vector<Judged>& traces, Method method, std::optional<
     if (noise && trace.scenario.noise != *noise) continue;
     const Outcome& o = outcome(trace, method);
     if (o.beyond_10_percent) ++beyond;
+    if (o.peak.kind == PeakKind::kLowerBound) {
+      ++all_bounds;
+      if (o.peak.mu_max <= top_of(trace.scenario.curve)) ++right;
+    }
     if (!trace.has_peak) {
       ++f.others;
       if (o.peak.kind == PeakKind::kValue) ++other_values;
       if (o.peak.kind != PeakKind::kLowerBound) continue;
       ++bounds;
-      if (o.peak.mu_max <= top_of(trace.scenario.curve)) ++right;
       const bool is_close = o.peak.mu_max >= kBoundWanted * o.mu_reached;
       if (is_close) ++close;
       // A bound at 99 % lies 2.3 deviations below an estimate that itself scatters by one.
@@ -150,7 +153,7 @@ Figures figures(const std::vector<Judged>& traces, Method method, std::optional<
   f.bound = 100.0 * std::sqrt(bound_squares / std::max(1, counted));
   f.sd_by_bound = std::sqrt(counted_squares / std::max(1e-12, bound_squares));
   f.other_value = share(other_values, f.others);
-  f.bound_right = share(right, bounds);
+  f.bound_right = share(right, all_bounds);
   f.bound_share = share(close, bounds);
   f.bound_possible = bounds > 0 ? 100.0 * possible / bounds : 0.0;
   f.bound_share_carried = share(carried_close, f.carried);

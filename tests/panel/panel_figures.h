@@ -45,9 +45,9 @@ struct Figures {
   double bias = 0.0, sd = 0.0, p95 = 0.0, covered = 0.0;  // of the values
   double bound = 0.0;        // root mean square, of the values whose bound is below kBoundCounts
   double sd_by_bound = 0.0;  // root mean square of their errors, divided by it
+  double bound_right = 0.0;  // of all lower bounds
   // Of the traces without a peak:
   double other_value = 0.0;     // wrongly a value
-  double bound_right = 0.0;     // lower bounds that are
   double bound_share = 0.0;     // lower bounds of at least 0.97 of what was reached
   double bound_possible = 0.0;  // of the traces, what an efficient estimate's 99 % bounds come to
   double bound_share_carried = 0.0;  // bound_share where the data carry it in 99 %
