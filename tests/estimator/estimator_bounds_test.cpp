@@ -174,7 +174,7 @@ TEST_P(EveryMethod, GarbageGivesFiniteNumbers) {
   const auto subject = estimator(rig);
   Garbage garbage(7);
   int samples = 0, usable = 0, peaks = 0;
-  for (int run = 0; samples < 100'000; ++run) {
+  for (int run = 0; samples < 200'000; ++run) {
     const unsigned rarities[] = {5000, 1000, 100, 10, 1};
     garbage.rarity(rarities[run % 5]);
     for (const TracePoint& point : trace) {
