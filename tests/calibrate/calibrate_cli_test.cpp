@@ -1,8 +1,12 @@
 // beltgrip calibrate as users call it: a log in, keys out that the configuration takes.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
 
+#include "daemon/core/config.h"
 #include "tests/calibrate/drive.h"
 #include "tests/tools/program.h"
 
@@ -65,6 +69,115 @@ TEST_F(Calibrate, WritesKeysThatAreTaken) {
       EXPECT_LT(std::abs(each["value"].get<double>()), 2.0 * each["std"].get<double>()) << each;
       EXPECT_LT(std::abs(each["value"].get<double>()), 0.01) << each;
     }
+  }
+}
+
+// The pressure in answers to the daemon's requests on a second interface, instead of in the
+// broadcast; its four bytes are the same, and come to `kAnswerMore_kPa` more.
+constexpr double kAnswerMore_kPa = 12.5;
+constexpr const char* kAnswerRole =
+    "{ uds = { request = 0x18DA10F1, response = 0x18DAF110, did = 0x1101, start = 0, length = 32, "
+    "byte_order = \"little\", signed = true, scale = 1e-5, offset = 12.5 }, unit = \"kPa\", "
+    "period_ms = 20.0, delay_ms = 1.5, bus = \"diag\" }";
+
+std::string in_answers(const std::string& broadcast) {
+  std::istringstream stream(broadcast);
+  std::string log;
+  for (std::string line; std::getline(stream, line);) {
+    const std::size_t at = line.find("can0 101#");
+    if (at != std::string::npos) {
+      log += line.substr(0, at) + "can1 18DA10F1#03221101CCCCCCCC\n";
+      line.replace(at, 9, "can1 18DAF110#07621101");
+    }
+    log += line + '\n';
+  }
+  return log;
+}
+
+// `config` with the value of a role replaced.
+std::string with_role(std::string config, const std::string& role, const std::string& value) {
+  const std::size_t begin = config.find("\n" + role + " = ") + role.size() + 4;
+  return config.replace(begin, config.find('\n', begin) - begin, value);
+}
+
+const daemon::RoleBinding& pressure_of(const daemon::Config& config) {
+  for (const daemon::RoleBinding& each : config.roles) {
+    if (each.role == daemon::Role::kSecondaryPressure) return each;
+  }
+  throw std::runtime_error("no secondary_pressure");
+}
+
+TEST_F(Calibrate, PressureFromDiagnosticsIsCalibratedAndWrittenWhole) {
+  DriveKind kind;
+  kind.duration_s = 60.0;
+  const std::string broadcast = drive_log(drive({}, kind, 3));
+  place.write("drive.log", broadcast);
+  place.write("beltgrip.toml", with_role(kDriveToml, "secondary_pressure",
+                                         "{ signal = \"Pressure.Secondary\", delay_ms = 1.5 }"));
+  const RunResult truth = calibrate({"--json", "-"});
+  ASSERT_EQ(truth.status, 0) << truth.err;
+
+  std::string config = with_role(kDriveToml, "secondary_pressure", kAnswerRole);
+  config.insert(config.find("[signals]"),
+                "diagnostics = \"poll\"\n[bus.diag]\ninterface = \"can1\"\n");
+  place.write("beltgrip.toml", config);
+  place.write("drive.log", in_answers(broadcast));
+  const RunResult result =
+      calibrate({"--out", place.path("out.toml"), "--json", place.path("out.json")});
+  ASSERT_EQ(result.status, 0) << result.err;
+  const auto expected = nlohmann::json::parse(truth.out)["findings"];
+  const auto found = nlohmann::json::parse(place.read("out.json"))["findings"];
+  ASSERT_EQ(found.size(), expected.size());
+  double zero_Pa = NAN;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_EQ(found[i]["key"], expected[i]["key"]);
+    ASSERT_EQ(found[i]["value"].is_null(), expected[i]["value"].is_null()) << found[i];
+    if (found[i]["value"].is_null()) continue;
+    const bool zero = found[i]["key"] == "signals.secondary_pressure";
+    const double wanted = expected[i]["value"].get<double>() + (zero ? 1e3 * kAnswerMore_kPa : 0.0);
+    const double value = found[i]["value"].get<double>();
+    if (zero) zero_Pa = value;
+    EXPECT_NEAR(value, wanted, 1e-6 * std::abs(wanted)) << found[i];
+  }
+  // The drive's sensor reads 30 kPa at none.
+  EXPECT_NEAR(zero_Pa, 30e3 + 1e3 * kAnswerMore_kPa, 300.0);
+
+  // The line in the configuration: the daemon takes it, and it is the same source, less the zero.
+  const std::string written = place.read("out.toml");
+  const std::string name = "\nsecondary_pressure = { uds";
+  const std::size_t line = written.find(name);
+  ASSERT_NE(line, std::string::npos) << written;
+  const std::size_t value = line + name.size() - 5;
+  const auto before = daemon::load_config(place.path("beltgrip.toml"));
+  place.write("beltgrip.toml", with_role(config, "secondary_pressure",
+                                         written.substr(value, written.find('\n', value) - value)));
+  const auto after = daemon::load_config(place.path("beltgrip.toml"));
+  ASSERT_TRUE(before.config && after.config) << after.errors.at(0).text;
+  const daemon::RoleBinding& was = pressure_of(*before.config);
+  const daemon::RoleBinding& is = pressure_of(*after.config);
+  ASSERT_TRUE(is.uds);
+  EXPECT_EQ(is.uds->request, was.uds->request);
+  EXPECT_EQ(is.uds->response, was.uds->response);
+  EXPECT_EQ(is.uds->identifier, was.uds->identifier);
+  EXPECT_EQ(is.uds->signal.start_bit, was.uds->signal.start_bit);
+  EXPECT_EQ(is.uds->signal.length, was.uds->signal.length);
+  EXPECT_EQ(is.uds->signal.byte_order, was.uds->signal.byte_order);
+  EXPECT_EQ(is.uds->signal.type, was.uds->signal.type);
+  EXPECT_EQ(is.bus, was.bus);
+  EXPECT_EQ(is.period_ms, was.period_ms);
+  EXPECT_EQ(is.delay_ms, was.delay_ms);
+  for (const double raw : {-30e5, 0.0, 12e7}) {
+    const auto si = [&](const daemon::RoleBinding& role) {
+      const can::SignalDef& signal = role.uds->signal;
+      return role.factor * (signal.scale * raw + signal.offset) + role.shift;
+    };
+    EXPECT_NEAR(si(is), si(was) - zero_Pa, 1e-6) << raw;
+  }
+  const RunResult again = calibrate({"--json", "-"});
+  ASSERT_EQ(again.status, 0) << again.err;
+  for (const auto& each : nlohmann::json::parse(again.out)["findings"]) {
+    if (each["key"] != "signals.secondary_pressure") continue;
+    EXPECT_NEAR(each["value"].get<double>(), 0.0, 1.0);
   }
 }
 
