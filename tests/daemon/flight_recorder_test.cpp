@@ -7,12 +7,14 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <array>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <random>
+#include <tuple>
 
 #include "daemon/core/loop.h"
 #include "tests/daemon/frame_player.h"
@@ -25,7 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 
 // A machine and a bus that do whatever they can: samples come late or are lost, frames come after
-// the sample that they belong to, the kernel drops some, sends fail, the link goes down, own frames
+// the sample that they belong to, the kernel drops some, sends fail, the links go down, own frames
 // are confirmed or not. The same for a seed.
 class RoughPort final : public Port {
  public:
@@ -36,6 +38,8 @@ class RoughPort final : public Port {
     for (const can::StampedFrame& each : frames) {
       place->second.t = each.t_ns;
       place->second.frame = each.frame;
+      place->second.bus = each.bus;
+      buses_ = std::max(buses_, std::size_t{each.bus} + 1);
       ++place;
     }
     // What comes to the program later than its stamp says.
@@ -58,7 +62,10 @@ class RoughPort final : public Port {
     now_ = std::max(now_, deadline + 50'000);
     if (chance(0.01)) now_ += static_cast<MonoTime>(random_() % 20) * kMillisecond;
     if (chance(0.001)) now_ += 80 * kMillisecond;
-    if (chance(0.003)) bus_ = bus_ == BusState::kActive ? BusState::kDown : BusState::kActive;
+    for (std::size_t i = 0; i < buses_; ++i) {
+      if (!chance(0.003)) continue;
+      states_[i] = states_[i] == BusState::kActive ? BusState::kDown : BusState::kActive;
+    }
     return Wake::kDeadline;
   }
   std::size_t receive(std::span<RxFrame> out) noexcept override {
@@ -69,13 +76,15 @@ class RoughPort final : public Port {
     }
     return count;
   }
-  SendResult send(const can::CanFrame& frame) noexcept override {
+  SendResult send(const can::CanFrame& frame) noexcept override { return send_on(0, frame); }
+  SendResult send_on(std::uint8_t bus, const can::CanFrame& frame) noexcept override {
     if (chance(0.01)) return chance(0.5) ? SendResult::kFull : SendResult::kDown;
-    sent.push_back({now_, frame});
-    if (!chance(0.05)) queue_.emplace(now_ + 100'000, RxFrame{now_ + 90'000, frame, true, 0, 0});
+    sent.push_back({now_, frame, bus});
+    if (!chance(0.05)) queue_.emplace(now_ + 100'000, RxFrame{now_ + 90'000, frame, true, 0, bus});
     return SendResult::kSent;
   }
-  BusState bus_state() noexcept override { return bus_; }
+  BusState bus_state() noexcept override { return states_[0]; }
+  BusState bus_state_of(std::uint8_t bus) noexcept override { return states_[bus]; }
 
   std::vector<test::SentFrame> sent;
 
@@ -85,23 +94,12 @@ class RoughPort final : public Port {
   std::mt19937 random_;
   std::multimap<MonoTime, RxFrame> queue_, later_;  // by when it comes
   MonoTime now_ = 0;
-  BusState bus_ = BusState::kActive;
+  std::size_t buses_ = 1;
+  std::array<BusState, kBusMax> states_{};  // kActive
 };
 
 class Recorded : public testing::Test {
  protected:
-  static Config config(const std::string& control = "observe") {
-    std::string toml = test::kVehicleToml;
-    toml.replace(toml.find("\"always\""), 8, "\"signal\"");
-    toml += "control = \"" + control + "\"\n";
-    return test::vehicle_config(toml);
-  }
-  static std::vector<can::StampedFrame> frames() {
-    test::Drive drive;
-    drive.active_from_ms = 1000;
-    drive.active_to_ms = 9500;
-    return test::drive_frames(drive);
-  }
   std::vector<fs::path> files() const {
     std::vector<fs::path> found;
     for (const auto& each : fs::directory_iterator(folder())) found.push_back(each.path());
@@ -136,12 +134,20 @@ std::string bytes(const SampleReport& report) {
   return text;
 }
 
-class Rough : public Recorded, public testing::WithParamInterface<std::uint32_t> {};
+class Rough : public Recorded,
+              public testing::WithParamInterface<std::tuple<std::uint32_t, bool>> {};
 
 TEST_P(Rough, RunIsDecidedAgainByteByByte) {
-  const Config config = this->config();
+  const auto [seed, two_buses] = GetParam();
+  const Config config =
+      test::vehicle_config(two_buses ? test::two_bus_toml() : test::signalled_toml());
+  const std::vector<std::string> interfaces =
+      two_buses ? std::vector<std::string>{"can0", "can1"} : std::vector<std::string>{"can0"};
+  test::Drive drive;
+  drive.active_from_ms = 1000;
+  drive.active_to_ms = 9500;
   constexpr std::int64_t kWallOffset_ns = 1'700'000'000'123'456'789;
-  RoughPort live(frames(), GetParam());
+  RoughPort live(two_buses ? test::two_bus_frames(drive) : test::drive_frames(drive), seed);
   test::ReportKeeper reports;
   estimator::LearnedFriction learned;
   learned.groups[0].known = true;
@@ -156,7 +162,7 @@ TEST_P(Rough, RunIsDecidedAgainByteByByte) {
     RecordLimits limits;
     limits.before = 60 * kSecond;
     limits.after = 60 * kSecond;
-    FlightRecorder recorder(folder(), {"can0"}, rings, kWallOffset_ns, limits);
+    FlightRecorder recorder(folder(), interfaces, rings, kWallOffset_ns, limits);
     counters = run_loop(live, pipeline, config.estimator.sample_rate_hz,
                         estimator::StopReason::kShutdown, &reports, nullptr, &tap);
     recorder.stop();
@@ -175,8 +181,8 @@ TEST_P(Rough, RunIsDecidedAgainByteByByte) {
   Pipeline again(config);
   sim::RecordPort port(
       path,
-      [&](MonoTime t, const can::CanFrame& frame, std::uint8_t) {
-        sent.push_back({t, frame});
+      [&](MonoTime t, const can::CanFrame& frame, std::uint8_t bus) {
+        sent.push_back({t, frame, bus});
       },
       [&](const sim::RecordedKnowledge& known) {
         estimator::LearnedFriction told;
@@ -198,10 +204,13 @@ TEST_P(Rough, RunIsDecidedAgainByteByByte) {
   ASSERT_EQ(sent.size(), live.sent.size());
   for (std::size_t i = 0; i < sent.size(); ++i) {
     ASSERT_EQ(sent[i].frame, live.sent[i].frame) << i;
+    ASSERT_EQ(sent[i].bus, live.sent[i].bus) << i;
   }
+  EXPECT_EQ(std::any_of(sent.begin(), sent.end(), [](const auto& each) { return each.bus == 1; }),
+            two_buses);
 }
 
-INSTANTIATE_TEST_SUITE_P(, Rough, testing::Range(1U, 9U));
+INSTANTIATE_TEST_SUITE_P(, Rough, testing::Combine(testing::Range(1U, 9U), testing::Bool()));
 
 // Seconds of frames, and a fault from `fault_s` on, through the rings.
 void feed(RecordRings& rings, double seconds, double fault_s, double experiment_s = -1.0,

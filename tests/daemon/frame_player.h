@@ -13,6 +13,7 @@ namespace beltgrip::test {
 struct SentFrame {
   daemon::MonoTime t = 0;
   can::CanFrame frame;
+  std::uint8_t bus = 0;
   friend bool operator==(const SentFrame&, const SentFrame&) = default;
 };
 
@@ -38,6 +39,7 @@ class FramePlayer final : public daemon::Port {
       out[count] = {};
       out[count].t = frames_[next_].t_ns;
       out[count].frame = frames_[next_].frame;
+      out[count].bus = frames_[next_].bus;
       now_ = std::max(now_, out[count].t);
       ++count;
       ++next_;
@@ -45,10 +47,14 @@ class FramePlayer final : public daemon::Port {
     return count;
   }
   daemon::SendResult send(const can::CanFrame& frame) noexcept override {
-    sent.push_back({now_, frame});
+    return send_on(0, frame);
+  }
+  daemon::SendResult send_on(std::uint8_t to, const can::CanFrame& frame) noexcept override {
+    sent.push_back({now_, frame, to});
     return daemon::SendResult::kSent;
   }
   daemon::BusState bus_state() noexcept override { return bus; }
+  daemon::BusState bus_state_of(std::uint8_t) noexcept override { return bus; }
 
   std::vector<SentFrame> sent;
   daemon::BusState bus = daemon::BusState::kActive;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -92,6 +93,22 @@ std::string TemporaryDirectory::write(const std::string& name, const std::string
   return path;
 }
 
+std::string signalled_toml() {
+  std::string toml = kVehicleToml;
+  return toml.replace(toml.find("\"always\""), 8, "\"signal\"");
+}
+
+std::string two_bus_toml() {
+  std::string toml = signalled_toml();
+  const std::string role = "\"Pressure.SecondaryPressure\"";
+  toml.replace(toml.find(role), role.size(),
+               "{ uds = { request = 0x7E1, response = 0x7E9, did = 0x1101, start = 7, length = "
+               "16, scale = 0.001 }, unit = \"bar\", period_ms = 20, bus = \"diag\" }");
+  toml.replace(toml.find("inproc:test"), 11, "can0");
+  return toml.insert(toml.find("[signals]"),
+                     "diagnostics = \"poll\"\n[bus.diag]\ninterface = \"can1\"\n");
+}
+
 daemon::Config vehicle_config(const std::string& toml) {
   TemporaryDirectory directory;
   directory.write("vehicle.dbc", kVehicleDbc);
@@ -168,6 +185,25 @@ std::vector<can::StampedFrame> drive_frames(const Drive& drive) {
   std::stable_sort(frames.begin(), frames.end(),
                    [](const auto& a, const auto& b) { return a.t_ns < b.t_ns; });
   return frames;
+}
+
+std::vector<can::StampedFrame> two_bus_frames(const Drive& drive) {
+  std::vector<can::StampedFrame> all;
+  for (const can::StampedFrame& each : drive_frames(drive)) {
+    if (each.frame.id != can::CanId{0x101, false}) {
+      all.push_back(each);
+      continue;
+    }
+    can::StampedFrame answer{each.t_ns, frame_of(0x7E9, false, 8), 1};
+    const std::array<std::uint8_t, 8> data{
+        0x05, 0x62, 0x11, 0x01, each.frame.data[0], each.frame.data[1], 0xCC, 0xCC};
+    std::copy(data.begin(), data.end(), answer.frame.data.begin());
+    can::StampedFrame stranger = answer;
+    stranger.bus = 0;
+    stranger.frame.data[4] = 0x7F;
+    all.insert(all.end(), {stranger, answer, {each.t_ns, speeds_frame(0.0, 0.0), 1}});
+  }
+  return all;
 }
 
 }  // namespace beltgrip::test

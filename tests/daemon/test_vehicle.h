@@ -34,6 +34,11 @@ extern const char* const kVehicleDbc;
 // [bus], [signals] and [experiment] for it; trigger "always".
 extern const char* const kVehicleToml;
 
+// The same with trigger "signal".
+std::string signalled_toml();
+// And with the pressure asked for by diagnostics on can1.
+std::string two_bus_toml();
+
 // The configuration, loaded from files as the daemon does; fails the test on any error.
 daemon::Config vehicle_config(const std::string& toml = kVehicleToml);
 
@@ -50,6 +55,10 @@ struct Drive {
 
 // All frames of a drive, in order of time.
 std::vector<can::StampedFrame> drive_frames(const Drive& drive);
+
+// The same for two_bus_toml(): the pressure as answers on bus 1; beside them, on each bus, what
+// must be taken from the other one only.
+std::vector<can::StampedFrame> two_bus_frames(const Drive& drive);
 
 can::CanFrame speeds_frame(double primary_rad_s, double secondary_rad_s);
 can::CanFrame pressure_frame(double pressure_Pa);
