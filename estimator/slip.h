@@ -37,4 +37,9 @@ double slip_percent(const OperatingPoint& point, double omega_p_rad_s, double om
 double traction_coefficient(const VariatorParameters& variator, const OperatingPoint& point,
                             double torque_p_Nm, double clamp_force_N);
 
+// MinClampForce: what holds the torque with that maximum friction, with [variator] safety_factor.
+// mu_max > 0.
+double min_clamp_force_N(const VariatorParameters& variator, EndStop end_stop, double torque_p_Nm,
+                         double mu_max);
+
 }  // namespace beltgrip::estimator

@@ -7,6 +7,7 @@
 #include "daemon/core/bus_error.h"
 #include "daemon/core/pipeline_parts.h"
 #include "estimator/sensor_error.h"
+#include "estimator/slip.h"
 
 namespace beltgrip::daemon {
 
@@ -547,13 +548,8 @@ Publication Pipeline::Parts::publication() const noexcept {
   const estimator::CurveEstimate& curve = last.curve;
   const double friction = friction_known();
   if (friction > 0.0 && curve.usable && last.sample.usable) {
-    const estimator::VariatorParameters& variator = config.variator;
-    const double radius_m = curve.end_stop == estimator::EndStop::kOverdrive
-                                ? variator.primary_radius_overdrive_m
-                                : variator.primary_radius_low_m;
-    now.estimate.min_clamp_force_N = variator.safety_factor * std::abs(curve.torque_p_Nm) *
-                                     std::cos(variator.half_wedge_angle_rad) /
-                                     (2.0 * radius_m * friction);
+    now.estimate.min_clamp_force_N =
+        estimator::min_clamp_force_N(config.variator, curve.end_stop, curve.torque_p_Nm, friction);
   }
   now.slip.macro_slip_stop = macro_slip_stop;
   now.slip.phase = curve.phase;

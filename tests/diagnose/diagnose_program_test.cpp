@@ -98,7 +98,8 @@ void expect_silence(const json& result) {
 }
 
 TEST_F(Diagnose, NamesTheCauseWritesTheModelAndIsContentWithIt) {
-  const auto recording = record(rig(12, {{"torque_loss", {{"per_kN_Nm", 0.6}}, ""}}));
+  const blind::Trial trial = rig(12, {{"torque_loss", {{"per_kN_Nm", 0.6}}, ""}});
+  const auto recording = record(trial);
   const auto logs = write(recording.csv);
   auto arguments = logs;
   arguments.insert(arguments.end(), {"--model-out", place_.path("model.toml"), "--report",
@@ -125,6 +126,22 @@ TEST_F(Diagnose, NamesTheCauseWritesTheModelAndIsContentWithIt) {
   }
   const json& torque = first.at("held_out").at("secondary_torque");
   EXPECT_LT(torque.at("rmse_after").get<double>(), 0.2 * torque.at("rmse_before").get<double>());
+
+  // The estimator that is told of the loss finds the generator's friction, the other one more.
+  const double mu_max = trial.machine.mu_max;
+  ASSERT_GE(first.at("reruns").size(), 4U);
+  for (const json& each : first.at("reruns")) {
+    for (const char* figure : {"mu_max", "slip_stop_percent", "min_clamp_force_N"}) {
+      EXPECT_TRUE(each.at(figure).contains("before") && each.at(figure).contains("after"));
+    }
+    if (each.at("mu_max").at("after").is_null()) continue;
+    EXPECT_NEAR(each.at("mu_max").at("after").get<double>() / mu_max, 1.0, 0.02) << each;
+    if (each.at("mu_max").at("before").is_null()) continue;
+    EXPECT_GT(each.at("mu_max").at("before"), each.at("mu_max").at("after")) << each;
+    // What is lost before the belt is missing in the torque and in mu_max alike.
+    const json& force = each.at("min_clamp_force_N");
+    EXPECT_NEAR(force.at("before").get<double>() / force.at("after").get<double>(), 1.0, 0.01);
+  }
 
   const std::string page = place_.read("report.html");
   EXPECT_EQ(page.find("<link"), std::string::npos);

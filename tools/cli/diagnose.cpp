@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <memory>
@@ -12,9 +13,11 @@
 #include "daemon/core/config.h"
 #include "tools/cli/log_table.h"
 #include "tools/cli/output_file.h"
+#include "tools/cli/replay_run.h"
 #include "tools/diagnose/diagnose.h"
 #include "tools/diagnose/html.h"
 #include "tools/diagnose/json.h"
+#include "tools/diagnose/rerun.h"
 
 namespace beltgrip::cli {
 namespace {
@@ -54,6 +57,44 @@ diagnose::SignalTable read(const std::string& path, const daemon::Config& config
   }
 }
 
+constexpr double kSameExperiment_s = 2.0;  // starts: a correction may wait for a late channel
+
+// The experiments that the estimator finds in it: by the configured trigger in a log, all of it in
+// a table.
+std::vector<daemon::ExperimentResult> estimate(const std::string& path,
+                                               const daemon::Config& config) {
+  if (!is_table(path)) return replay({path}, "", config, {}).experiments;
+  const auto whole = diagnose::estimate(read(path, config), config);
+  return whole ? std::vector{*whole} : std::vector<daemon::ExperimentResult>{};
+}
+
+// As [estimator] model does.
+daemon::Config told(daemon::Config config, const daemon::ModelFile& model) {
+  config.variator = model.variator;
+  config.corrected = daemon::whole_machine(model);
+  return config;
+}
+
+// Every experiment again with the estimator told the model before and after.
+std::vector<diagnose::Rerun> rerun(const std::vector<std::string>& paths,
+                                   const daemon::Config& with_before,
+                                   const daemon::Config& with_after) {
+  std::vector<diagnose::Rerun> out;
+  for (const std::string& path : paths) {
+    const auto then = estimate(path, with_after);
+    for (const daemon::ExperimentResult& each : estimate(path, with_before)) {
+      diagnose::Rerun row{path, static_cast<double>(each.start) * 1e-9,
+                          diagnose::measured(each, with_before.variator), std::nullopt};
+      const auto same = std::find_if(then.begin(), then.end(), [&](const auto& other) {
+        return std::abs(static_cast<double>(other.start - each.start)) * 1e-9 < kSameExperiment_s;
+      });
+      if (same != then.end()) row.after = diagnose::measured(*same, with_after.variator);
+      if (row.before || row.after) out.push_back(std::move(row));
+    }
+  }
+  return out;
+}
+
 void show_progress(double share, const std::string& what) {
   constexpr int kWidth = 30;
   const int filled = static_cast<int>(share * kWidth);
@@ -67,14 +108,15 @@ void run(const Options& options) {
   std::signal(SIGTERM, request_stop);
   const daemon::Config config = load(options);
   diagnose::Request request;
-  request.model = diagnose::nominal_model(config.variator);
+  daemon::ModelFile before = diagnose::nominal_model(config.variator);
   if (!options.model.empty()) {
     try {
-      request.model = diagnose::read_model(options.model, request.model);
+      before = diagnose::read_model(options.model, before);
     } catch (const diagnose::ModelError& error) {
       throw Failure{error.missing_file ? kNoInput : kConfiguration, error.text};
     }
   }
+  request.model = before;
   for (const std::string& path : options.logs) request.experiments.push_back(read(path, config));
   for (const std::string& path : options.held_out) request.held_out.push_back(read(path, config));
   const auto output = [](const std::string& path) {
@@ -87,7 +129,13 @@ void run(const Options& options) {
   request.jobs = options.jobs;
   request.stop = [] { return stop_requested != 0; };
   if (isatty(STDERR_FILENO) != 0) request.progress = show_progress;
-  const diagnose::Answer answer = diagnose::diagnose(std::move(request));
+  diagnose::Answer answer = diagnose::diagnose(std::move(request));
+  if (answer.diagnosis.complete && !answer.diagnosis.findings.empty()) {
+    std::vector<std::string> all = options.logs;
+    all.insert(all.end(), options.held_out.begin(), options.held_out.end());
+    answer.diagnosis.reruns = rerun(all, options.model.empty() ? config : told(config, before),
+                                    told(config, answer.extended));
+  }
   if (options.json != "-") std::fputs(diagnose::plain_text(answer.diagnosis).c_str(), stdout);
   if (json) {
     json->write(diagnose::json_text(answer.diagnosis));

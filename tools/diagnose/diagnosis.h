@@ -51,6 +51,20 @@ struct MuMaxError {
   double before = 0.0, after = 0.0, low = 0.0, high = 0.0;
 };
 
+// What the estimator makes of an experiment.
+struct Measured {
+  double mu_max = 0.0;
+  double slip_stop_percent = 0.0;
+  double min_clamp_force_N = 0.0;  // for the torque at its end
+};
+// The same experiment by an estimator that is told the model before and after; nothing where it
+// gives no value.
+struct Rerun {
+  std::string log;
+  double start_s = 0.0;
+  std::optional<Measured> before, after;
+};
+
 enum class Verdict { kNothingWrong, kExplained, kUnexplained };
 
 struct Diagnosis {
@@ -61,6 +75,7 @@ struct Diagnosis {
   std::vector<NotIdentifiable> not_identifiable;
   std::map<std::string, BeforeAfter> held_out;
   std::optional<MuMaxError> mu_max;
+  std::vector<Rerun> reruns;    // with findings only
   std::string next_experiment;  // empty: none
   std::vector<std::string> notes;
   std::map<std::string, Interval> machine;  // constants of the nominal machine, as fitted

@@ -67,6 +67,21 @@ void add_tables(report::HtmlPage& page, const Diagnosis& d) {
     }
     page.table({"signal, SI", "before", "after", "difference (95 %)"}, rows);
   }
+  if (!d.reruns.empty()) {
+    page.heading("By the estimator, told the model before and after");
+    std::vector<std::string> head{"experiment", "from, s"};
+    for (const RerunFigure& figure : kRerunFigures) head.emplace_back(figure.heading);
+    rows.clear();
+    for (const Rerun& each : d.reruns) {
+      char from[32];
+      std::snprintf(from, sizeof from, "%.2f", each.start_s);
+      rows.push_back({each.log, from});
+      for (const RerunFigure& figure : kRerunFigures) {
+        rows.back().push_back(figure_text(each, figure));
+      }
+    }
+    page.table(head, rows);
+  }
   if (!d.not_identifiable.empty()) {
     page.heading("What these experiments cannot show");
     rows.clear();

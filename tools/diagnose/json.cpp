@@ -31,6 +31,13 @@ std::string number(double value) {
 
 }  // namespace
 
+std::string figure_text(const Rerun& rerun, const RerunFigure& figure) {
+  const auto text = [&](const std::optional<Measured>& side) {
+    return side ? number((*side).*figure.value) : std::string("none");
+  };
+  return text(rerun.before) + " -> " + text(rerun.after);
+}
+
 std::string json_text(const Diagnosis& d) {
   cli::JsonWriter json;
   json.begin_object();
@@ -111,6 +118,20 @@ std::string json_text(const Diagnosis& d) {
     json.end_object();
   }
   json.end_object();
+  json.key("reruns").begin_array();
+  for (const Rerun& each : d.reruns) {
+    json.begin_object().field("log", each.log).field("start_s", each.start_s);
+    for (const RerunFigure& figure : kRerunFigures) {
+      json.key(figure.key).begin_object();
+      for (const auto& [when, side] : {std::pair{"before", &each.before}, {"after", &each.after}}) {
+        json.key(when);
+        *side ? json.value((**side).*figure.value) : json.null();
+      }
+      json.end_object();
+    }
+    json.end_object();
+  }
+  json.end_array();
   json.key("next_experiment");
   d.next_experiment.empty() ? json.null() : json.value(d.next_experiment);
   json.key("machine").begin_object();
@@ -180,6 +201,22 @@ std::string plain_text(const Diagnosis& d) {
   if (d.mu_max) {
     out += "  mu_max, relative error: " + number(d.mu_max->before) + " -> " +
            number(d.mu_max->after) + "\n";
+  }
+  if (!d.reruns.empty()) {
+    out += "by the estimator, told the model before -> after (";
+    for (const RerunFigure& figure : kRerunFigures) {
+      out += (&figure == kRerunFigures.data() ? "" : "; ") + std::string(figure.heading);
+    }
+    out += "):\n";
+  }
+  for (const Rerun& each : d.reruns) {
+    char from[32];
+    std::snprintf(from, sizeof from, ", from %.2f s:", each.start_s);
+    out += "  " + each.log + from;
+    for (const RerunFigure& figure : kRerunFigures) {
+      out += (&figure == kRerunFigures.data() ? " " : "; ") + figure_text(each, figure);
+    }
+    out += "\n";
   }
   if (!d.not_identifiable.empty()) {
     out += "not to be seen in these data:";
