@@ -2,12 +2,15 @@
 
 #include <sqlite3.h>
 #include <sys/stat.h>
+#include <unistd.h>
 #include <zlib.h>
 
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <functional>
 #include <limits>
 #include <optional>
@@ -267,6 +270,12 @@ bool has_content(const std::string& path) {
   return stat(path.c_str(), &status) == 0 && status.st_size > 0;
 }
 
+// SQLite says only that it could not; an operator wants to know why. mode: what it needs of path.
+std::string why_not_opened(sqlite3* db, const std::string& path, int mode) {
+  const int denied = access(path.c_str(), mode);
+  return denied == 0 ? sqlite3_errmsg(db) : std::strerror(errno);
+}
+
 // For a URI file name.
 std::string escaped(const std::string& path) {
   constexpr std::string_view kHex = "0123456789ABCDEF";
@@ -332,7 +341,12 @@ HistoryDb::Opened HistoryDb::open(const std::string& path) {
     opened.db.reset();
     return std::move(opened);
   };
-  if (status != SQLITE_OK) return fail(HistoryTrouble::kMissing, sqlite3_errmsg(db));
+  if (status != SQLITE_OK) {
+    const bool there = access(path.c_str(), F_OK) == 0;
+    const std::string folder = std::filesystem::path(path).parent_path().string();
+    return fail(HistoryTrouble::kMissing,
+                there ? why_not_opened(db, path, R_OK) : why_not_opened(db, folder, W_OK | X_OK));
+  }
   sqlite3_extended_result_codes(db, 1);
   sqlite3_busy_timeout(db, kBusy_ms);
   bool fresh = false;
@@ -375,7 +389,7 @@ HistoryDb::Opened HistoryDb::open_to_read(const std::string& path) {
       uri.c_str(), &db, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
   opened.db.reset(new HistoryDb(db));
   if (status != SQLITE_OK) {
-    opened.text = sqlite3_errmsg(db);
+    opened.text = why_not_opened(db, path, R_OK);
     opened.trouble = HistoryTrouble::kMissing;
     opened.db.reset();
     return opened;

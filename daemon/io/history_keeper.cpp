@@ -31,9 +31,10 @@ void HistoryKeeper::complain(const std::string& what) {
 }
 
 void HistoryKeeper::open_file() {
-  std::error_code ignored;
-  std::filesystem::create_directories(folder_, ignored);
+  std::error_code error;
+  std::filesystem::create_directories(folder_, error);
   HistoryDb::Opened opened = HistoryDb::open(path_);
+  if (error && opened.trouble == HistoryTrouble::kMissing) opened.text = error.message();
   if (opened.trouble == HistoryTrouble::kCorrupt) {
     set_aside(opened.text);
     return;

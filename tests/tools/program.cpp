@@ -30,7 +30,7 @@ void Workplace::write(const std::string& name, std::string_view content) const {
   if (!file.flush()) throw std::runtime_error(name + " cannot be written");
 }
 
-std::string program_path() { return BELTGRIP_PROGRAM; }
+std::string program_path(const std::string& name) { return BELTGRIP_PROGRAMS "/" + name; }
 
 RunResult beltgrip(std::vector<std::string> arguments, const std::string& stdin_file) {
   arguments.insert(arguments.begin(), program_path());

@@ -25,7 +25,7 @@ class Workplace {
   std::filesystem::path directory_;
 };
 
-std::string program_path();
+std::string program_path(const std::string& name = "beltgrip");
 
 // beltgrip ARGUMENT...
 RunResult beltgrip(std::vector<std::string> arguments, const std::string& stdin_file = "/dev/null");

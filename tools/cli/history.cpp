@@ -65,9 +65,9 @@ struct History {
 std::string in_folder(const std::string& folder) {
   namespace fs = std::filesystem;
   const fs::path direct = fs::path(folder) / daemon::kHistoryFile;
-  if (fs::exists(direct)) return direct.string();
+  std::error_code ignored;  // opening it says why
+  if (fs::exists(direct, ignored)) return direct.string();
   std::vector<std::string> found;
-  std::error_code ignored;
   for (const auto& each : fs::directory_iterator(folder, ignored)) {
     const fs::path below = each.path() / daemon::kHistoryFile;
     if (fs::exists(below, ignored)) found.push_back(below.string());
@@ -89,7 +89,8 @@ std::string path_of(const Options& options) {
     if (!folder.empty()) path = (fs::path(options.config).parent_path() / folder).string();
   }
   if (path.empty()) path = kDefaultFolder;
-  return fs::is_directory(path) ? in_folder(path) : path;
+  std::error_code ignored;
+  return fs::is_directory(path, ignored) ? in_folder(path) : path;
 }
 
 History read(const Options& options) {
