@@ -128,7 +128,7 @@ TEST_F(Calibrate, PressureFromDiagnosticsIsCalibratedAndWrittenWhole) {
   const auto expected = nlohmann::json::parse(truth.out)["findings"];
   const auto found = nlohmann::json::parse(place.read("out.json"))["findings"];
   ASSERT_EQ(found.size(), expected.size());
-  double zero_Pa = NAN;
+  double zero_Pa = std::numeric_limits<double>::quiet_NaN();
   for (std::size_t i = 0; i < found.size(); ++i) {
     EXPECT_EQ(found[i]["key"], expected[i]["key"]);
     ASSERT_EQ(found[i]["value"].is_null(), expected[i]["value"].is_null()) << found[i];
