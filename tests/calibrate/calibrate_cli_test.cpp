@@ -176,7 +176,8 @@ TEST_F(Calibrate, PressureFromDiagnosticsIsCalibratedAndWrittenWhole) {
   }
   const RunResult again = calibrate({"--json", "-"});
   ASSERT_EQ(again.status, 0) << again.err;
-  for (const auto& each : nlohmann::json::parse(again.out)["findings"]) {
+  const auto settled = nlohmann::json::parse(again.out);
+  for (const auto& each : settled["findings"]) {
     if (each["key"] != "signals.secondary_pressure") continue;
     EXPECT_NEAR(each["value"].get<double>(), 0.0, 1.0);
   }
