@@ -244,12 +244,14 @@ Summary summary_of(const Campaign& campaign, int run, const RawColumns& raw,
       for (int& effect : effects) effect -= n;
     }
     const auto rows = block.rows.leftCols(count);
+    out.samples += static_cast<int>(block.rows.rows());
+    // A signal that never moves leaves a block without columns: nothing to add.
+    if (!effects.empty()) out.uu(effects, effects) += random.transpose() * random;
+    if (columns.empty()) continue;
     MatrixXd aa = MatrixXd::Zero(count, count);
     aa.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
     out.aa(columns, columns) += MatrixXd(aa.selfadjointView<Eigen::Lower>());
-    out.ua(effects, columns) += random.transpose() * rows;
-    out.uu(effects, effects) += random.transpose() * random;
-    out.samples += static_cast<int>(block.rows.rows());
+    if (!effects.empty()) out.ua(effects, columns) += random.transpose() * rows;
   }
   return out;
 }
@@ -412,7 +414,8 @@ Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>&
     weights << full, u;
     for (std::size_t i = 0; i < kinds.size(); ++i) {
       const auto q = static_cast<std::size_t>(kinds[i]);
-      const VectorXd block = blocks[i].rows * weights(blocks[i].columns);
+      VectorXd block = VectorXd::Zero(blocks[i].rows.rows());
+      if (!blocks[i].columns.empty()) block = blocks[i].rows * weights(blocks[i].columns);
       rest[q][e].assign(block.data(), block.data() + block.size());
       // Clipped: a few outliers must not make the noise look white.
       std::vector<double> size;
