@@ -620,6 +620,31 @@ void PeakFit::finish() noexcept {
     if (points_[i - 1].slip <= result_.slip) break;
   }
   result_.valid = std::isfinite(result_.mu) && result_.mu > 0.0;
+  result_.passed = came_after();
+}
+
+// Do the points beyond the peak come after those before it, and the last ones among them? Where
+// deformation drives slip back while mu* still rises, what looks like a fall along slip is the way
+// there.
+bool PeakFit::came_after() const noexcept {
+  struct Side {
+    double time_s = 0.0, sum = 0.0;
+    double mean() const { return sum / time_s; }
+  };
+  Side before, beyond, last;  // times, times, slip
+  const std::size_t end_begin =
+      point_count_ - std::max<std::size_t>(1, (point_count_ - first_) / 10);
+  for (std::size_t i = first_; i < point_count_; ++i) {
+    const Point& point = points_[i];
+    Side& side = point.slip > result_.slip ? beyond : before;
+    side.time_s += point.duration_s;
+    side.sum += point.duration_s * point.t_s;
+    if (i < end_begin) continue;
+    last.time_s += point.duration_s;
+    last.sum += point.duration_s * point.slip;
+  }
+  return before.time_s > 0.0 && beyond.time_s > 0.0 && beyond.mean() > before.mean() &&
+         last.mean() > result_.slip;
 }
 
 // Where the clamp force has come to a stand, the load alone moves slip and mu* to and fro, by less

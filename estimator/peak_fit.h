@@ -36,6 +36,7 @@ struct PeakFitResult {
   double inside = 0.0;  // probability that the curve turns down within the data
   double fall = 0.0;    // from there to the end of the data
   double fall_variance = 0.0;
+  bool passed = false;      // the data beyond the peak come after those before it
   double duration_s = 0.0;  // of the data that were used
   // What mu* has surely reached: the mean over that window, of any length, whose lower end is
   // largest; its relative deviation by the noise of torque, speed and clamp force.
@@ -114,6 +115,7 @@ class PeakFit {
   void find_course() noexcept;
   void find_stretch() noexcept;
   void find_reached(std::size_t length) noexcept;
+  bool came_after() const noexcept;
   double force_variance(double begin_s, double end_s) const noexcept;
   double span() const noexcept { return std::max(0.3, slip_high_ - slip_low_); }
   double corner(std::size_t index) const noexcept;

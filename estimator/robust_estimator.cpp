@@ -244,6 +244,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     const bool seen = out_.stop == StopReason::kSlope
                           ? fit.inside >= inside_needed(fit.slip)
                           : out_.stop != StopReason::kTorque && fit.inside >= kInsideWithoutStop &&
+                                fit.passed &&
                                 fit.fall > kFallDeviations * std::sqrt(fit.fall_variance);
     peak_.samples = std::lround(fit.duration_s * sample_rate_hz_);
     peak_.contradictory = contradictory(fit);
