@@ -161,6 +161,13 @@ constexpr std::array<BinaryFormat, 6> kBinaryFormats{
       "packed with xz, which is not read; pack with gzip or zstd"},
      {"\x0A\x0D\x0D\x0A", "a pcapng capture, which is not read; export it as a candump log"}}};
 
+// Whatever the format: no line may say more than one of these.
+bool is_of_two_kinds(const CanFrame& frame) {
+  return static_cast<int>(frame.remote) + static_cast<int>(frame.error) +
+             static_cast<int>(frame.fd) >
+         1;
+}
+
 class TextLogReader : public LogReader {
  public:
   TextLogReader(std::unique_ptr<ByteSource> source, bool notes)
@@ -198,6 +205,10 @@ class TextLogReader : public LogReader {
       }
       switch (parser_->parse(line, record)) {
         case LineKind::kFrame:
+          if (is_of_two_kinds(record.frame)) {
+            report("a frame of two kinds: remote, error and CAN FD exclude each other");
+            break;
+          }
           record.note = {};
           ++stats_.frames;
           return true;

@@ -153,7 +153,7 @@ class CandumpParser : public LineParser {
     skip_blanks(line);
     if (line.starts_with("remote request")) {
       frame.remote = true;
-      return frame.fd ? bad("remote request in a CAN FD frame") : LineKind::kFrame;
+      return LineKind::kFrame;
     }
     for (std::size_t i = 0; i < *length; ++i) {
       const std::string_view byte = take_word(line);

@@ -115,7 +115,6 @@ class TrcParser : public LineParser {
     frame.length = static_cast<std::uint8_t>(code);
     skip_blanks(line);
     frame.remote |= line.starts_with("RTR");
-    if (frame.remote && frame.fd) return bad("remote request in a CAN FD frame");
     for (std::size_t i = 0; i < code && !frame.remote; ++i) {
       const auto byte = hexadecimal(take_word(line));
       if (!byte || *byte > 0xFF) return bad("fewer data bytes than the length says");

@@ -573,6 +573,19 @@ TEST(AnyLog, UnpacksGzipAndZstdByContent) {
   EXPECT_EQ(zstd.stats.lines_bad, 0U);
 }
 
+TEST(AnyLog, AFrameIsOfOneKind) {
+  // An error frame that is remote; CAN FD that is remote, as candump prints them.
+  const Log log = read(
+      "(1.0) can0 20000004#R8\n"
+      "(2.0) can0 20000004#0000000000000000\n"
+      " (003.000000)  can0  123  [12]  remote request\n"
+      "(4.0) can0 123#R8\n");
+  EXPECT_EQ(log.stats.lines_bad, 2U);
+  ASSERT_EQ(log.frames.size(), 2U);
+  EXPECT_TRUE(log.frames[0].frame.error);
+  EXPECT_TRUE(log.frames[1].frame.remote);
+}
+
 std::string utf16(std::string_view ascii, bool little) {
   std::string out = little ? "\xFF\xFE" : "\xFE\xFF";
   for (const char c : ascii) out += little ? std::string{c, '\0'} : std::string{'\0', c};
