@@ -127,6 +127,16 @@ TEST_F(Diagnose, NamesTheCauseWritesTheModelAndIsContentWithIt) {
   const json& torque = first.at("held_out").at("secondary_torque");
   EXPECT_LT(torque.at("rmse_after").get<double>(), 0.2 * torque.at("rmse_before").get<double>());
 
+  // Run forward, the extended simulation follows the signals that the given one misses.
+  for (const char* name : {"secondary_speed", "slip", "primary_torque"}) {
+    const json& forward = first.at("simulation").at(name);
+    EXPECT_GT(forward.at("rmse"), forward.at("noise_floor")) << name;
+    const json& gain = forward.at("held_out");
+    EXPECT_LT(gain.at("rmse_after").get<double>(), 0.5 * gain.at("rmse_before").get<double>())
+        << name << gain;
+    EXPECT_GT(gain.at("ci95")[0], 0.0) << name << gain;
+  }
+
   // The estimator that is told of the loss finds the generator's friction, the other one more.
   const double mu_max = trial.machine.mu_max;
   ASSERT_GE(first.at("reruns").size(), 4U);

@@ -151,6 +151,7 @@ class Run {
     }
     fill_machine(engine, naming);
     fill_baseline(engine, naming);
+    out().simulation = simulated_signals(campaign, naming.nominal);
     fill_not_identifiable(engine, naming);
     if (different_machines_) {
       nothing_identifiable("the experiments are not of one machine");
@@ -189,6 +190,7 @@ class Run {
     }
     out().held_out = gain.signals;
     out().mu_max = gain.mu_max;
+    for (const auto& [name, errors] : gain.forward) out().simulation[name].left_out = errors;
     fill_findings(engine, refuted ? std::vector<Accepted>() : naming.accepted, naming, gain);
     if (naming.unknown) {
       out().unexplained =

@@ -47,6 +47,12 @@ struct BaselineSignal {
   std::map<std::string, double> tests;
 };
 
+// A signal that the simulation predicts when it is run forward.
+struct SimulatedSignal {
+  double rmse = 0.0, noise_floor = 0.0;  // of the nominal machine
+  std::optional<BeforeAfter> left_out;   // on experiments that were not used for the fit
+};
+
 struct MuMaxError {
   double before = 0.0, after = 0.0, low = 0.0, high = 0.0;
 };
@@ -70,6 +76,7 @@ enum class Verdict { kNothingWrong, kExplained, kUnexplained };
 struct Diagnosis {
   Verdict verdict = Verdict::kNothingWrong;
   std::map<std::string, BaselineSignal> baseline;
+  std::map<std::string, SimulatedSignal> simulation;
   std::vector<Finding> findings;
   std::optional<Unexplained> unexplained;
   std::vector<NotIdentifiable> not_identifiable;

@@ -78,36 +78,6 @@ GridSignal to_grid(const Channel& channel, double start_s, int n, double dt_s) {
   return out;
 }
 
-// The slow copy of what is on the grid.
-void add_slow(GridSignal& signal, double dt_s) {
-  const auto n = static_cast<int>(signal.value.size());
-  signal.slow = signal.value;
-  signal.slow_slope = signal.slope;
-  const int reach = static_cast<int>(std::ceil(3.0 * kSlowSigma_s / dt_s));
-  std::vector<double> weight;
-  for (int i = 0; i <= reach; ++i) {
-    weight.push_back(std::exp(-0.5 * std::pow(i * dt_s / kSlowSigma_s, 2.0)));
-  }
-  for (int k = 0; k < n; ++k) {
-    double w0 = 0.0, w1 = 0.0, w2 = 0.0, y0 = 0.0, y1 = 0.0;
-    for (int i = std::max(0, k - reach); i <= std::min(n - 1, k + reach); ++i) {
-      const double y = signal.value[i];
-      if (!std::isfinite(y)) continue;
-      const double w = weight[static_cast<std::size_t>(std::abs(i - k))];
-      const double u = (i - k) * dt_s;
-      w0 += w;
-      w1 += w * u;
-      w2 += w * u * u;
-      y0 += w * y;
-      y1 += w * u * y;
-    }
-    const double determinant = w0 * w2 - w1 * w1;
-    if (!std::isfinite(signal.value[k]) || determinant <= 0.02 * w0 * w0 * dt_s * dt_s) continue;
-    signal.slow[k] = (w2 * y0 - w1 * y1) / determinant;
-    signal.slow_slope[k] = (w0 * y1 - w1 * y0) / determinant;
-  }
-}
-
 // Where a third and more of the channel's samples sit on its largest or smallest value for half a
 // second while the channel moves elsewhere: noise takes a clipped signal off its bound now and
 // then.
@@ -170,6 +140,35 @@ void trim_and_segment(ExperimentData& data) {
 }
 
 }  // namespace
+
+void add_slow(GridSignal& signal, double dt_s) {
+  const auto n = static_cast<int>(signal.value.size());
+  signal.slow = signal.value;
+  signal.slow_slope = signal.slope;
+  const int reach = static_cast<int>(std::ceil(3.0 * kSlowSigma_s / dt_s));
+  std::vector<double> weight;
+  for (int i = 0; i <= reach; ++i) {
+    weight.push_back(std::exp(-0.5 * std::pow(i * dt_s / kSlowSigma_s, 2.0)));
+  }
+  for (int k = 0; k < n; ++k) {
+    double w0 = 0.0, w1 = 0.0, w2 = 0.0, y0 = 0.0, y1 = 0.0;
+    for (int i = std::max(0, k - reach); i <= std::min(n - 1, k + reach); ++i) {
+      const double y = signal.value[i];
+      if (!std::isfinite(y)) continue;
+      const double w = weight[static_cast<std::size_t>(std::abs(i - k))];
+      const double u = (i - k) * dt_s;
+      w0 += w;
+      w1 += w * u;
+      w2 += w * u * u;
+      y0 += w * y;
+      y1 += w * u * y;
+    }
+    const double determinant = w0 * w2 - w1 * w1;
+    if (!std::isfinite(signal.value[k]) || determinant <= 0.02 * w0 * w0 * dt_s * dt_s) continue;
+    signal.slow[k] = (w2 * y0 - w1 * y1) / determinant;
+    signal.slow_slope[k] = (w0 * y1 - w1 * y0) / determinant;
+  }
+}
 
 ArrayXd shifted(const GridSignal& signal, double dt_s, double shift_s) {
   const ArrayXd& x = signal.slow;

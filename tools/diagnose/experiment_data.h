@@ -45,6 +45,9 @@ struct ExperimentData {
 // Never throws: what cannot be used is masked, and said in notes.
 ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator);
 
+// Both slow copies, from value.
+void add_slow(GridSignal& signal, double dt_s);
+
 // slow(t + shift), cubic; held at the ends. Seconds.
 Eigen::ArrayXd shifted(const GridSignal& signal, double dt_s, double shift_s);
 

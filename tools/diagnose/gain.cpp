@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "tools/diagnose/forward.h"
+
 namespace beltgrip::diagnose {
 namespace {
 
@@ -98,6 +100,23 @@ std::string torque_name(const Campaign& campaign) {
     if (run.valid_count > 0) return run.torque_is_engine ? "engine_torque" : "primary_torque";
   }
   return "primary_torque";
+}
+
+// Both states' errors per experiment.
+Gain judge(const Campaign& campaign, const std::vector<ModelState>& before,
+           const std::vector<ModelState>& after) {
+  std::vector<SignalErrors> errors_before, errors_after, forward_before, forward_after;
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    const int run = static_cast<int>(e);
+    errors_before.push_back(signal_errors(campaign, run, before[e]));
+    errors_after.push_back(signal_errors(campaign, run, after[e]));
+    ForwardErrors forward = forward_errors(campaign, run, before[e], after[e]);
+    forward_before.push_back(std::move(forward.before));
+    forward_after.push_back(std::move(forward.after));
+  }
+  Gain out = compare(errors_before, errors_after);
+  out.forward = compare(forward_before, forward_after).signals;
+  return out;
 }
 
 }  // namespace
@@ -243,28 +262,69 @@ std::map<std::string, double> noise_floors(const Campaign& campaign, const Model
   return out;
 }
 
+ForwardErrors forward_errors(const Campaign& campaign, int run, const ModelState& before,
+                             const ModelState& after) {
+  ForwardErrors out;
+  const Forward one = run_forward(campaign, run, before), other = run_forward(campaign, run, after);
+  for (std::size_t i = 0; i < one.signals.size(); ++i) {
+    const std::string name(one.signals[i].name);
+    for (std::size_t k = 0; k < one.grips.size(); ++k) {
+      if (!one.grips[k] || !other.grips[k]) continue;
+      const auto add = [&](const ForwardSignal& signal, SignalErrors& to) {
+        const auto at = static_cast<Index>(k);
+        const double error = signal.measured[at] - signal.simulated[at];
+        SignalErrors::Sum& sum = to.signal[name];
+        sum.squares += error * error;
+        sum.count += 1.0;
+      };
+      add(one.signals[i], out.before);
+      add(other.signals[i], out.after);
+    }
+  }
+  return out;
+}
+
+std::map<std::string, SimulatedSignal> simulated_signals(const Campaign& campaign,
+                                                         const ModelState& nominal) {
+  constexpr Index kApart = 4;  // samples: nearer ones share those of the local fit
+  std::map<std::string, SignalErrors::Sum> sums;
+  std::map<std::string, std::vector<double>> differences;
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    for (const ForwardSignal& signal :
+         run_forward(campaign, static_cast<int>(e), nominal).signals) {
+      const std::string name(signal.name);
+      const ArrayXd error = signal.measured - signal.simulated;
+      for (Index k = 0; k < error.size(); ++k) {
+        if (!std::isfinite(error[k])) continue;
+        sums[name].squares += error[k] * error[k];
+        sums[name].count += 1.0;
+        if (k < kApart || k + kApart >= error.size()) continue;
+        const double bend = error[k - kApart] - 2.0 * error[k] + error[k + kApart];
+        if (std::isfinite(bend)) differences[name].push_back(bend / std::sqrt(6.0));
+      }
+    }
+  }
+  std::map<std::string, SimulatedSignal> out;
+  for (const auto& [name, sum] : sums) {
+    out[name] = {rms(sum), robust_sigma(differences[name]), std::nullopt};
+  }
+  return out;
+}
+
 Gain left_out_gain(const Engine& engine, const ModelState& nominal, const ModelState& extended,
                    const std::vector<int>& slots) {
   const Campaign& campaign = engine.campaign();
   const std::vector<ModelState> before = leave_one_out(engine, nominal, {}).states;
   const std::vector<ModelState> after =
       slots.empty() ? before : leave_one_out(engine, extended, slots).states;
-  std::vector<SignalErrors> errors_before, errors_after;
-  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
-    errors_before.push_back(signal_errors(campaign, static_cast<int>(e), before[e]));
-    errors_after.push_back(signal_errors(campaign, static_cast<int>(e), after[e]));
-  }
-  return compare(errors_before, errors_after);
+  return judge(campaign, before, after);
 }
 
 Gain held_out_gain(const Campaign& held_out, const ModelState& nominal,
                    const ModelState& extended) {
-  std::vector<SignalErrors> before, after;
-  for (std::size_t e = 0; e < held_out.runs.size(); ++e) {
-    before.push_back(signal_errors(held_out, static_cast<int>(e), nominal));
-    after.push_back(signal_errors(held_out, static_cast<int>(e), extended));
-  }
-  return compare(before, after);
+  const auto runs = held_out.runs.size();
+  return judge(held_out, std::vector<ModelState>(runs, nominal),
+               std::vector<ModelState>(runs, extended));
 }
 
 }  // namespace beltgrip::diagnose

@@ -28,8 +28,20 @@ SignalErrors signal_errors(const Campaign& campaign, int run, const ModelState& 
 // Noise of the same signals, from differences of neighbouring samples.
 std::map<std::string, double> noise_floors(const Campaign& campaign, const ModelState& state);
 
+// The same of the signals that the simulation predicts when it is run forward, each where both
+// states' belts grip.
+struct ForwardErrors {
+  SignalErrors before, after;
+};
+ForwardErrors forward_errors(const Campaign& campaign, int run, const ModelState& before,
+                             const ModelState& after);
+// Errors of the nominal machine run forward, and their noise, from differences of neighbours.
+std::map<std::string, SimulatedSignal> simulated_signals(const Campaign& campaign,
+                                                         const ModelState& nominal);
+
 struct Gain {
   std::map<std::string, BeforeAfter> signals;
+  std::map<std::string, BeforeAfter> forward;
   std::optional<MuMaxError> mu_max;
   // One signal is predicted better beyond chance.
   bool better() const;

@@ -17,9 +17,34 @@ std::string number(double value) {
 
 std::string range(double low, double high) { return number(low) + " .. " + number(high); }
 
+std::string probability(double value) { return value > 0.999 ? "> 0.999" : number(value); }
+
 std::string joined(const std::vector<std::string>& words) {
   std::string out;
   for (const std::string& each : words) out += (out.empty() ? "" : ", ") + each;
+  return out;
+}
+
+std::string sizes(const Finding& finding) {
+  std::string out;
+  const auto add = [&](const std::string& text) { out += (out.empty() ? "" : "; ") + text; };
+  for (const auto& [name, value] : finding.parameters) {
+    add(name + " = " + number(value.value) + " (" + range(value.low, value.high) + ")");
+  }
+  for (const auto& [name, value] : finding.fixed) add(name + " = " + number(value));
+  return out;
+}
+
+std::string name_of(const Finding& finding) {
+  return finding.effect + (finding.role.empty() ? "" : " of " + finding.role);
+}
+
+std::string sentence(const Finding& finding) {
+  std::string out = name_of(finding) + ": " + finding.equation + ", " + sizes(finding) +
+                    "; probability " + probability(finding.probability) + ".";
+  if (!finding.aliases.empty()) {
+    out += " These data cannot tell it from " + joined(finding.aliases) + ".";
+  }
   return out;
 }
 
@@ -28,13 +53,8 @@ void add_findings(report::HtmlPage& page, const Diagnosis& d) {
   page.heading("What is wrong");
   Rows rows;
   for (const Finding& finding : d.findings) {
-    std::string sizes;
-    for (const auto& [name, value] : finding.parameters) {
-      sizes += name + " = " + number(value.value) + " (" + range(value.low, value.high) + ") ";
-    }
-    for (const auto& [name, value] : finding.fixed) sizes += name + " = " + number(value) + " ";
-    rows.push_back({finding.effect + (finding.role.empty() ? "" : " of " + finding.role),
-                    finding.equation, sizes, number(finding.probability), joined(finding.aliases),
+    rows.push_back({name_of(finding), finding.equation, sizes(finding),
+                    probability(finding.probability), joined(finding.aliases),
                     finding.separate_by});
   }
   page.table({"effect", "equation", "size (95 %)", "probability", "these data cannot tell it from",
@@ -66,6 +86,26 @@ void add_tables(report::HtmlPage& page, const Diagnosis& d) {
                       range(d.mu_max->low, d.mu_max->high)});
     }
     page.table({"signal, SI", "before", "after", "difference (95 %)"}, rows);
+  }
+  if (!d.simulation.empty()) {
+    page.heading("The simulation run forward");
+    page.paragraph(
+        "Integrated over each experiment, driven by what drives the machine there, up to the peak "
+        "of friction, where it ends and begins anew once the belt grips. Before and after: "
+        "experiments left out of the fit.");
+    rows.clear();
+    for (const auto& [name, signal] : d.simulation) {
+      rows.push_back({name, number(signal.rmse), number(signal.noise_floor)});
+      if (!signal.left_out) continue;
+      const BeforeAfter& gain = *signal.left_out;
+      for (const std::string& cell :
+           {number(gain.before), number(gain.after), range(gain.low, gain.high)}) {
+        rows.back().push_back(cell);
+      }
+    }
+    page.table(
+        {"signal, SI", "error as given, rms", "noise", "before", "after", "difference (95 %)"},
+        rows);
   }
   if (!d.reruns.empty()) {
     page.heading("By the estimator, told the model before and after");
@@ -101,6 +141,12 @@ void add_tables(report::HtmlPage& page, const Diagnosis& d) {
 std::string html_text(const Diagnosis& d, const Plots& plots) {
   report::HtmlPage page("BeltGrip: diagnosis");
   page.paragraph(headline(d));
+  if (d.verdict == Verdict::kNothingWrong) {
+    page.paragraph(
+        "The model departs from these data by no more than noise and the scatter between "
+        "experiments do.");
+  }
+  for (const Finding& finding : d.findings) page.paragraph(sentence(finding));
   if (d.unexplained) {
     page.paragraph("Something that is not in the library acts on " + d.unexplained->acts_on +
                    " and follows " + joined(d.unexplained->depends_on) + ".");
@@ -113,11 +159,11 @@ std::string html_text(const Diagnosis& d, const Plots& plots) {
     page.heading(heading);
     page.charts(charts);
   };
+  draw("Measured and simulated", plots.signals);
+  draw("Friction", plots.friction);
   draw("Residual over time", plots.over_time);
   draw("Residual over what it may depend on", plots.over_variables);
-  draw("Friction", plots.friction);
   draw("Order spectra", plots.orders);
-  draw("Measured and simulated", plots.signals);
   if (!d.notes.empty()) {
     page.heading("Notes");
     for (const std::string& note : d.notes) page.paragraph(note);

@@ -55,6 +55,23 @@ std::string json_text(const Diagnosis& d) {
     json.end_object().end_object();
   }
   json.end_object();
+  json.key("simulation").begin_object();
+  for (const auto& [name, signal] : d.simulation) {
+    json.key(name).begin_object();
+    json.field("rmse", signal.rmse).field("noise_floor", signal.noise_floor);
+    json.key("held_out");
+    if (signal.left_out) {
+      json.begin_object();
+      json.field("rmse_before", signal.left_out->before);
+      json.field("rmse_after", signal.left_out->after);
+      interval(json, signal.left_out->low, signal.left_out->high);
+      json.end_object();
+    } else {
+      json.null();
+    }
+    json.end_object();
+  }
+  json.end_object();
   json.key("findings").begin_array();
   for (const Finding& finding : d.findings) {
     json.begin_object();
@@ -197,6 +214,12 @@ std::string plain_text(const Diagnosis& d) {
   for (const auto& [name, gain] : d.held_out) {
     out += "  " + name + ": " + number(gain.before) + " -> " + number(gain.after) + " [" +
            number(gain.low) + ", " + number(gain.high) + "]\n";
+  }
+  for (const auto& [name, signal] : d.simulation) {
+    if (!signal.left_out) continue;
+    out += "  " + name + ", simulated forward: " + number(signal.left_out->before) + " -> " +
+           number(signal.left_out->after) + " [" + number(signal.left_out->low) + ", " +
+           number(signal.left_out->high) + "]\n";
   }
   if (d.mu_max) {
     out += "  mu_max, relative error: " + number(d.mu_max->before) + " -> " +

@@ -10,31 +10,6 @@ using Eigen::ArrayXd;
 
 constexpr int kBalanceStep = 5;  // samples of the slow copies, nearly independent of each other
 
-Quantities quantities(const Campaign& campaign, const ExperimentData& data, int run,
-                      const ModelState& state) {
-  return evaluate(data, run, campaign.variator, state.nuisance,
-                  Effects{&campaign.slots, campaign.switched_on + state.effects});
-}
-
-std::array<CurveShape, kStops> shapes(const Eigen::VectorXd& nuisance, const Quantities& q) {
-  std::array<CurveShape, kStops> out;
-  const double* values = nuisance.data();
-  out[kOverdriveStop] =
-      CurveShape(std::span<const double, kShapeKnots>(values + kShapeOverdrive, kShapeKnots),
-                 q.fall[kOverdriveStop]);
-  out[kLowStop] = CurveShape(std::span<const double, kShapeKnots>(values + kShapeLow, kShapeKnots),
-                             q.fall[kLowStop]);
-  return out;
-}
-
-double robust_sigma(std::vector<double>& values) {
-  if (values.size() < 20) return 0.0;
-  for (double& v : values) v = std::abs(v);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return 1.4826 * *middle;
-}
-
 // The foot point of what stands in the regressors: of the misfit in torque, the clamp force takes
 // its share.
 void move_to_foot(const Quantities& q, const ExperimentData& data,
@@ -60,6 +35,31 @@ void move_to_foot(const Quantities& q, const ExperimentData& data,
 }
 
 }  // namespace
+
+double robust_sigma(std::vector<double>& values) {
+  if (values.size() < 20) return 0.0;
+  for (double& v : values) v = std::abs(v);
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return 1.4826 * *middle;
+}
+
+Quantities quantities(const Campaign& campaign, const ExperimentData& data, int run,
+                      const ModelState& state) {
+  return evaluate(data, run, campaign.variator, state.nuisance,
+                  Effects{&campaign.slots, campaign.switched_on + state.effects});
+}
+
+std::array<CurveShape, kStops> shapes(const Eigen::VectorXd& nuisance, const Quantities& q) {
+  std::array<CurveShape, kStops> out;
+  const double* values = nuisance.data();
+  out[kOverdriveStop] =
+      CurveShape(std::span<const double, kShapeKnots>(values + kShapeOverdrive, kShapeKnots),
+                 q.fall[kOverdriveStop]);
+  out[kLowStop] = CurveShape(std::span<const double, kShapeKnots>(values + kShapeLow, kShapeKnots),
+                             q.fall[kLowStop]);
+  return out;
+}
 
 Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state) {
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];

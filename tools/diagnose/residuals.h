@@ -72,6 +72,11 @@ struct Residuals {
   ExperimentData clean;  // torques and pressure at the foot point: no noise in a regressor
 };
 
+// The model at a state, of the campaign's data or of others in their place; its friction curves.
+Quantities quantities(const Campaign& campaign, const ExperimentData& data, int run,
+                      const ModelState& state);
+std::array<CurveShape, kStops> shapes(const Eigen::VectorXd& nuisance, const Quantities& q);
+
 Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state);
 // Adds what derivative() needs; at: the residuals of this state.
 void prepare_derivatives(const Campaign& campaign, int run, const ModelState& state, Residuals& at);
@@ -88,6 +93,8 @@ struct QuantityChange {
 ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
                           const QuantityChange& change);
 
+// By the median; changes the values. 0: fewer than 20.
+double robust_sigma(std::vector<double>& values);
 NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& state);
 // A speed sensor's noise counts the more, the slower its shaft turns.
 std::vector<double> estimate_slip_noise_shares(const Campaign& campaign, const ModelState& state);

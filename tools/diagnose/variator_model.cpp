@@ -262,6 +262,8 @@ Quantities evaluate(const ExperimentData& run, int experiment,
   }
   q.force_N = std::move(c.force_N);
   q.belt_torque = std::move(c.belt_torque);
+  q.omega_p = std::move(c.omega_p);
+  q.omega_s = std::move(c.omega_s);
   q.ln_peak_slip = c.ln_peak_slip;
   q.fall = c.fall;
   return q;

@@ -72,6 +72,7 @@ struct Context {
 // What the residuals are made of.
 struct Quantities {
   Eigen::ArrayXd slip, belt_torque, capacity, force_N, ratio, balance, tracking;
+  Eigen::ArrayXd omega_p, omega_s;  // the true ones
   std::array<double, kStops> ln_peak_slip{}, fall{};
 };
 

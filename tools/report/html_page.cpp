@@ -16,27 +16,29 @@ h1 { font-size: 1.5em; } h2 { font-size: 1.2em; margin-top: 2em; }
 table { border-collapse: collapse; margin: 0.7em 0; }
 th, td { border: 1px solid #ccc; padding: 0.25em 0.6em; text-align: left; vertical-align: top; }
 th { background: #f3f3f3; }
-.charts { display: grid; grid-template-columns: repeat(auto-fill, minmax(520px, 1fr)); gap: 1em; }
+.charts { display: grid; grid-template-columns: repeat(auto-fill, minmax(370px, 1fr)); gap: 1em; }
 .chart { position: relative; height: 320px; min-width: 0; }
 )";
 
-// One scatter chart per entry of `data`; a series is [name, is a line, [x, y, x, y, ...]].
+// One scatter chart per entry of `data`; a series is [name, is a line, is dashed, [x, y, x, y,
+// ...]].
 constexpr std::string_view kScript = R"(
-const colours = ['#1f6fb4', '#d1495b', '#2e8b57', '#8d6a9f', '#b8860b', '#555555'];
+const colours = ['#1f6fb4', '#d1495b', '#999999', '#2e8b57', '#8d6a9f', '#b8860b', '#555555'];
 for (const [id, title, xLabel, yLabel, series] of data) {
-  const datasets = series.map(([label, line, xy], i) => {
+  const datasets = series.map(([label, line, dashed, xy], i) => {
     const points = [];
     for (let k = 0; k + 1 < xy.length; k += 2) points.push({x: xy[k], y: xy[k + 1]});
     const colour = colours[i % colours.length];
     return {label, data: points, showLine: line, borderColor: colour, backgroundColor: colour,
-            borderWidth: line ? 1.5 : 0, pointRadius: line ? 0 : 1.5};
+            borderWidth: line ? 1.5 : 0, borderDash: dashed ? [5, 4] : [],
+            pointRadius: line ? 0 : 1.5};
   });
   new Chart(document.getElementById(id), {
     type: 'scatter',
     data: {datasets},
     options: {
       animation: false, maintainAspectRatio: false, normalized: true,
-      plugins: {title: {display: true, text: title}, legend: {display: datasets.length > 1}},
+      plugins: {title: {display: true, text: title}, legend: {display: datasets.length > 1, labels: {boxWidth: 12}}},
       scales: {x: {title: {display: true, text: xLabel}}, y: {title: {display: true, text: yLabel}}}
     }
   });
@@ -125,7 +127,8 @@ void HtmlPage::charts(const std::vector<Chart>& charts) {
     data_ += "[" + quoted(id) + "," + quoted(chart.title) + "," + quoted(chart.x_label) + "," +
              quoted(chart.y_label) + ",[";
     for (const Series& series : chart.series) {
-      data_ += "[" + quoted(series.name) + (series.line ? ",true,[" : ",false,[");
+      data_ += "[" + quoted(series.name) + (series.line ? ",true" : ",false") +
+               (series.dashed ? ",true,[" : ",false,[");
       for (std::size_t i = 0; i < series.x.size(); ++i) {
         append_number(data_, series.x[i]);
         data_ += ',';

@@ -12,6 +12,7 @@ struct Series {
   std::string name;
   std::vector<double> x, y;  // same length; what is not finite is a gap
   bool line = false;         // else points
+  bool dashed = false;
 };
 
 struct Chart {
