@@ -1,11 +1,18 @@
 #include "estimator/experiment_record.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 namespace beltgrip::estimator {
 namespace {
 
 constexpr double kFinestCell_s = 0.01;
 constexpr std::size_t kTrendCells = 4096;  // 205 s
 constexpr double kLowered = 0.97;          // of the first clamp force
+constexpr double kSmooth_s = 0.1;
+constexpr double kRaised = 1.05;  // of the lowest clamp force, and beyond so many deviations
+constexpr double kRaisedDeviations = 5.0;
 
 }  // namespace
 
@@ -27,11 +34,29 @@ void ExperimentRecord::reset() noexcept {
   torque_watch_.reset();
   first_force_N_ = 0.0;
   torque_stepped_ = false;
+  torque_stepped_s_ = smooth_force_N_ = lowest_force_N_ = lowest_force_s_ = 0.0;
   last_t_s_ = 0.0;
   last_omega_rad_s_ = 1.0;
 }
 
+double ExperimentRecord::lowered_until_s() const noexcept {
+  const double noise = std::sqrt(force_.density(kNoiseScale_s) / kSmooth_s);
+  const bool raised = smooth_force_N_ > kRaised * lowest_force_N_ + kRaisedDeviations * noise;
+  return raised ? lowest_force_s_ : std::numeric_limits<double>::infinity();
+}
+
+void ExperimentRecord::follow_force(const Cell& sample) noexcept {
+  const double share = std::min(1.0, (sample.t_s - last_t_s_) / kSmooth_s);
+  if (smooth_force_N_ <= 0.0) smooth_force_N_ = sample.clamp_force_N;
+  smooth_force_N_ += share * (sample.clamp_force_N - smooth_force_N_);
+  if (lowest_force_N_ <= 0.0 || smooth_force_N_ < lowest_force_N_) {
+    lowest_force_N_ = smooth_force_N_;
+    lowest_force_s_ = sample.t_s;
+  }
+}
+
 bool ExperimentRecord::step(const Cell& sample) noexcept {
+  follow_force(sample);
   last_t_s_ = sample.t_s;
   const double slip = sample.slip_percent;
   if (force_.step(sample.t_s, sample.clamp_force_N, 0.0)) force_line_ = force_.line();
@@ -42,6 +67,7 @@ bool ExperimentRecord::step(const Cell& sample) noexcept {
     if (first_force_N_ <= 0.0) first_force_N_ = force_N;
     if (force_N < kLowered * first_force_N_ &&
         torque_watch_.step(sample.torque_Nm, slip, force_N, torque_noise())) {
+      if (!torque_stepped_) torque_stepped_s_ = sample.t_s;
       torque_stepped_ = true;
     }
   }

@@ -36,12 +36,20 @@ class ExperimentRecord {
                                                                 : cell.clamp_force_N;
   }
   double duration_s() const noexcept { return last_t_s_; }
-  // The torque's reading has stepped since the clamp force began to fall.
-  bool torque_stepped() const noexcept { return torque_stepped_; }
+  // The torque's reading has stepped since the clamp force began to fall, and before it came back.
+  bool torque_stepped() const noexcept {
+    return torque_stepped_ && torque_stepped_s_ < lowered_until_s() - kTakingUp_s;
+  }
+  // When the clamp force was at its lowest, if it has been raised since; else infinity.
+  double lowered_until_s() const noexcept;
 
  private:
   // Frames of 20 Hz and more are independent over this time; torque and slip hardly vary in it.
   static constexpr double kNoiseScale_s = 0.2;
+  // As the force comes back, the shafts come back to one speed, which takes torque.
+  static constexpr double kTakingUp_s = 0.5;
+
+  void follow_force(const Cell& sample) noexcept;
 
   History history_;
   Trend force_, torque_, omega_p_;
@@ -50,6 +58,9 @@ class ExperimentRecord {
   StepWatch torque_watch_;
   double first_force_N_ = 0.0;
   bool torque_stepped_ = false;
+  double torque_stepped_s_ = 0.0;
+  double smooth_force_N_ = 0.0;
+  double lowest_force_N_ = 0.0, lowest_force_s_ = 0.0;
   double last_t_s_ = 0.0;
   double last_omega_rad_s_ = 1.0;
 };

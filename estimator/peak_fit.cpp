@@ -653,7 +653,7 @@ double PeakFit::tested_until_s() const noexcept {
   const Line& line = record_->force_line();
   const double end_s = record_->duration_s();
   const bool stands = std::abs(line.slope) * (end_s - line.begin_s) < kStandsStill * line.at(end_s);
-  return stands ? line.begin_s : end_s;
+  return std::min(stands ? line.begin_s : end_s, record_->lowered_until_s());
 }
 
 // From where mu* came to a share of its top, to where the curve has its top.

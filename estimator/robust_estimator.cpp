@@ -6,6 +6,7 @@
 #include "estimator/clamp_force.h"
 #include "estimator/excitation.h"
 #include "estimator/experiment_record.h"
+#include "estimator/frozen_reading.h"
 #include "estimator/peak_fit.h"
 #include "estimator/peak_forecast.h"
 #include "estimator/sensor_error.h"
@@ -28,7 +29,9 @@ constexpr double kFormDeviation = 5e-4;  // of mu: what the forms of the fit lea
 constexpr int kNarrowInARow = 4;
 constexpr double kClimb = 1.05;    // mu* at the stop, of the first one; or
 constexpr double kLowered = 0.99;  // the clamp force
-constexpr double kMuLeast = 0.02;
+// Friction that is none of a belt's: a channel is in the wrong unit.
+constexpr double kMuLeast = 0.04, kMuMost = 0.25;
+constexpr double kWidestStd = 0.3;         // of mu: wider is no value
 constexpr double kFittedDeviations = 2.6;  // by which the fit's top is lowered for a bound
 constexpr double kChordDeviations = 5.5;   // beyond these the points lie on no one curve
 constexpr double kAfterFrom_s = 0.02, kAfterTo_s = 0.08;  // after the stop
@@ -58,7 +61,10 @@ class RobustEstimator final : public SlipCurveEstimator {
         excitation_(kExcitationWindow_s, settings.sample_rate_hz, 0.0),
         record_(settings.sample_rate_hz),
         detector_(thresholds),
-        peak_forecast_(settings.sample_rate_hz) {
+        peak_forecast_(settings.sample_rate_hz),
+        pressure_reading_(settings.sample_rate_hz),
+        torque_reading_(settings.sample_rate_hz),
+        torque_is_sensor_(!settings.torque_is_engine) {
     RobustEstimator::reset();
   }
 
@@ -66,6 +72,8 @@ class RobustEstimator final : public SlipCurveEstimator {
     chain_.reset();
     excitation_.reset();
     record_.reset();
+    pressure_reading_.reset();
+    torque_reading_.reset();
     out_ = {};
     peak_ = {};
     first_t_ns_ = 0;
@@ -95,6 +103,8 @@ class RobustEstimator final : public SlipCurveEstimator {
       detector_.reset(traction_, inertia_kg_m2_);
       peak_forecast_.reset(traction_, inertia_kg_m2_);
     }
+    pressure_reading_.step(sample.secondary_pressure_Pa);
+    torque_reading_.step(sample.torque_Nm);
     const double sign = chain_.point().sign;
     const bool cell = record_.step(
         {.t_s = static_cast<double>(sample.t_ns - first_t_ns_) * kNanosecond_s,
@@ -171,11 +181,12 @@ class RobustEstimator final : public SlipCurveEstimator {
     out_.stop = detector_.step(record_);
     if (first_mu_ <= 0.0) first_mu_ = out_.mu_star;
     if (first_force_N_ <= 0.0) first_force_N_ = out_.clamp_force_N;
-    // Slip that grows while neither the force is lowered nor mu* climbs: a channel stands still. A
-    // peak that is none of a belt's: one is in the wrong unit.
+    // Slip that grows while neither the force is lowered nor mu* climbs: a channel stands still.
     const bool still =
-        out_.mu_star < kClimb * first_mu_ && out_.clamp_force_N > kLowered * first_force_N_;
-    if (out_.stop == StopReason::kSlope && (still || out_.mu_star < kMuLeast)) {
+        pressure_reading_.frozen() ||
+        (out_.mu_star < kClimb * first_mu_ && out_.clamp_force_N > kLowered * first_force_N_);
+    if ((out_.stop == StopReason::kSlope && still) ||
+        (out_.stop != StopReason::kNone && (torque_frozen() || !of_a_belt(out_.mu_star)))) {
       out_.stop = StopReason::kInputs;
     }
     out_.friction_slope = detector_.slope();
@@ -188,6 +199,10 @@ class RobustEstimator final : public SlipCurveEstimator {
     }
     peak_forecast_.collect(record_);
   }
+
+  // What an engine's controller computes may stand still, a sensor's torque does not.
+  bool torque_frozen() const noexcept { return torque_is_sensor_ && torque_reading_.frozen(); }
+  static bool of_a_belt(double mu) noexcept { return mu >= kMuLeast && mu <= kMuMost; }
 
   // What the curve so far says of its top, with the sensors' constant errors; enough for a stop?
   void expect() noexcept {
@@ -239,6 +254,7 @@ class RobustEstimator final : public SlipCurveEstimator {
 
   void judge() noexcept {
     if (out_.stop == StopReason::kInputs || out_.stop == StopReason::kRatio) return;
+    if (torque_frozen()) return;
     const PeakFitResult& fit = fit_.result();
     // Torque that fades is no friction that falls.
     const bool seen = out_.stop == StopReason::kSlope
@@ -249,9 +265,9 @@ class RobustEstimator final : public SlipCurveEstimator {
     peak_.samples = std::lround(fit.duration_s * sample_rate_hz_);
     peak_.contradictory = contradictory(fit);
     if (peak_.contradictory) return;
-    if (fit.valid && seen) {
-      const double std = std::sqrt(
-          fit.variance + fit.mu * fit.mu * common_variance(fit.mu, fit.t_s, fit.held_share));
+    const double std = std::sqrt(
+        fit.variance + fit.mu * fit.mu * common_variance(fit.mu, fit.t_s, fit.held_share));
+    if (fit.valid && seen && of_a_belt(fit.mu) && std < kWidestStd * fit.mu) {
       peak_.kind = PeakKind::kValue;
       peak_.mu_max = fit.mu;
       peak_.mu_max_std = std::max(std, kSmallestStd);
@@ -275,6 +291,7 @@ class RobustEstimator final : public SlipCurveEstimator {
         fit.variance + fit.mu * fit.mu * common_variance(fit.mu, fit.t_s, fit.held_share);
     const double fitted = fit.valid ? fit.mu - kFittedDeviations * std::sqrt(fit_variance) : 0.0;
     const bool better = fitted > surely;
+    if (std::max(fitted, surely) > kMuMost) return;
     peak_.kind = PeakKind::kLowerBound;
     peak_.mu_max = better ? fitted : surely;
     peak_.sigma_peak_percent = better ? fit.slip : fit.reached_slip;
@@ -296,6 +313,8 @@ class RobustEstimator final : public SlipCurveEstimator {
   StopDetector detector_;
   PeakFit fit_;
   PeakForecast peak_forecast_;
+  FrozenReading pressure_reading_, torque_reading_;
+  bool torque_is_sensor_;
   CurveEstimate out_;
   PeakEstimate peak_;
   double traction_ = 0.0;  // mu* = traction T_p / F_s

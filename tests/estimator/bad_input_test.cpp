@@ -2,6 +2,7 @@
 // the stop says why.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -67,6 +68,8 @@ INSTANTIATE_TEST_SUITE_P(
               StopReason::kInputs},
         Fault{"PressureTenfold", [](VariatorSample& s) { s.secondary_pressure_Pa *= 10.0; },
               StopReason::kInputs},
+        Fault{"TorqueOfAThird", [](VariatorSample& s) { s.torque_Nm *= 0.3; }, StopReason::kInputs},
+        Fault{"TorqueStuck", [](VariatorSample& s) { s.torque_Nm = 50.0; }, StopReason::kInputs},
         Fault{"TorqueTenfold", [](VariatorSample& s) { s.torque_Nm *= 10.0; }, StopReason::kInputs},
         Fault{"PressureAndTorqueStuck",
               [](VariatorSample& s) {
@@ -94,6 +97,62 @@ TEST(BadInput, TorqueThatGoesToZeroEndsTheExperiment) {
   }
   EXPECT_EQ(stop, StopReason::kTorque);
   EXPECT_NE(estimator->peak().kind, PeakKind::kValue);
+}
+
+// A channel that stands still from some instant of the ramp on, its frames still arriving.
+struct Frozen {
+  const char* name;
+  double VariatorSample::*channel;
+};
+void PrintTo(const Frozen& frozen, std::ostream* out) { *out << frozen.name; }
+
+class FrozenChannel : public testing::TestWithParam<Frozen> {};
+
+TEST_P(FrozenChannel, GivesNoValueAndTheReason) {
+  for (const double share : {0.3, 0.6, 0.8}) {  // of the ramp up to the peak, 32 s
+    const Rig rig = {.friction = test::round_peak(0.105, 2.5)};
+    const auto estimator = make_slip_curve_estimator(rig_settings(rig), {}, {});
+    StopReason stop = StopReason::kNone;
+    double held = 0.0;
+    for (auto& point : rig_trace(rig)) {
+      double& value = point.sample.*GetParam().channel;
+      if (static_cast<double>(point.sample.t_ns) * 1e-9 < 2.0 + 32.0 * share) held = value;
+      value = held;
+      stop = estimator->step(point.sample).stop;
+      if (stop != StopReason::kNone) break;
+    }
+    for (int i = 0; i < 10000 && !estimator->conclude(); ++i) {
+    }
+    EXPECT_EQ(stop, StopReason::kInputs) << share;
+    EXPECT_EQ(estimator->peak().kind, PeakKind::kNone) << share;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Channels, FrozenChannel,
+                         testing::Values(Frozen{"Pressure", &VariatorSample::secondary_pressure_Pa},
+                                         Frozen{"Torque", &VariatorSample::torque_Nm}),
+                         [](const auto& each) { return std::string(each.param.name); });
+
+TEST(BadInput, ForceThatComesBackBeforeThePeakLeavesALowerBound) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Rig rig = {.friction = test::round_peak(0.105, 2.5),
+                     .ramp_N_per_s = 70.0,
+                     .restore_s = 11.0,
+                     .end_s = 12.0,
+                     .seed = seed};
+    const auto estimator = make_slip_curve_estimator(rig_settings(rig), {}, {});
+    double reached = 0.0;
+    for (const auto& point : rig_trace(rig)) {
+      reached = std::max(reached, point.mu);
+      ASSERT_EQ(estimator->step(point.sample).stop, StopReason::kNone);
+    }
+    for (int i = 0; i < 10000 && !estimator->conclude(); ++i) {
+    }
+    EXPECT_FALSE(estimator->peak().contradictory) << seed;
+    EXPECT_EQ(estimator->peak().kind, PeakKind::kLowerBound) << seed;
+    EXPECT_GT(estimator->peak().mu_max, 0.97 * reached) << seed;
+    EXPECT_LT(estimator->peak().mu_max, 0.105) << seed;
+  }
 }
 
 }  // namespace

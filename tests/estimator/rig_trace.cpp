@@ -67,8 +67,10 @@ std::vector<TracePoint> rig_trace(const Rig& rig) {
   for (int i = 0; i < static_cast<int>(rig.end_s * kRate_hz); ++i) {
     const double t_s = i / kRate_hz;
     const double omega_p_rad_s = rig.omega_p_rad_s - rig.slowing_rad_s2 * t_s;
-    const double force_N =
-        std::max(200.0, begin_N - rig.ramp_N_per_s * std::max(0.0, t_s - rig.rest_s));
+    const double lowered_N =
+        rig.ramp_N_per_s * std::max(0.0, std::min(t_s, rig.restore_s) - rig.rest_s);
+    const double restored_N = rig.restore_N_per_s * std::max(0.0, t_s - rig.restore_s);
+    const double force_N = std::min(begin_N, std::max(200.0, begin_N - lowered_N + restored_N));
     // Secondary: the belt's torque against the load; slip is what its speed lacks, in both
     // directions.
     for (int j = 0; j < kSubsteps; ++j) {

@@ -28,8 +28,10 @@ struct Rig {
   double torque_Nm = 50.0;     // of the primary; negative: overrun
   double mu_begin = 0.075;     // at the begin of the ramp
   double ramp_N_per_s = 26.0;  // 0: clamp force held
-  double rest_s = 2.0;         // before the ramp
-  double end_s = 120.0;        // or:
+  double restore_s = 1e9;      // when the force is raised again, by restore_N_per_s
+  double restore_N_per_s = 3000.0;
+  double rest_s = 2.0;   // before the ramp
+  double end_s = 120.0;  // or:
   double end_slip_percent = 12.0;
   double secondary_inertia_kg_m2 = 0.5;      // what runs away once the belt slips
   double deformation_percent_per_kN = 0.18;  // of the ratio

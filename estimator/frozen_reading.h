@@ -1,0 +1,47 @@
+// Has a reading that kept changing come to stand still? A sensor's never repeats itself for long: a
+// signal that does so is no longer measured, though its frames still arrive. Real-time thread.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+namespace beltgrip::estimator {
+
+class FrozenReading {
+ public:
+  explicit FrozenReading(double sample_rate_hz)
+      : least_samples_(std::lround(kLeast_s * sample_rate_hz)),
+        never_samples_(std::lround(kNever_s * sample_rate_hz)) {}
+  void reset() noexcept {
+    run_ = longest_ = values_ = 0;
+    last_ = 0.0;
+  }
+  void step(double value) noexcept {
+    if (values_ > 0 && !(value < last_) && !(value > last_)) {
+      ++run_;
+      return;
+    }
+    longest_ = std::max(longest_, run_);
+    run_ = 0;
+    ++values_;
+    last_ = value;
+  }
+  // Never so where the reading has changed a few times only: it comes in coarse steps.
+  bool frozen() const noexcept {
+    if (values_ == 1) return run_ >= never_samples_;
+    return values_ > kFewest && run_ >= std::max(least_samples_, kTimesLongest * longest_);
+  }
+
+ private:
+  static constexpr double kLeast_s = 0.5;
+  static constexpr double kNever_s = 5.0;  // with one value since the beginning
+  static constexpr long kFewest = 20, kTimesLongest = 10;
+
+  long least_samples_, never_samples_;
+  long run_ = 0;      // samples since the last change
+  long longest_ = 0;  // the longest run before this one
+  long values_ = 0;   // runs, this one included
+  double last_ = 0.0;
+};
+
+}  // namespace beltgrip::estimator
