@@ -344,7 +344,8 @@ History Experiment::run() {
     angle_s += omega_s * kStep_s;
     h.omega_p.push(omega_p);
     h.omega_s.push(omega_s);
-    h.pressure.push(in);
+    h.pressure.push(
+        pressure_wanted);  // without a command in the table, lag and delay come after it
     h.command.push(pressure_wanted);
     h.torque_p.push(torque_p + zero_Nm_);
     h.torque_s.push(load_s);

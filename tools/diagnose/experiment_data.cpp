@@ -19,6 +19,9 @@ constexpr double kSlipRateMax_1_s = 0.03;  // the run-away: ratios of derivative
 constexpr double kRatioTolerance = 0.085;  // ln; around an end stop
 constexpr double kSpeedMin_rad_s = 10.0;
 constexpr double kForceMin_N = 200.0;
+// Of the clamp force: where its slow copy departs further from it, the pressure moves too fast for
+// what a lag, a shift or play is computed from.
+constexpr double kForceStepMax = 0.02;
 
 double median_period_s(const Channel& channel) {
   if (channel.t_s.size() < 3) return kNaN;
@@ -242,10 +245,12 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
                              ratio;
     const double force_N = variator.secondary_piston_area_m2 * data.pressure.value[k] +
                            variator.secondary_spring_force_N;
+    const double step_N =
+        variator.secondary_piston_area_m2 * (data.pressure.value[k] - data.pressure.slow[k]);
     data.valid[i] = std::abs(slip) < kSlipMax && std::abs(slip_rate) < kSlipRateMax_1_s &&
                     data.pressure.present && force_N > kForceMin_N && data.torque.present &&
-                    usable(data.pressure, k) && usable(data.torque, k) &&
-                    usable(data.torque_s, k) && usable(data.command, k) &&
+                    std::abs(step_N) < kForceStepMax * force_N && usable(data.pressure, k) &&
+                    usable(data.torque, k) && usable(data.torque_s, k) && usable(data.command, k) &&
                     usable(data.temperature, k) && usable(data.pressure_p, k) && !saturated[i];
     data.saturated_pressure |= saturated[i];
   }

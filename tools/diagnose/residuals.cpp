@@ -15,7 +15,6 @@ constexpr int kBalanceStep = 5;  // samples of the slow copies, nearly independe
 void move_to_foot(const Quantities& q, const ExperimentData& data,
                   const estimator::VariatorParameters& variator, const ArrayXd& force_share,
                   Residuals& out) {
-  out.force_N = q.force_N;
   out.ratio = q.ratio;
   out.clean_Nm = out.model_Nm;
   out.clean = data;
@@ -26,7 +25,6 @@ void move_to_foot(const Quantities& q, const ExperimentData& data,
     if (out.model_Nm[k] != 0.0) {
       const double relative = std::clamp(force_Nm / out.model_Nm[k], -0.2, 0.2);
       out.clean.pressure.value[k] += relative * q.force_N[k] / variator.secondary_piston_area_m2;
-      out.force_N[k] *= 1.0 + relative;
       out.clean_Nm[k] *= 1.0 + relative;
     }
     out.clean.torque.value[k] -= off_Nm - (out.clean_Nm[k] - out.model_Nm[k]);
@@ -237,8 +235,6 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
   };
   // With slip energy at work, whatever moves the slip moves the friction: by differences, below.
   switch (energy_acts(campaign, state) ? -1 : parameter) {
-    case kDeformationPerkN:
-      return ratio_change(-1e-3 * at.force_N);
     case kLossConstant_Nm:
       return torque_change(ArrayXd::Constant(n, -1.0));
     case kLossPerSpeed_Nms:

@@ -68,7 +68,7 @@ struct Residuals {
   Eigen::ArrayXd balance_weight;  // 1 / (noise of the balance)
   Eigen::ArrayXd capacity, slip;  // as measured
   // By prepare_derivatives only, at the clamp force of the foot point:
-  Eigen::ArrayXd clean_Nm, force_N, ratio, output_torque;
+  Eigen::ArrayXd clean_Nm, ratio, output_torque;
   ExperimentData clean;  // torques and pressure at the foot point: no noise in a regressor
 };
 

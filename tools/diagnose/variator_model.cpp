@@ -210,6 +210,7 @@ Quantities evaluate(const ExperimentData& run, int experiment,
             {},
             {},
             {},
+            ArrayXd::Zero(n),
             {},
             {},
             ArrayXd::Zero(n),
@@ -230,7 +231,7 @@ Quantities evaluate(const ExperimentData& run, int experiment,
   if (run.torque_is_engine) c.loss_Nm += variator.primary_inertia_kg_m2 * run.omega_p.slope;
   apply(Stage::kDriveline);
   c.belt_torque = c.torque - c.loss_Nm;
-  c.ln_ratio = -nuisance[kDeformationPerkN] * 1e-3 * c.force_N;
+  c.deformation = nuisance[kDeformationPerkN] * 1e-3 * c.force_N;
   ArrayXd ln_ratio_0(n), radius(n);
   const double ln_low = std::log(variator.ratio_low) + nuisance[kLnRatioLow];
   const double ln_overdrive = std::log(variator.ratio_overdrive) + nuisance[kLnRatioOverdrive];
@@ -240,7 +241,7 @@ Quantities evaluate(const ExperimentData& run, int experiment,
     radius[k] = low ? variator.primary_radius_low_m : variator.primary_radius_overdrive_m;
   }
   apply(Stage::kRatio);
-  const ArrayXd ratio = (ln_ratio_0 + c.ln_ratio).exp();
+  const ArrayXd ratio = (1.0 - c.deformation).max(0.05) * (ln_ratio_0 + c.ln_ratio).exp();
   c.slip = 1.0 - c.omega_s / (c.omega_p * ratio);
   apply(Stage::kFriction);
 

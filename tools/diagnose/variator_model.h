@@ -60,10 +60,11 @@ struct Context {
   const estimator::VariatorParameters& variator;
   int experiment = 0;                                 // its place in the order given
   Eigen::ArrayXd omega_p, omega_s, pressure, torque;  // the true ones, as the model believes
-  Eigen::ArrayXd track;     // what p_s should be by the command (tracking residual)
-  Eigen::ArrayXd force_N;   // F_s
-  Eigen::ArrayXd loss_Nm;   // between shaft and belt, drag positive
-  Eigen::ArrayXd ln_ratio;  // ln(r_g / r_g0)
+  Eigen::ArrayXd track;        // what p_s should be by the command (tracking residual)
+  Eigen::ArrayXd force_N;      // F_s
+  Eigen::ArrayXd loss_Nm;      // between shaft and belt, drag positive
+  Eigen::ArrayXd deformation;  // r_g = r_g0 (1 - deformation) exp(ln_ratio)
+  Eigen::ArrayXd ln_ratio;
   Eigen::ArrayXd slip, belt_torque;
   Eigen::ArrayXd ln_friction;
   std::array<double, kStops> ln_peak_slip{}, fall{};

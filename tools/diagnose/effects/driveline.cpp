@@ -31,10 +31,10 @@ void apply_loss_per_speed(Context& c, const Slot&, double per_rad_s_Nm) {
   c.loss_Nm += per_rad_s_Nm * c.omega_p;
 }
 void apply_deformation_linear(Context& c, const Slot&, double per_kN) {
-  c.ln_ratio -= per_kN * 1e-3 * c.force_N;
+  c.deformation += per_kN * 1e-3 * c.force_N;
 }
 void apply_deformation_quadratic(Context& c, const Slot&, double per_kN2) {
-  c.ln_ratio -= per_kN2 * 1e-6 * c.force_N.square();
+  c.deformation += per_kN2 * 1e-6 * c.force_N.square();
 }
 void apply_radius_tilt(Context& c, const Slot&, double per_Nm) { c.ln_ratio -= per_Nm * c.torque; }
 void apply_end_stop_low(Context& c, const Slot&, double relative) {

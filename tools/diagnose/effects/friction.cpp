@@ -23,8 +23,11 @@ void apply_friction_temperature(Context& c, const Slot&, double per_K) {
 void apply_friction_speed(Context& c, const Slot&, double per_ln_speed) {
   c.ln_friction += ln_of(1.0 + per_ln_speed * (c.omega_p / kReferenceSpeed_rad_s).max(0.01).log());
 }
+// Of the slow pressure: else a larger exponent would fit better for the noise that it divides.
 void apply_friction_load(Context& c, const Slot&, double exponent) {
-  c.ln_friction -= exponent * (c.force_N / kReferenceForce_N).max(0.01).log();
+  const ArrayXd force_N = c.force_N + c.variator.secondary_piston_area_m2 *
+                                          (c.run.pressure.slow - c.run.pressure.value);
+  c.ln_friction -= exponent * (force_N / kReferenceForce_N).max(0.01).log();
 }
 void apply_friction_ratio(Context& c, const Slot&, double relative) {
   for (Eigen::Index k = 0; k < c.ln_friction.size(); ++k) {
