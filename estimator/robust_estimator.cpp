@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/after_stop.h"
 #include "estimator/clamp_force.h"
 #include "estimator/excitation.h"
 #include "estimator/experiment_record.h"
@@ -34,9 +35,6 @@ constexpr double kMuLeast = 0.04, kMuMost = 0.25;
 constexpr double kWidestStd = 0.3;         // of mu: wider is no value
 constexpr double kFittedDeviations = 2.6;  // by which the fit's top is lowered for a bound
 constexpr double kChordDeviations = 5.5;   // beyond these the points lie on no one curve
-constexpr double kAfterFrom_s = 0.02, kAfterTo_s = 0.08;  // after the stop
-constexpr std::size_t kBeforeCells = 20, kSwingCells = 10;
-constexpr double kSwing_percent = 0.3, kSwingDeviations = 3.0, kSwingShare = 0.4;
 constexpr double kInnovation = 5.0;
 constexpr double kRuns = 4.5;
 constexpr double kBoundDeviations = 2.33;  // 99 %, one-sided
@@ -61,6 +59,7 @@ class RobustEstimator final : public SlipCurveEstimator {
         excitation_(kExcitationWindow_s, settings.sample_rate_hz, 0.0),
         record_(settings.sample_rate_hz),
         detector_(thresholds),
+        after_stop_(settings.sample_rate_hz),
         peak_forecast_(settings.sample_rate_hz),
         pressure_reading_(settings.sample_rate_hz),
         torque_reading_(settings.sample_rate_hz),
@@ -77,10 +76,12 @@ class RobustEstimator final : public SlipCurveEstimator {
     out_ = {};
     peak_ = {};
     first_t_ns_ = 0;
-    narrow_ = after_samples_ = 0;
-    after_slip_ = 0.0;
+    after_stop_.reset();
+    next_after_ = 0;
+    narrow_ = 0;
     first_mu_ = first_force_N_ = 0.0;
     started_ = concluding_ = concluded_ = false;
+    waiting_ = refitting_ = stepped_ = false;
   }
 
   const CurveEstimate& step(const VariatorSample& sample) noexcept override {
@@ -91,9 +92,9 @@ class RobustEstimator final : public SlipCurveEstimator {
     if (out_.stop == StopReason::kNone) out_.stop = now.stop;
     if (!now.usable) return out_;
     publish(now);
-    // What comes after the stop (the clamp force is restored) is not of the curve any more.
     if (ended) {
-      follow_on(sample);
+      if (started_) after_stop_.step(cell_of(sample));
+      stepped_ = true;
       return out_;
     }
     if (!started_) {
@@ -105,14 +106,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     }
     pressure_reading_.step(sample.secondary_pressure_Pa);
     torque_reading_.step(sample.torque_Nm);
-    const double sign = chain_.point().sign;
-    const bool cell = record_.step(
-        {.t_s = static_cast<double>(sample.t_ns - first_t_ns_) * kNanosecond_s,
-         .slip_percent = slip_percent(chain_.point(), sample.omega_p_rad_s, sample.omega_s_rad_s),
-         .torque_Nm = sign * sample.torque_Nm,
-         .clamp_force_N =
-             secondary_clamp_force_N(variator_, sample.secondary_pressure_Pa, sample.omega_s_rad_s),
-         .omega_p_rad_s = sign * sample.omega_p_rad_s});
+    const bool cell = record_.step(cell_of(sample));
     if (cell) decide();
     if (peak_forecast_.step()) expect();
     return out_;
@@ -128,17 +122,35 @@ class RobustEstimator final : public SlipCurveEstimator {
         concluded_ = true;
         return true;
       }
+      if (out_.stop == StopReason::kNone) after_stop_.begin(record_);  // ended by the caller
       fit_.begin(record_, traction_, inertia_kg_m2_);
     }
+    const bool stepped = stepped_;
+    stepped_ = false;
+    if (waiting_) return (after_stop_.over() || !stepped) && follow_on();
     if (!fit_.step()) return false;
     judge();
-    concluded_ = true;
-    return true;
+    // What the belt did next may tell what the curve up to the stop leaves open.
+    waiting_ = !refitting_ && out_.stop == StopReason::kSlope && peak_.kind != PeakKind::kValue &&
+               !peak_.contradictory;
+    concluded_ = !waiting_;
+    return concluded_;
   }
 
   const PeakEstimate& peak() const noexcept override { return peak_; }
 
  private:
+  Cell cell_of(const VariatorSample& sample) const noexcept {
+    const double sign = chain_.point().sign;
+    return {
+        .t_s = static_cast<double>(sample.t_ns - first_t_ns_) * kNanosecond_s,
+        .slip_percent = slip_percent(chain_.point(), sample.omega_p_rad_s, sample.omega_s_rad_s),
+        .torque_Nm = sign * sample.torque_Nm,
+        .clamp_force_N =
+            secondary_clamp_force_N(variator_, sample.secondary_pressure_Pa, sample.omega_s_rad_s),
+        .omega_p_rad_s = sign * sample.omega_p_rad_s};
+  }
+
   void publish(const Measurement& now) noexcept {
     excitation_.step(now.slip_percent);
     out_.mu_star = now.mu_star;
@@ -153,28 +165,18 @@ class RobustEstimator final : public SlipCurveEstimator {
     omega_s_rad_s_ = now.omega_s_rad_s;
   }
 
-  // Slip for a moment after the stop, before any force can have come back.
-  void follow_on(const VariatorSample& sample) noexcept {
-    const double after_s =
-        static_cast<double>(sample.t_ns - first_t_ns_) * kNanosecond_s - record_.duration_s();
-    if (!started_ || after_s < kAfterFrom_s || after_s > kAfterTo_s) return;
-    after_slip_ += slip_percent(chain_.point(), sample.omega_p_rad_s, sample.omega_s_rad_s);
-    ++after_samples_;
-  }
-
-  // Slip that rattles swings back at once; a belt that slips does not.
-  bool swung_back() const noexcept {
-    const History& history = record_.history();
-    if (after_samples_ == 0 || history.size(0) < kBeforeCells + kSwingCells) return false;
-    double before = 0.0, end = 0.0;
-    for (std::size_t i = 0; i < kSwingCells; ++i) {
-      before += history.cell(0, kBeforeCells + i).slip_percent / kSwingCells;
-      end = std::max(end, history.cell(0, i).slip_percent);
+  // One of the samples after the stop joins the record; after the last one the curve is fitted
+  // again.
+  bool follow_on() noexcept {
+    if (next_after_ < after_stop_.size()) {
+      record_.step(after_stop_[next_after_++]);
+      return false;
     }
-    const double gained = end - before;
-    const double noise = std::sqrt(record_.slip_noise() / (kAfterTo_s - kAfterFrom_s));
-    return gained > kSwing_percent + kSwingDeviations * noise &&
-           after_slip_ / after_samples_ < before + kSwingShare * gained;
+    waiting_ = false;
+    concluded_ = next_after_ == 0;
+    refitting_ = !concluded_;
+    if (refitting_) fit_.begin(record_, traction_, inertia_kg_m2_);
+    return concluded_;
   }
 
   void decide() noexcept {
@@ -191,6 +193,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     }
     out_.friction_slope = detector_.slope();
     if (out_.stop != StopReason::kNone) {
+      after_stop_.begin(record_);
       out_.phase = Phase::kMacroSlip;
     } else if (detector_.level()) {
       out_.phase = Phase::kPeak;
@@ -256,6 +259,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     if (out_.stop == StopReason::kInputs || out_.stop == StopReason::kRatio) return;
     if (torque_frozen()) return;
     const PeakFitResult& fit = fit_.result();
+    peak_ = {};
     // Torque that fades is no friction that falls.
     const bool seen = out_.stop == StopReason::kSlope
                           ? fit.inside >= inside_needed(fit.slip)
@@ -298,8 +302,9 @@ class RobustEstimator final : public SlipCurveEstimator {
   }
 
   bool contradictory(const PeakFitResult& fit) const noexcept {
-    return record_.torque_stepped() || swung_back() || fit.below_chord > kChordDeviations ||
-           fit.residuals.innovation > kInnovation || fit.residuals.runs > kRuns;
+    return record_.torque_stepped() || after_stop_.swung_back() ||
+           fit.below_chord > kChordDeviations || fit.residuals.innovation > kInnovation ||
+           fit.residuals.runs > kRuns;
   }
 
   VariatorParameters variator_;
@@ -311,6 +316,8 @@ class RobustEstimator final : public SlipCurveEstimator {
   SlipExcitation excitation_;
   ExperimentRecord record_;
   StopDetector detector_;
+  AfterStop after_stop_;
+  std::size_t next_after_ = 0;  // to join the record
   PeakFit fit_;
   PeakForecast peak_forecast_;
   FrozenReading pressure_reading_, torque_reading_;
@@ -321,10 +328,11 @@ class RobustEstimator final : public SlipCurveEstimator {
   double omega_s_rad_s_ = 0.0;
   std::int64_t first_t_ns_ = 0;
   double first_mu_ = 0.0, first_force_N_ = 0.0;
-  double after_slip_ = 0.0;
-  int after_samples_ = 0;
   int narrow_ = 0;  // forecasts in a row within confidence_width
   bool started_ = false, concluding_ = false, concluded_ = false;
+  bool waiting_ = false;    // for what comes after the stop
+  bool refitting_ = false;  // with it
+  bool stepped_ = false;    // since the last conclude()
 };
 
 }  // namespace
