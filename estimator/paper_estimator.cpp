@@ -5,6 +5,7 @@
 
 #include "estimator/excitation.h"
 #include "estimator/kalman.h"
+#include "estimator/possible_friction.h"
 #include "estimator/sensor_error.h"
 #include "estimator/signal_chain.h"
 #include "estimator/units.h"
@@ -78,6 +79,7 @@ class PaperEstimator final : public SlipCurveEstimator {
     } else {
       peak_ = {};
     }
+    refuse_impossible(peak_);
     return true;
   }
 

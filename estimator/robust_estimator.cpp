@@ -10,6 +10,7 @@
 #include "estimator/frozen_reading.h"
 #include "estimator/peak_fit.h"
 #include "estimator/peak_forecast.h"
+#include "estimator/possible_friction.h"
 #include "estimator/sensor_error.h"
 #include "estimator/signal_chain.h"
 #include "estimator/units.h"
@@ -28,10 +29,8 @@ constexpr double kUsualPeak_percent = 2.5;
 constexpr double kFallDeviations = 3.0;  // by which mu* must then have fallen
 constexpr double kFormDeviation = 5e-4;  // of mu: what the forms of the fit leave
 constexpr int kNarrowInARow = 4;
-constexpr double kClimb = 1.05;    // mu* at the stop, of the first one; or
-constexpr double kLowered = 0.99;  // the clamp force
-// Friction that is none of a belt's: a channel is in the wrong unit.
-constexpr double kMuLeast = 0.04, kMuMost = 0.25;
+constexpr double kClimb = 1.05;            // mu* at the stop, of the first one; or
+constexpr double kLowered = 0.99;          // the clamp force
 constexpr double kWidestStd = 0.3;         // of mu: wider is no value
 constexpr double kFittedDeviations = 2.6;  // by which the fit's top is lowered for a bound
 constexpr double kChordDeviations = 5.5;   // beyond these the points lie on no one curve
@@ -119,6 +118,7 @@ class RobustEstimator final : public SlipCurveEstimator {
       peak_ = {};
       if (out_.stop == StopReason::kConfidence) {
         take_expected();
+        refuse_impossible(peak_);
         concluded_ = true;
         return true;
       }
@@ -130,9 +130,10 @@ class RobustEstimator final : public SlipCurveEstimator {
     if (waiting_) return (after_stop_.over() || !stepped) && follow_on();
     if (!fit_.step()) return false;
     judge();
+    refuse_impossible(peak_);
     // What the belt did next may tell what the curve up to the stop leaves open.
     waiting_ = !refitting_ && out_.stop == StopReason::kSlope && peak_.kind != PeakKind::kValue &&
-               !peak_.contradictory;
+               !peak_.contradictory && !peak_.impossible;
     concluded_ = !waiting_;
     return concluded_;
   }
@@ -188,7 +189,7 @@ class RobustEstimator final : public SlipCurveEstimator {
         pressure_reading_.frozen() ||
         (out_.mu_star < kClimb * first_mu_ && out_.clamp_force_N > kLowered * first_force_N_);
     if ((out_.stop == StopReason::kSlope && still) ||
-        (out_.stop != StopReason::kNone && (torque_frozen() || !of_a_belt(out_.mu_star)))) {
+        (out_.stop != StopReason::kNone && (torque_frozen() || !is_possible(out_.mu_star)))) {
       out_.stop = StopReason::kInputs;
     }
     out_.friction_slope = detector_.slope();
@@ -205,7 +206,6 @@ class RobustEstimator final : public SlipCurveEstimator {
 
   // What an engine's controller computes may stand still, a sensor's torque does not.
   bool torque_frozen() const noexcept { return torque_is_sensor_ && torque_reading_.frozen(); }
-  static bool of_a_belt(double mu) noexcept { return mu >= kMuLeast && mu <= kMuMost; }
 
   // What the curve so far says of its top, with the sensors' constant errors; enough for a stop?
   void expect() noexcept {
@@ -271,7 +271,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     if (peak_.contradictory) return;
     const double std = std::sqrt(
         fit.variance + fit.mu * fit.mu * common_variance(fit.mu, fit.t_s, fit.held_share));
-    if (fit.valid && seen && of_a_belt(fit.mu) && std < kWidestStd * fit.mu) {
+    if (fit.valid && seen && std < kWidestStd * fit.mu) {
       peak_.kind = PeakKind::kValue;
       peak_.mu_max = fit.mu;
       peak_.mu_max_std = std::max(std, kSmallestStd);
@@ -295,7 +295,6 @@ class RobustEstimator final : public SlipCurveEstimator {
         fit.variance + fit.mu * fit.mu * common_variance(fit.mu, fit.t_s, fit.held_share);
     const double fitted = fit.valid ? fit.mu - kFittedDeviations * std::sqrt(fit_variance) : 0.0;
     const bool better = fitted > surely;
-    if (std::max(fitted, surely) > kMuMost) return;
     peak_.kind = PeakKind::kLowerBound;
     peak_.mu_max = better ? fitted : surely;
     peak_.sigma_peak_percent = better ? fit.slip : fit.reached_slip;

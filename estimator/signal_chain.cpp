@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimator/clamp_force.h"
+#include "estimator/possible_friction.h"
 
 namespace beltgrip::estimator {
 namespace {
@@ -37,7 +38,7 @@ SignalChain::SignalChain(const EstimatorSettings& settings, const VariatorParame
 
 void SignalChain::reset() noexcept {
   started_ = measured_ = false;
-  acquired_ = dead_samples_ = wrong_samples_ = 0;
+  acquired_ = dead_samples_ = wrong_samples_ = impossible_samples_ = 0;
   ratio_sum_ = 0.0;
   out_ = {};
 }
@@ -65,10 +66,15 @@ void SignalChain::acquire(double ratio) noexcept {
 }
 
 const Measurement& SignalChain::step(const VariatorSample& sample) noexcept {
-  if (!sample.usable || !possible(sample) || (started_ && sample.t_ns <= last_t_ns_)) {
+  const bool in_turn = sample.usable && !(started_ && sample.t_ns <= last_t_ns_);
+  if (!in_turn || !possible(sample)) {
     out_.usable = false;
+    if (in_turn && ++impossible_samples_ >= acquire_samples_ && out_.stop == StopReason::kNone) {
+      out_.stop = StopReason::kInputs;
+    }
     return out_;
   }
+  impossible_samples_ = 0;
   if (!started_) {
     omega_p_.reset(sample.omega_p_rad_s);
     omega_s_.reset(sample.omega_s_rad_s);
@@ -98,7 +104,7 @@ const Measurement& SignalChain::step(const VariatorSample& sample) noexcept {
     if (out_.slip_percent < -kRatioTolerance_percent ||
         (measured_ && out_.slip_percent < first_slip_percent_ - kSlipBelowFirst_percent)) {
       wrong = StopReason::kRatio;
-    } else if (out_.mu_star > kMuImpossible) {
+    } else if (out_.mu_star > kMuReadMost) {
       wrong = StopReason::kInputs;
     }
     // Noise at low speed or in a small clamp force does that too, for a moment.

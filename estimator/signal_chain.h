@@ -26,8 +26,6 @@ inline constexpr double kRatioTolerance_percent = 8.0;
 // sigma* falls below its first value by deformation only; by more than this with a torque or a
 // speed of the wrong sign or place.
 inline constexpr double kSlipBelowFirst_percent = 4.0;
-// No belt carries more; a pressure or torque in the wrong unit does.
-inline constexpr double kMuImpossible = 0.4;
 
 struct Measurement {  // filtered
   double omega_p_rad_s = 0.0;
@@ -46,7 +44,7 @@ class SignalChain {
               double lowpass_hz);
   void reset() noexcept;
   // A sample that is unusable, impossible (no number, standstill, beyond what any variator does) or
-  // not later than the one before changes nothing.
+  // not later than the one before changes nothing; impossible ones for kAcquire_s are kInputs.
   const Measurement& step(const VariatorSample& sample) noexcept;
   const OperatingPoint& point() const noexcept { return point_; }
 
@@ -61,9 +59,10 @@ class SignalChain {
   OperatingPoint point_;
   Measurement out_;
   std::int64_t last_t_ns_ = 0;
-  std::int64_t acquired_ = 0;       // samples outside the dead band in a row, at the start
-  std::int64_t dead_samples_ = 0;   // inside it in a row, later
-  std::int64_t wrong_samples_ = 0;  // slip or mu* that cannot be, in a row
+  std::int64_t acquired_ = 0;            // samples outside the dead band in a row, at the start
+  std::int64_t dead_samples_ = 0;        // inside it in a row, later
+  std::int64_t wrong_samples_ = 0;       // slip or mu* that cannot be, in a row
+  std::int64_t impossible_samples_ = 0;  // that are no measurement, in a row
   double ratio_sum_ = 0.0;
   double first_slip_percent_ = 0.0;
   bool started_ = false, measured_ = false;

@@ -70,6 +70,8 @@ struct PeakEstimate {
   // The experiment's own residuals say that its points lie on no one friction curve: there is no
   // value, and no bound.
   bool contradictory = false;
+  // No belt has such friction (possible_friction.h): no value, and no bound either.
+  bool impossible = false;
 };
 
 class SlipCurveEstimator {

@@ -244,6 +244,14 @@ void Pipeline::Parts::arm(MonoTime t) noexcept {
   arming.step(now);
 }
 
+// Every input comes, but for as long as makes one stale no sample could be made of them: a primary
+// speed at zero, say.
+bool Pipeline::Parts::starved(MonoTime t) const noexcept {
+  if (state != State::kRamping) return false;
+  const Duration slowest = std::max(sampler.delay().value_or(0), sample_period(config));
+  return t - last_usable > std::max(InputMonitor::kStaleMinimum, slowest * 5 / 2);
+}
+
 // Nobody has confirmed what was asked: it may not be on the bus at all.
 bool Pipeline::Parts::unconfirmed(MonoTime t) const noexcept {
   return clamp_unconfirmed && t - clamp_sent >= kConfirmationMax;
@@ -315,7 +323,7 @@ void Pipeline::Parts::step_request(MonoTime t) noexcept {
 Guards Pipeline::Parts::guards(MonoTime t) const noexcept {
   Guards now;
   now.inputs_usable = last.sample.usable;
-  now.inputs_lost = inputs.any_lost() || samples_lost;
+  now.inputs_lost = inputs.any_lost() || samples_lost || starved(t);
   now.bus_up = buses_up();
   now.triggered = triggered();
   now.settled = !by_conditions() || arming.settled();
@@ -335,6 +343,7 @@ Guards Pipeline::Parts::guards(MonoTime t) const noexcept {
 void Pipeline::Parts::step(MonoTime t) noexcept {
   last.curve = estimator->step(correction ? correction->correct(last.sample) : last.sample);
   if (state == State::kRamping && last.sample.usable) ++running.samples;
+  if (last.sample.usable) last_usable = t;
   // Outside an experiment the estimator only watches; what would have stopped it (a ratio that is
   // no end stop's, torque that changes its sign) starts it afresh.
   if (!in_experiment(state) && last.curve.stop != StopReason::kNone) {
@@ -373,7 +382,7 @@ void Pipeline::Parts::publish_result(Outcome outcome) noexcept {
   result = running;
   last.new_result = true;
   if (outcome == Outcome::kAborted) return;  // says nothing of mu_max: the last result stands
-  contradictory = running.peak.contradictory;
+  contradictory = running.peak.contradictory || running.peak.impossible;
   // Neither does a bound below what is known: coast-downs without a ramp come all the time.
   const bool weaker = running.peak.kind != PeakKind::kValue && estimate.kind == PeakKind::kValue &&
                       running.peak.mu_max <= estimate.mu_max;

@@ -1,6 +1,7 @@
 // What a Pipeline is made of; seen by pipeline.cpp and pipeline_setup.cpp only.
 #pragma once
 
+#include <cmath>
 #include <memory>
 #include <optional>
 
@@ -15,6 +16,10 @@
 #include "estimator/input_correction.h"
 
 namespace beltgrip::daemon {
+
+inline Duration sample_period(const Config& config) {
+  return std::llround(static_cast<double>(kSecond) / config.estimator.sample_rate_hz);
+}
 
 struct Pipeline::Parts {
   explicit Parts(const Config& config);
@@ -34,6 +39,7 @@ struct Pipeline::Parts {
   void arm(MonoTime t) noexcept;
   void step_request(MonoTime t) noexcept;
   bool unconfirmed(MonoTime t) const noexcept;
+  bool starved(MonoTime t) const noexcept;
   void ask_again(MonoTime t) noexcept;
   void withdraw(estimator::StopReason reason) noexcept;
   Guards guards(MonoTime t) const noexcept;
@@ -69,6 +75,7 @@ struct Pipeline::Parts {
   State state = State::kInhibited;
   bool macro_slip_stop = false;
   bool samples_lost = false;  // since the last sample
+  MonoTime last_usable = 0;   // sample
   bool refused = false;       // the experiment under way never began
   estimator::StopReason backup_stop = estimator::StopReason::kNone;  // at this sample
   estimator::StopReason withdrawn = estimator::StopReason::kNone;    // at this sample

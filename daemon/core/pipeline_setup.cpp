@@ -7,9 +7,6 @@
 namespace beltgrip::daemon {
 
 namespace {
-Duration sample_period(const Config& config) {
-  return std::llround(static_cast<double>(kSecond) / config.estimator.sample_rate_hz);
-}
 
 // Independent of what the experiment uses: wider than its own limits, and it keeps to them.
 SafetyLimits safety_limits(const Config& config) {

@@ -51,8 +51,15 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 INSTANTIATE_TEST_SUITE_P(
     Faults, BadInput,
     testing::Values(
-        // Nothing that could be used ever comes: no stop, no result.
-        Fault{"NoNumber", [](VariatorSample& s) { s.torque_Nm = kNaN; }, StopReason::kNone},
+        Fault{"NoNumber", [](VariatorSample& s) { s.torque_Nm = kNaN; }, StopReason::kInputs},
+        Fault{"PressureBeyondAnyVariator",
+              [](VariatorSample& s) { s.secondary_pressure_Pa = 1e30; }, StopReason::kInputs},
+        Fault{"PressureThousandfold", [](VariatorSample& s) { s.secondary_pressure_Pa *= 1000.0; },
+              StopReason::kInputs},
+        Fault{"PressureATenth", [](VariatorSample& s) { s.secondary_pressure_Pa *= 0.1; },
+              StopReason::kInputs},
+        Fault{"PressureInPsiForBar", [](VariatorSample& s) { s.secondary_pressure_Pa *= 0.0689; },
+              StopReason::kInputs},
         Fault{"SpeedsSwapped",
               [](VariatorSample& s) { std::swap(s.omega_p_rad_s, s.omega_s_rad_s); },
               StopReason::kRatio},

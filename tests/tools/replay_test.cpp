@@ -121,6 +121,38 @@ TEST_F(Replay, TextGoesToStandardOutputAndSpeedToStandardError) {
   EXPECT_NE(result.err.find("frames/s"), std::string::npos);
 }
 
+// Whatever is wrong with an input: one line says why there is no value.
+TEST_F(Replay, TextSaysWhyThereIsNoValue) {
+  struct Wrong {
+    const char* role;
+    const char* factors;
+    const char* says;
+  };
+  const std::string config = place_->read("beltgrip.toml");
+  for (const Wrong& wrong :
+       {Wrong{"primary_speed", "scale = -1.0", "no experiment: primary_speed is not above zero"},
+        Wrong{"primary_torque", "scale = -1.0", "no value: speeds and torque do not fit the ratio"},
+        Wrong{"secondary_pressure", "scale = 1000.0", "no value: an input was lost, stood still"},
+        Wrong{"secondary_pressure", "scale = 0.1", "no value: an input was lost, stood still"},
+        Wrong{"primary_torque", "scale = 0.001", "no value: too short, or too little torque"}}) {
+    const std::size_t begin = config.find(std::string("\n") + wrong.role);
+    ASSERT_NE(begin, std::string::npos) << wrong.role;
+    const std::size_t first = config.find('"', begin);
+    const std::size_t last = config.find('"', first + 1);
+    std::string line = std::string("\n") + wrong.role +
+                       " = { signal = " + config.substr(first, last - first + 1) + ", " +
+                       wrong.factors + " }";
+    std::string changed = config;
+    changed.replace(begin, config.find('\n', begin + 1) - begin, line);
+    place_->write("wrong.toml", changed);
+    const RunResult result =
+        beltgrip({"replay", path("trace.log"), "--config", path("wrong.toml")});
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_NE(result.out.find(wrong.says), std::string::npos) << wrong.role << "\n" << result.out;
+    EXPECT_EQ(result.out.find("mu_max 0"), std::string::npos) << result.out;
+  }
+}
+
 TEST_F(Replay, SeveralLogsAreSeparateRunsInTheirOrder) {
   place_->write("short.log", trace().substr(0, trace().size() / 3));
   const std::vector<std::string> logs = {path("trace.log"), path("short.log"), path("trace.log"),

@@ -203,12 +203,30 @@ std::string further_interface(const daemon::Config& config) {
 
 namespace {
 
+// What keeps the inputs at the end of a log from being a sample; empty if nothing does.
+std::string why_unusable(const daemon::Pipeline& pipeline, const daemon::Config& config) {
+  using daemon::Role;
+  const Role torque =
+      config.estimator.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque;
+  for (const Role role :
+       {Role::kPrimarySpeed, Role::kSecondarySpeed, Role::kSecondaryPressure, torque}) {
+    const std::string name(daemon::role_name(role));
+    const daemon::SignalObservation seen = pipeline.signal(role);
+    if (!seen.seen) return name + " never came with a value that is one";
+    if (role == Role::kPrimarySpeed && seen.value <= 0.0) {
+      return name + format(" is not above zero (last %.3g rad/s); is its sign wrong?", seen.value);
+    }
+  }
+  return "";
+}
+
 void run_pipeline(daemon::Port& port, daemon::Pipeline& pipeline, const daemon::Config& config,
                   estimator::StopReason end, ReplayResult& result, std::FILE* trace) {
   Sink sink(result, config, trace);
   daemon::run_loop(port, pipeline, config.estimator.sample_rate_hz, end, &sink);
   result.frames_decoded = pipeline.counters().frames_decoded;
   result.frames_bad = pipeline.counters().frames_bad;
+  result.unusable = why_unusable(pipeline, config);
 }
 
 bool is_record(const std::string& path) {
@@ -314,6 +332,7 @@ std::string experiment_lines(const ReplayResult& result) {
     json.field("mu_max_lower_bound", inconclusive ? e.peak.mu_max : kJsonNull)
         .field("sigma_stop_percent", e.stopped ? e.sigma_stop_percent : kJsonNull)
         .field("contradictory", e.peak.contradictory)
+        .field("impossible", e.peak.impossible)
         .field("sigma_peak_percent", completed ? e.peak.sigma_peak_percent : kJsonNull)
         .field("samples", e.samples)
         .field("direction", direction_text(e.direction))
@@ -322,6 +341,28 @@ std::string experiment_lines(const ReplayResult& result) {
     lines += json.take() + "\n";
   }
   return lines;
+}
+
+// Where nothing is known of mu_max.
+const char* why_no_value(const daemon::ExperimentResult& e) {
+  if (e.peak.contradictory) return "its points lie on no one friction curve";
+  if (e.peak.impossible) {
+    return "no belt has the friction that was read; is pressure, torque or their unit wrong?";
+  }
+  switch (e.stop_reason) {
+    case estimator::StopReason::kRatio:
+      return "speeds and torque do not fit the ratio at the end stop; is a speed or the sign of "
+             "the "
+             "torque wrong, or the ratio off its stop?";
+    case estimator::StopReason::kInputs:
+      return "an input was lost, stood still, or read what cannot be";
+    case estimator::StopReason::kTorque:
+      return "the torque went to zero or changed its sign";
+    default:
+      return e.outcome == daemon::Outcome::kAborted
+                 ? "the experiment was broken off"
+                 : "too short, or too little torque or clamp force, to say anything of mu_max";
+  }
 }
 
 std::string summary_line(const ReplayResult& result) {
@@ -354,15 +395,15 @@ std::string text(const ReplayResult& result) {
       out += format("  mu_max %.4f, std %.4f, 95 %% %.4f .. %.4f, peak at %.2f %% slip\n",
                     e.peak.mu_max, e.peak.mu_max_std, e.peak.ci95_low, e.peak.ci95_high,
                     e.peak.sigma_peak_percent);
-    } else if (e.peak.contradictory) {
-      out += "  no value: its points lie on no one friction curve\n";
     } else if (e.outcome == daemon::Outcome::kInconclusive && e.peak.mu_max > 0.0) {
       out += format("  mu_max is at least %.4f\n", e.peak.mu_max);
-    } else if (e.outcome == daemon::Outcome::kInconclusive) {
-      out += "  too short to say anything of mu_max\n";
+    } else {
+      out += std::string("  no value: ") + why_no_value(e) + "\n";
     }
   }
-  if (result.experiments.empty()) out += "  no experiment\n";
+  if (result.experiments.empty()) {
+    out += "  no experiment" + (result.unusable.empty() ? "" : ": " + result.unusable) + "\n";
+  }
   std::string why;
   for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
     if (result.inhibited_s[i] < kShownInhibit_s) continue;

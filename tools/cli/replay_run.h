@@ -26,6 +26,7 @@ struct ReplayResult {
   std::uint64_t frames_bad = 0;
   std::uint64_t lines_bad = 0;
   std::int64_t duration_ns = 0;
+  std::string unusable;  // what was wrong with the inputs in the end; empty: nothing
   // How long each daemon::Inhibit kept an experiment from beginning while the driver's feet did
   // not, control "command".
   std::array<double, daemon::kInhibitCount> inhibited_s{};
