@@ -112,7 +112,7 @@ SignalTable rig(double measured_slip = 0.01, double steepness = 20.0) {
 
 double rig_rate(const ExperimentData& data, double t_s, double omega_s) {
   const double force_N = kArea_m2 * at(data.pressure.value, t_s) + kSpring_N;
-  const double ratio = kLow * std::exp(-kDeformationPerN * force_N);
+  const double ratio = kLow * (1.0 - kDeformationPerN * force_N);
   const double slip = 1.0 - omega_s / (at(data.omega_p.value, t_s) * ratio);
   const double belt_Nm = capacity_Nm(force_N, kRadiusLow_m) * traction(slip, kPeakSlipLow);
   return (belt_Nm / ratio - at(data.torque_s.value, t_s)) / kSecondaryInertia_kgm2;
@@ -138,7 +138,7 @@ TEST(Forward, StiffRigFollowsTheFineIntegrationUpToThePeakAndEndsThere) {
   }
   // The next sample is beyond the peak in truth too.
   const double force_N = kArea_m2 * data.pressure.value[end + 1] + kSpring_N;
-  const double ratio = kLow * std::exp(-kDeformationPerN * force_N);
+  const double ratio = kLow * (1.0 - kDeformationPerN * force_N);
   EXPECT_GT(1.0 - truth[end + 1] / (data.omega_p.value[end + 1] * ratio), 0.99 * kPeakSlipLow);
 
   // Why it takes an implicit step: friction pulls at more than 2000/s.
@@ -157,7 +157,7 @@ TEST(Forward, PredictsTheTorqueAtTheRigsPrimaryShaft) {
   for (int k = 0; k < data.size(); ++k) {
     if (!forward.grips[static_cast<std::size_t>(k)]) continue;
     const double force_N = kArea_m2 * data.pressure.value[k] + kSpring_N;
-    const double ratio = kLow * std::exp(-kDeformationPerN * force_N);
+    const double ratio = kLow * (1.0 - kDeformationPerN * force_N);
     const double slip = 1.0 - omega_s[k] / (data.omega_p.value[k] * ratio);
     const double loss_Nm = kLoss_Nm + kLossPerSpeed_Nms * data.omega_p.value[k];
     EXPECT_NEAR(torque[k],
@@ -184,7 +184,7 @@ TEST(Forward, VehicleFollowsTheFineIntegration) {
   const ArrayXd& simulated = signal(forward, "primary_speed").simulated;
   const auto rate = [&](double t_s, double omega_p) {
     const double force_N = kArea_m2 * at(data.pressure.value, t_s) + kSpring_N;
-    const double ratio = kOverdrive * std::exp(-kDeformationPerN * force_N);
+    const double ratio = kOverdrive * (1.0 - kDeformationPerN * force_N);
     const double slip = 1.0 - at(data.omega_s.value, t_s) / (omega_p * ratio);
     const double belt_Nm =
         capacity_Nm(force_N, kRadiusOverdrive_m) * traction(slip, kPeakSlipOverdrive);
@@ -240,7 +240,7 @@ TEST(Forward, SensorsStandBetweenTheMachineAndItsReading) {
     if (!std::isfinite(speed[k]) || !std::isfinite(speed_late[k])) continue;
     EXPECT_NEAR(speed_scaled[k] / speed[k], 1.004, 1e-8) << k;
     EXPECT_NEAR(speed_late[k], speed[k - 1], 0.1 * std::abs(speed[k] - speed[k - 1]) + 5e-3) << k;
-    EXPECT_NEAR(torque_gained[k] / torque[k], 1.05, 1e-8) << k;
+    EXPECT_NEAR(torque_gained[k] / torque[k], 1.05, 1e-3) << k;  // of the slow copy
     ++compared;
   }
   EXPECT_GT(compared, 30);

@@ -8,6 +8,7 @@
 #include "tools/diagnose/gain.h"
 #include "tools/diagnose/namer.h"
 #include "tools/diagnose/parallel.h"
+#include "tools/diagnose/residual_tests.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -239,6 +240,13 @@ class Run {
       }
     }
     const auto floors = noise_floors(campaign, naming.nominal);
+    std::vector<ResidualTest> tests = test_residuals(engine, naming.nominal);
+    for (const UnknownGroup& group : naming.nominal_groups) {
+      tests.push_back({group.acts_on, group.depends_on, chi2_p(group.chi2, 1)});
+    }
+    for (const Ripple& ripple : naming.ripples) {
+      tests.push_back({"ratio", "order_spectrum_" + ripple.shaft, chi2_p(ripple.chi2, 1)});
+    }
     for (const auto& [name, sum] : sums) {
       if (sum.count == 0.0) continue;
       BaselineSignal signal;
@@ -246,11 +254,12 @@ class Run {
       signal.noise_floor = floors.at(name);
       signal.unexplained_share =
           std::max(0.0, 1.0 - std::pow(signal.noise_floor / std::max(signal.rmse, 1e-300), 2.0));
-      for (const UnknownGroup& group : naming.nominal_groups) {
-        const bool here = name == "secondary_speed"    ? group.acts_on == "ratio"
-                          : name == "secondary_torque" ? group.acts_on == "torque"
-                                                       : group.acts_on == "friction";
-        if (here) signal.tests[group.depends_on] = std::erfc(std::sqrt(group.chi2 / 2.0));
+      const std::string acts_on = name == "secondary_speed"      ? "ratio"
+                                  : name == "secondary_torque"   ? "torque"
+                                  : name == "secondary_pressure" ? "clamp force"
+                                                                 : "friction";
+      for (const ResidualTest& test : tests) {
+        if (test.acts_on == acts_on) signal.tests[test.name] = test.p;
       }
       out().baseline[name] = signal;
     }

@@ -15,6 +15,12 @@ std::string number(double value) {
   return buffer;
 }
 
+std::string short_number(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.2g", value);
+  return buffer;
+}
+
 std::string range(double low, double high) { return number(low) + " .. " + number(high); }
 
 std::string probability(double value) { return value > 0.999 ? "> 0.999" : number(value); }
@@ -62,56 +68,89 @@ void add_findings(report::HtmlPage& page, const Diagnosis& d) {
              rows);
 }
 
-void add_tables(report::HtmlPage& page, const Diagnosis& d) {
+// p-values; what chance does once in a thousand tests counts as a failure.
+void add_tests(report::HtmlPage& page, const Diagnosis& d) {
+  constexpr double kFails = 1e-3, kShown = 1e-12;
+  std::vector<std::string> head{"its residual"};
+  std::map<std::string, std::vector<std::string>> cells;
+  int count = 0, failed = 0;
+  for (const auto& [name, signal] : d.baseline) {
+    for (const auto& [test, p] : signal.tests) {
+      std::vector<std::string>& row = cells[test];
+      row.resize(head.size() - 1);
+      row.push_back((p < kFails ? "fails, p " : "p ") + (p < kShown ? "< 1e-12" : short_number(p)));
+      ++count;
+      if (p < kFails) ++failed;
+    }
+    head.push_back(name);
+  }
+  if (count == 0) return;
+  page.paragraph(
+      "The scatter between experiments of a healthy machine lies beyond the noise, too. Tests of "
+      "these residuals, with that scatter and the noise's autocorrelation counted: " +
+      std::to_string(failed) + " of " + std::to_string(count) +
+      " fail (p below 0.001). An empty cell: these data cannot show it there.");
+  Rows rows;
+  for (auto& [test, row] : cells) {
+    const bool plain = test == "whiteness" || test.starts_with("order_spectrum");
+    row.resize(head.size() - 1);
+    row.insert(row.begin(), (plain ? "" : "follows ") + test);
+    rows.push_back(std::move(row));
+  }
+  page.table(head, rows);
+}
+
+void add_gain(std::vector<std::string>& row, const BeforeAfter& gain) {
+  for (const std::string& cell :
+       {number(gain.before), number(gain.after), range(gain.low, gain.high)}) {
+    row.push_back(cell);
+  }
+}
+
+void add_errors(report::HtmlPage& page, const Diagnosis& d) {
   page.heading("The model as given against the data");
   Rows rows;
   for (const auto& [name, signal] : d.baseline) {
-    std::string failed;
-    for (const auto& [test, p] : signal.tests) {
-      if (p < 0.001) failed += (failed.empty() ? "" : ", ") + test + " (p " + number(p) + ")";
-    }
     rows.push_back({name, number(signal.rmse), number(signal.noise_floor),
-                    number(100.0 * signal.unexplained_share) + " %",
-                    failed.empty() ? "none" : failed});
+                    number(100.0 * signal.unexplained_share) + " %"});
   }
-  page.table({"signal, SI", "error, rms", "noise", "unexplained", "its residual follows"}, rows);
+  page.table({"signal, SI", "error, rms", "noise", "beyond the noise"}, rows);
+  add_tests(page, d);
   if (!d.held_out.empty()) {
     page.heading("Errors on experiments that were not used for the fit");
+    if (d.findings.empty()) page.paragraph("Nothing was found that would change them.");
     rows.clear();
     for (const auto& [name, gain] : d.held_out) {
-      rows.push_back({name, number(gain.before), number(gain.after), range(gain.low, gain.high)});
+      rows.push_back({name});
+      add_gain(rows.back(), gain);
     }
     if (d.mu_max) {
-      rows.push_back({"mu_max, relative", number(d.mu_max->before), number(d.mu_max->after),
-                      range(d.mu_max->low, d.mu_max->high)});
+      rows.push_back({"mu_max, relative"});
+      add_gain(rows.back(), {d.mu_max->before, d.mu_max->after, d.mu_max->low, d.mu_max->high});
     }
     page.table({"signal, SI", "before", "after", "difference (95 %)"}, rows);
   }
-  if (!d.simulation.empty()) {
-    page.heading("The simulation run forward");
-    page.paragraph(
-        "Integrated over each experiment, driven by what drives the machine there, up to the peak "
-        "of friction, where it ends and begins anew once the belt grips. Before and after: "
-        "experiments left out of the fit.");
-    rows.clear();
-    for (const auto& [name, signal] : d.simulation) {
-      rows.push_back({name, number(signal.rmse), number(signal.noise_floor)});
-      if (!signal.left_out) continue;
-      const BeforeAfter& gain = *signal.left_out;
-      for (const std::string& cell :
-           {number(gain.before), number(gain.after), range(gain.low, gain.high)}) {
-        rows.back().push_back(cell);
-      }
-    }
-    page.table(
-        {"signal, SI", "error as given, rms", "noise", "before", "after", "difference (95 %)"},
-        rows);
+  if (d.simulation.empty()) return;
+  page.heading("The simulation run forward");
+  page.paragraph(
+      "Integrated over each experiment, driven by what drives the machine there, up to the peak of "
+      "friction, where it ends and begins anew once the belt grips. Before and after: experiments "
+      "that were not used for the fit.");
+  rows.clear();
+  for (const auto& [name, signal] : d.simulation) {
+    rows.push_back({name, number(signal.rmse), number(signal.noise_floor)});
+    if (signal.left_out) add_gain(rows.back(), *signal.left_out);
   }
+  page.table({"signal, SI", "error as given, rms", "noise", "before", "after", "difference (95 %)"},
+             rows);
+}
+
+void add_tables(report::HtmlPage& page, const Diagnosis& d) {
+  Rows rows;
   if (!d.reruns.empty()) {
     page.heading("By the estimator, told the model before and after");
     std::vector<std::string> head{"experiment", "from, s"};
     for (const RerunFigure& figure : kRerunFigures) head.emplace_back(figure.heading);
-    rows.clear();
     for (const Rerun& each : d.reruns) {
       char from[32];
       std::snprintf(from, sizeof from, "%.2f", each.start_s);
@@ -149,10 +188,12 @@ std::string html_text(const Diagnosis& d, const Plots& plots) {
   for (const Finding& finding : d.findings) page.paragraph(sentence(finding));
   if (d.unexplained) {
     page.paragraph("Something that is not in the library acts on " + d.unexplained->acts_on +
-                   " and follows " + joined(d.unexplained->depends_on) + ".");
+                   " and follows " + joined(d.unexplained->depends_on) + ": " +
+                   number(100.0 * d.unexplained->share) + " % of the residual's energy.");
   }
   if (!d.next_experiment.empty()) page.paragraph("Next experiment: " + d.next_experiment + ".");
   add_findings(page, d);
+  add_errors(page, d);
   add_tables(page, d);
   const auto draw = [&](const char* heading, const std::vector<report::Chart>& charts) {
     if (charts.empty()) return;

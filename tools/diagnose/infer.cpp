@@ -272,6 +272,26 @@ Summary summarise(const Campaign& campaign, int run, const ModelState& state,
                    whitening, extra);
 }
 
+std::array<VectorXd, kResidualKinds> white_residuals(const Campaign& campaign, int run,
+                                                     const ModelState& state,
+                                                     const Whitening& whitening,
+                                                     const Scatter& scatter) {
+  const RawColumns raw =
+      raw_columns(campaign, run, state, residuals_of(campaign, run, state), {}, {}, true);
+  const Summary summary = summary_of(campaign, run, raw, whitening);
+  const MatrixXd inverse = (1.0 / scatter.variance).matrix().asDiagonal();
+  VectorXd weights(1 + kRandomEffects);
+  weights << 1.0, -(summary.uu + inverse).llt().solve(summary.ua.col(0));
+  const std::vector<WhiteBlock> blocks = whitened(campaign, run, raw, whitening);
+  const std::vector<int> kinds = kinds_of(campaign);
+  std::array<VectorXd, kResidualKinds> out;
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    if (blocks[i].columns.empty()) continue;
+    out[static_cast<std::size_t>(kinds[i])] = blocks[i].rows * weights(blocks[i].columns);
+  }
+  return out;
+}
+
 Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& columns,
                const Prior& prior, const Scatter& start, int scatter_iterations) {
   const auto n = static_cast<Index>(columns.size());

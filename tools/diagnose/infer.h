@@ -111,6 +111,13 @@ Summary summarise(const Campaign& campaign, int run, const ModelState& state,
                   const std::vector<int>& parameters, const Eigen::VectorXd& scale,
                   const Whitening& whitening, const ExtraColumns& extra = {});
 
+// The residuals of a state, whitened, what the scatter between experiments explains taken out; one
+// row per valid sample, empty where the kind does not exist.
+std::array<Eigen::VectorXd, kResidualKinds> white_residuals(const Campaign& campaign, int run,
+                                                            const ModelState& state,
+                                                            const Whitening& whitening,
+                                                            const Scatter& scatter);
+
 // Filters, weights and the cross correlation from the residual that is left after the best linear
 // fit of everything (parameters with the prior), so that no effect leaks into the noise. raw: with
 // random effects, one per experiment.

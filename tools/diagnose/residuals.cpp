@@ -8,8 +8,6 @@ namespace {
 
 using Eigen::ArrayXd;
 
-constexpr int kBalanceStep = 5;  // samples of the slow copies, nearly independent of each other
-
 // The foot point of what stands in the regressors: of the misfit in torque, the clamp force takes
 // its share.
 void move_to_foot(const Quantities& q, const ExperimentData& data,

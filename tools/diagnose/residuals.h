@@ -19,6 +19,8 @@ namespace beltgrip::diagnose {
 
 enum ResidualKind : int { kFrictionResidual, kBalanceResidual, kTrackingResidual, kResidualKinds };
 
+inline constexpr int kBalanceStep = 5;  // samples of the slow copies, nearly independent
+
 // One sigma of the noise of one grid sample, from differences of neighbours.
 struct NoiseLevels {
   double slip = 1e-4;
