@@ -5,6 +5,7 @@
 #include <unistd.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <charconv>
@@ -260,6 +261,8 @@ HistoryTrouble inspect(sqlite3* db, bool& fresh, std::string& text) {
                           : nullptr;
   if (version != kHistoryVersion || found == nullptr || std::strcmp(found, "ok") != 0) {
     text = found == nullptr ? sqlite3_errmsg(db) : found;
+    // SQLite's own report has several lines; an error is one.
+    std::replace(text.begin(), text.end(), '\n', ' ');
     return HistoryTrouble::kCorrupt;
   }
   return HistoryTrouble::kNone;

@@ -141,7 +141,11 @@ TEST_F(History, WhatIsNone) {
   std::filesystem::remove(place.path("history.db"));
   fill();
   fails({"history", place.path(""), "--json", "-", "--csv", "-"}, 64, "only one of");
-  std::string damaged = place.read("history.db");
+  const std::string whole = place.read("history.db");
+  place.write("history.db", whole.substr(0, 5000));
+  fails({"history", place.path("")}, 65, "found no history");
+  place.write("history.db", whole);
+  std::string damaged = whole;
   const std::size_t at = damaged.find("deadbeef");
   damaged[at] = 'x';
   place.write("history.db", damaged);
