@@ -176,6 +176,7 @@ TEST(Forward, VehicleFollowsTheFineIntegration) {
        [&](double t_s) { return speed(t_s) / (kOverdrive * (1.0 - 0.006)); });
   fill(table, Role::kSecondaryPressure, [](double t_s) { return 6e5 - 0.1e5 * t_s; });
   fill(table, Role::kEngineTorque, [](double t_s) { return 55.0 + 10.0 * std::sin(3.0 * t_s); });
+  fill(table, Role::kSecondaryTorque, [](double) { return 20.0; });
   const Campaign campaign = campaign_of(table);
   const ExperimentData& data = campaign.runs[0];
   const Forward forward = run_forward(campaign, 0, nominal_state(campaign));
@@ -196,6 +197,40 @@ TEST(Forward, VehicleFollowsTheFineIntegration) {
     ASSERT_TRUE(forward.grips[static_cast<std::size_t>(k)]) << k;
     EXPECT_NEAR(simulated[k] / truth[k], 1.0, 2e-6) << k;
   }
+  const ArrayXd& torque_s = signal(forward, "secondary_torque").simulated;
+  for (int k = begin + 5; k < end - 5; ++k) {
+    const double force_N = kArea_m2 * data.pressure.value[k] + kSpring_N;
+    const double ratio = kOverdrive * (1.0 - kDeformationPerN * force_N);
+    const double slip = 1.0 - data.omega_s.value[k] / (truth[k] * ratio);
+    const double belt_Nm =
+        capacity_Nm(force_N, kRadiusOverdrive_m) * traction(slip, kPeakSlipOverdrive);
+    const double acceleration = (data.omega_s.value[k + 1] - data.omega_s.value[k - 1]) / 0.2;
+    EXPECT_NEAR(torque_s[k], belt_Nm / ratio - kSecondaryInertia_kgm2 * acceleration, 0.05) << k;
+  }
+}
+
+// Without a sensor at the secondary shaft the torque before the belt decides what it carries.
+TEST(Forward, RigWithoutSecondaryTorqueCarriesThePrimaryOne) {
+  SignalTable table = rig(0.01, 1.0);
+  table[Role::kSecondaryTorque] = {};
+  const Campaign campaign = campaign_of(table);
+  const ExperimentData& data = campaign.runs[0];
+  const Forward forward = run_forward(campaign, 0, nominal_state(campaign));
+  ASSERT_EQ(forward.signals.size(), 2U);  // the torque is no prediction here
+  const ArrayXd& omega_s = signal(forward, "secondary_speed").simulated;
+  int compared = 0;
+  for (int k = 0; k < data.size(); ++k) {
+    if (!std::isfinite(omega_s[k])) continue;
+    const double force_N = kArea_m2 * data.pressure.value[k] + kSpring_N;
+    const double ratio = kLow * (1.0 - kDeformationPerN * force_N);
+    const double slip = 1.0 - omega_s[k] / (data.omega_p.value[k] * ratio);
+    if (slip > 0.7 * kPeakSlipLow) continue;  // about to run away: no longer at rest
+    const double carried_Nm = 17.0 - kLoss_Nm - kLossPerSpeed_Nms * data.omega_p.value[k];
+    EXPECT_NEAR(capacity_Nm(force_N, kRadiusLow_m) * traction(slip, kPeakSlipLow), carried_Nm, 0.1)
+        << k;
+    ++compared;
+  }
+  EXPECT_GT(compared, 60);
 }
 
 TEST(Forward, WhatTheFreeShaftIsMeasuredToDoDoesNotComeThrough) {

@@ -1,5 +1,6 @@
 #include "tools/diagnose/html.h"
 
+#include <algorithm>
 #include <cstdio>
 
 #include "tools/diagnose/json.h"
@@ -118,7 +119,13 @@ void add_errors(report::HtmlPage& page, const Diagnosis& d) {
   add_tests(page, d);
   if (!d.held_out.empty()) {
     page.heading("Errors on experiments that were not used for the fit");
-    if (d.findings.empty()) page.paragraph("Nothing was found that would change them.");
+    if (std::all_of(d.held_out.begin(), d.held_out.end(),
+                    [](const auto& each) { return each.second.before == each.second.after; })) {
+      page.paragraph(d.findings.empty()
+                         ? "Nothing was found that would change them."
+                         : "These signals are averaged over revolutions: what was found changes "
+                           "nothing here, it stands in the order spectra.");
+    }
     rows.clear();
     for (const auto& [name, gain] : d.held_out) {
       rows.push_back({name});
