@@ -8,6 +8,7 @@
 #include "estimator/excitation.h"
 #include "estimator/experiment_record.h"
 #include "estimator/frozen_reading.h"
+#include "estimator/glitch_gate.h"
 #include "estimator/peak_fit.h"
 #include "estimator/peak_forecast.h"
 #include "estimator/possible_friction.h"
@@ -29,8 +30,11 @@ constexpr double kUsualPeak_percent = 2.5;
 constexpr double kFallDeviations = 3.0;  // by which mu* must then have fallen
 constexpr double kFormDeviation = 5e-4;  // of mu: what the forms of the fit leave
 constexpr int kNarrowInARow = 4;
-constexpr double kClimb = 1.05;            // mu* at the stop, of the first one; or
-constexpr double kLowered = 0.99;          // the clamp force
+constexpr double kClimb = 1.05;    // mu* at the stop, of the first one; or
+constexpr double kLowered = 0.99;  // the clamp force
+// A jump of the reading by more is looked at: of a speed and of the torque, relative; of noise.
+constexpr double kGlitchSlip = 0.005, kGlitchTorque = 0.2, kGlitchDeviations = 5.0;
+constexpr double kNoiseKnown_s = 1.0;
 constexpr double kWidestStd = 0.3;         // of mu: wider is no value
 constexpr double kFittedDeviations = 2.6;  // by which the fit's top is lowered for a bound
 constexpr double kChordDeviations = 5.5;   // beyond these the points lie on no one curve
@@ -62,6 +66,9 @@ class RobustEstimator final : public SlipCurveEstimator {
         peak_forecast_(settings.sample_rate_hz),
         pressure_reading_(settings.sample_rate_hz),
         torque_reading_(settings.sample_rate_hz),
+        omega_p_gate_(settings.sample_rate_hz),
+        omega_s_gate_(settings.sample_rate_hz),
+        torque_gate_(settings.sample_rate_hz),
         torque_is_sensor_(!settings.torque_is_engine) {
     RobustEstimator::reset();
   }
@@ -72,6 +79,9 @@ class RobustEstimator final : public SlipCurveEstimator {
     record_.reset();
     pressure_reading_.reset();
     torque_reading_.reset();
+    omega_p_gate_.reset();
+    omega_s_gate_.reset();
+    torque_gate_.reset();
     out_ = {};
     peak_ = {};
     first_t_ns_ = 0;
@@ -83,11 +93,12 @@ class RobustEstimator final : public SlipCurveEstimator {
     waiting_ = refitting_ = stepped_ = false;
   }
 
-  const CurveEstimate& step(const VariatorSample& sample) noexcept override {
+  const CurveEstimate& step(const VariatorSample& read) noexcept override {
+    const bool ended = out_.stop != StopReason::kNone || concluding_ || concluded_;
+    const VariatorSample sample = ended ? read : without_glitches(read);
     const Measurement& now = chain_.step(sample);
     out_.t_ns = sample.t_ns;
     out_.usable = now.usable;
-    const bool ended = out_.stop != StopReason::kNone || concluding_ || concluded_;
     if (out_.stop == StopReason::kNone) out_.stop = now.stop;
     if (!now.usable) return out_;
     publish(now);
@@ -103,8 +114,8 @@ class RobustEstimator final : public SlipCurveEstimator {
       detector_.reset(traction_, inertia_kg_m2_);
       peak_forecast_.reset(traction_, inertia_kg_m2_);
     }
-    pressure_reading_.step(sample.secondary_pressure_Pa);
-    torque_reading_.step(sample.torque_Nm);
+    pressure_reading_.step(read.secondary_pressure_Pa);
+    torque_reading_.step(read.torque_Nm);
     const bool cell = record_.step(cell_of(sample));
     if (cell) decide();
     if (peak_forecast_.step()) expect();
@@ -164,6 +175,24 @@ class RobustEstimator final : public SlipCurveEstimator {
     out_.direction = chain_.point().direction;
     out_.end_stop = chain_.point().end_stop;
     omega_s_rad_s_ = now.omega_s_rad_s;
+  }
+
+  // Noise is taken as if every sample had its own, which is more than there is.
+  VariatorSample without_glitches(const VariatorSample& sample) noexcept {
+    if (!sample.usable || record_.duration_s() < kNoiseKnown_s) return sample;
+    for (const double value : {sample.omega_p_rad_s, sample.omega_s_rad_s, sample.torque_Nm}) {
+      if (!std::isfinite(value)) return sample;
+    }
+    const auto least = [this](double density) {
+      return kGlitchDeviations * std::sqrt(density * sample_rate_hz_);
+    };
+    const double slip = std::max(kGlitchSlip, least(record_.slip_noise()) / kPercent);
+    VariatorSample clean = sample;
+    clean.omega_p_rad_s = omega_p_gate_.step(sample.omega_p_rad_s, slip, 0.0);
+    clean.omega_s_rad_s = omega_s_gate_.step(sample.omega_s_rad_s, slip, 0.0);
+    clean.torque_Nm =
+        torque_gate_.step(sample.torque_Nm, kGlitchTorque, least(record_.torque_noise()));
+    return clean;
   }
 
   // One of the samples after the stop joins the record; after the last one the curve is fitted
@@ -320,6 +349,7 @@ class RobustEstimator final : public SlipCurveEstimator {
   PeakFit fit_;
   PeakForecast peak_forecast_;
   FrozenReading pressure_reading_, torque_reading_;
+  GlitchGate omega_p_gate_, omega_s_gate_, torque_gate_;
   bool torque_is_sensor_;
   CurveEstimate out_;
   PeakEstimate peak_;

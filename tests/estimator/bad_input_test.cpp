@@ -140,6 +140,41 @@ INSTANTIATE_TEST_SUITE_P(Channels, FrozenChannel,
                                          Frozen{"Torque", &VariatorSample::torque_Nm}),
                          [](const auto& each) { return std::string(each.param.name); });
 
+// Readings that are wrong for 20 ms in mid ramp: a bad frame or two.
+class BadFrame : public testing::TestWithParam<Fault> {};
+
+TEST_P(BadFrame, ChangesNothing) {
+  const Rig rig = {.friction = test::round_peak(0.105, 2.5)};
+  const auto estimator = make_slip_curve_estimator(rig_settings(rig), {}, {});
+  StopReason stop = StopReason::kNone;
+  double slip = 0.0;
+  for (auto& point : rig_trace(rig)) {
+    const double t_s = static_cast<double>(point.sample.t_ns) * 1e-9;
+    if (t_s > 20.0 && t_s < 20.02) GetParam().apply(point.sample);
+    stop = estimator->step(point.sample).stop;
+    slip = point.slip_percent;
+    if (stop != StopReason::kNone) break;
+  }
+  for (int i = 0; i < 10000 && !estimator->conclude(); ++i) {
+  }
+  EXPECT_EQ(stop, GetParam().reason);
+  EXPECT_GT(slip, 2.4);
+  ASSERT_EQ(estimator->peak().kind, PeakKind::kValue);
+  EXPECT_NEAR(estimator->peak().mu_max, 0.105, 0.0003);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Readings, BadFrame,
+    testing::Values(
+        Fault{"SpeedTooHigh", [](VariatorSample& s) { s.omega_p_rad_s *= 1.01; },
+              StopReason::kSlope},
+        Fault{"SpeedTooLow", [](VariatorSample& s) { s.omega_s_rad_s *= 0.97; },
+              StopReason::kSlope},
+        Fault{"NoSpeed", [](VariatorSample& s) { s.omega_p_rad_s = 0.0; }, StopReason::kSlope},
+        Fault{"NoTorque", [](VariatorSample& s) { s.torque_Nm = 0.0; }, StopReason::kSlope},
+        Fault{"TorqueTwice", [](VariatorSample& s) { s.torque_Nm *= 2.0; }, StopReason::kSlope}),
+    [](const auto& each) { return std::string(each.param.name); });
+
 TEST(BadInput, ForceThatComesBackBeforeThePeakLeavesALowerBound) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Rig rig = {.friction = test::round_peak(0.105, 2.5),
