@@ -315,8 +315,10 @@ TEST_F(Diagnose, AnInterruptedRunLeavesAValidPartialReport) {
 TEST_F(Diagnose, TooLittleDataSaysSo) {
   const auto table =
       changed(record(rig(1)).csv[0], [](const auto& cells) { return number(cells[0]) < 17.0; });
-  const json result = of({table});
+  const auto logs = write({table});
+  const json result = answer(logs);
   expect_silence(result);
+  EXPECT_NE(run(logs).out.find("nothing can be said"), std::string::npos);
   EXPECT_NE(notes(result).find("too little data"), std::string::npos) << notes(result);
   EXPECT_GT(result.at("not_identifiable").size(), 10U);
 }

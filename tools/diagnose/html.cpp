@@ -109,6 +109,7 @@ void add_gain(std::vector<std::string>& row, const BeforeAfter& gain) {
 }
 
 void add_errors(report::HtmlPage& page, const Diagnosis& d) {
+  if (d.baseline.empty()) return;
   page.heading("The model as given against the data");
   Rows rows;
   for (const auto& [name, signal] : d.baseline) {
@@ -141,15 +142,20 @@ void add_errors(report::HtmlPage& page, const Diagnosis& d) {
   page.heading("The simulation run forward");
   page.paragraph(
       "Integrated over each experiment, driven by what drives the machine there, up to the peak of "
-      "friction, where it ends and begins anew once the belt grips. Before and after: experiments "
+      "friction, where it ends and begins anew once the belt grips. Before and after: on "
+      "experiments "
       "that were not used for the fit.");
+  std::vector<std::string> head{"signal, SI", "error as given, rms", "noise"};
+  if (d.simulation.begin()->second.left_out) {
+    head.insert(head.end(), {"before", "after", "difference (95 %)"});
+  }
   rows.clear();
   for (const auto& [name, signal] : d.simulation) {
     rows.push_back({name, number(signal.rmse), number(signal.noise_floor)});
     if (signal.left_out) add_gain(rows.back(), *signal.left_out);
+    rows.back().resize(head.size());
   }
-  page.table({"signal, SI", "error as given, rms", "noise", "before", "after", "difference (95 %)"},
-             rows);
+  page.table(head, rows);
 }
 
 void add_tables(report::HtmlPage& page, const Diagnosis& d) {
@@ -187,10 +193,10 @@ void add_tables(report::HtmlPage& page, const Diagnosis& d) {
 std::string html_text(const Diagnosis& d, const Plots& plots) {
   report::HtmlPage page("BeltGrip: diagnosis");
   page.paragraph(headline(d));
-  if (d.verdict == Verdict::kNothingWrong) {
+  if (d.verdict == Verdict::kNothingWrong && d.complete && !d.baseline.empty()) {
     page.paragraph(
-        "The model departs from these data by no more than noise and the scatter between "
-        "experiments do.");
+        "Nothing stands out from noise and from the scatter between experiments. What these "
+        "experiments could not have shown is listed below.");
   }
   for (const Finding& finding : d.findings) page.paragraph(sentence(finding));
   if (d.unexplained) {

@@ -169,7 +169,9 @@ std::string headline(const Diagnosis& d) {
   std::string what;
   switch (d.verdict) {
     case Verdict::kNothingWrong:
-      what = "nothing wrong";
+      what = d.baseline.empty() ? "nothing can be said"
+             : d.complete       ? "nothing wrong"
+                                : "nothing found so far";
       break;
     case Verdict::kExplained:
       what = "explained";
