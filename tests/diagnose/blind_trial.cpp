@@ -247,6 +247,8 @@ json run_trial(std::uint64_t number) {
   // The envelope is opened.
   Random random(number);
   json truth = json::array();
+  std::vector<int> true_slots;
+  diagnose::ModelState true_sizes = naming.nominal;
   const Eigen::MatrixXd m = information(engine, naming.hypothesis.fit.scatter);
   for (const Planted& planted : envelope.trial.planted) {
     for (const auto& [name, value] : planted.parameters) {
@@ -255,6 +257,8 @@ json run_trial(std::uint64_t number) {
       if (!planted.role.empty()) each["role"] = planted.role;
       if (const int slot = slot_of(campaign, planted, name); slot >= 0) {
         const double size = value / campaign.slots[static_cast<std::size_t>(slot)].row->typical;
+        true_slots.push_back(slot);
+        true_sizes.effects[slot] = value;
         each["slot"] = campaign.slots[static_cast<std::size_t>(slot)].label();
         each["d"] = std::abs(size) * std::sqrt(std::max(m(slot, slot), 0.0));
         each["oracle"] = oracle(campaign, m, slot, size, naming.threshold, random);
@@ -271,6 +275,15 @@ json run_trial(std::uint64_t number) {
     }
   }
   out["truth"] = truth;
+  // What the true structure removes when it is fitted: the error that can be removed.
+  out["removable"] = json::object();
+  if (!true_slots.empty() && true_slots.size() == truth.size()) {
+    engine.accept(engine.refine_from(true_sizes, true_slots, 20));
+    for (const auto& [name, value] :
+         diagnose::left_out_gain(engine, naming.nominal, engine.state(), true_slots).signals) {
+      out["removable"][name] = {value.before, value.after, value.low};
+    }
+  }
   out["rivals"] = rivals(engine, naming.nominal);
   json left = json::array();
   auto scores = naming.last_screen;

@@ -375,26 +375,28 @@ Engine::Replacement Engine::add(const std::vector<int>& slots) const {
   return out;
 }
 
-std::vector<Summary> Engine::summaries_without(int slot) const {
-  const int column = columns_of({kNuisanceCount + slot}).front();
-  const double back = -state_.effects[slot] / scale(kNuisanceCount + slot);
+std::vector<Summary> Engine::summaries_without(const std::vector<int>& slots) const {
   std::vector<Summary> moved = summaries_;
-  for (Summary& each : moved) {  // the residual's column after the step back
-    const auto last = each.aa.rows() - 1;
-    const double power = each.aa(last, last) + 2.0 * back * each.aa(column, last) +
-                         back * back * each.aa(column, column);
-    const VectorXd cross = each.aa.col(last) + back * each.aa.col(column);
-    each.aa.col(last) = cross;
-    each.aa.row(last) = cross.transpose();
-    each.aa(last, last) = power;
-    each.ua.col(last) += back * each.ua.col(column);
+  for (const int slot : slots) {
+    const int column = columns_of({kNuisanceCount + slot}).front();
+    const double back = -state_.effects[slot] / scale(kNuisanceCount + slot);
+    for (Summary& each : moved) {  // the residual's column after the step back
+      const auto last = each.aa.rows() - 1;
+      const double power = each.aa(last, last) + 2.0 * back * each.aa(column, last) +
+                           back * back * each.aa(column, column);
+      const VectorXd cross = each.aa.col(last) + back * each.aa.col(column);
+      each.aa.col(last) = cross;
+      each.aa.row(last) = cross.transpose();
+      each.aa(last, last) = power;
+      each.ua.col(last) += back * each.ua.col(column);
+    }
   }
   return moved;
 }
 
 Engine::Replacement Engine::replace(const std::vector<int>& slots, int instead_of) const {
   const std::vector<int> parameters = with_nuisances(slots);
-  const Fit fit = fit_linear(summaries_without(instead_of), columns_of(parameters),
+  const Fit fit = fit_linear(summaries_without({instead_of}), columns_of(parameters),
                              prior(parameters, state_), base_.scatter, 3);
   Replacement out{2.0 * (fit.log_likelihood - base_.log_likelihood), state_};
   out.state.effects[instead_of] = 0.0;
@@ -492,7 +494,18 @@ double Engine::left_out_gain(int without) const {
   };
   std::vector<int> fewer = accepted_;
   std::erase(fewer, without);
-  return density(summaries_, accepted_) - density(summaries_without(without), fewer);
+  return density(summaries_, accepted_) - density(summaries_without({without}), fewer);
+}
+
+std::vector<double> Engine::left_out_gains() const {
+  const auto densities = [&](const std::vector<Summary>& summaries, const std::vector<int>& set) {
+    const std::vector<int> parameters = with_nuisances(set);
+    return left_out_densities(summaries, columns_of(parameters), prior(parameters, state_));
+  };
+  std::vector<double> out = densities(summaries_, accepted_);
+  const std::vector<double> without = densities(summaries_without(accepted_), {});
+  for (std::size_t e = 0; e < out.size(); ++e) out[e] -= without[e];
+  return out;
 }
 
 }  // namespace beltgrip::diagnose

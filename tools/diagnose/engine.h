@@ -70,6 +70,8 @@ class Engine {
   // By how much the accepted effects predict experiments that were left out of the fit better than
   // the same set without one of them: sum over experiments of the log predictive density.
   double left_out_gain(int without) const;
+  // The same of the whole set over none, per experiment.
+  std::vector<double> left_out_gains() const;
 
   double scale(int parameter) const;
   Prior prior(const std::vector<int>& parameters, const ModelState& at) const;
@@ -92,8 +94,8 @@ class Engine {
                    const ModelState& start, const Whitening& whitening, const Scatter& scatter,
                    int iterations, int scatter_iterations) const;
   std::vector<int> columns_of(const std::vector<int>& parameters) const;
-  // The matrices with the size of one accepted effect put back to zero.
-  std::vector<Summary> summaries_without(int slot) const;
+  // The matrices with the sizes of some accepted effects put back to zero.
+  std::vector<Summary> summaries_without(const std::vector<int>& slots) const;
   double ln_mu_reached() const;
 
   Campaign campaign_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 
 #include "tools/diagnose/forward.h"
 
@@ -21,16 +22,60 @@ double rms(const SignalErrors::Sum& sum) {
   return sum.count > 0.0 ? std::sqrt(sum.squares / sum.count) : 0.0;
 }
 
+class Draw {  // the same draws every time
+ public:
+  std::size_t operator()(std::size_t n) {
+    state_ ^= state_ << 13;
+    state_ ^= state_ >> 7;
+    state_ ^= state_ << 17;
+    return static_cast<std::size_t>(state_ % n);
+  }
+
+ private:
+  std::uint64_t state_ = 0x9E3779B97F4A7C15ULL;
+};
+
+// Share of all choices of signs for which the sum is as large as it is: what chance would do if
+// every experiment were as likely to gain as to lose.
+double sign_flip_p(const std::vector<double>& gains) {
+  const double seen = std::accumulate(gains.begin(), gains.end(), 0.0);
+  const std::size_t patterns = std::size_t{1} << gains.size();
+  std::size_t as_large = 0;
+  for (std::size_t pattern = 0; pattern < patterns; ++pattern) {
+    double sum = 0.0;
+    for (std::size_t e = 0; e < gains.size(); ++e) {
+      sum += ((pattern >> e) & 1U) != 0 ? gains[e] : -gains[e];
+    }
+    as_large += sum >= seen ? 1 : 0;
+  }
+  return static_cast<double>(as_large) / static_cast<double>(patterns);
+}
+
+// Sum of what each experiment gains and its 95 % interval, experiments drawn with replacement;
+// where they are few, zero lies outside only if the exact test says so too.
+Interval sum_over_experiments(const std::vector<double>& gains) {
+  constexpr std::size_t kFew = 8;
+  constexpr double kChance = 0.05;
+  Interval out{std::accumulate(gains.begin(), gains.end(), 0.0), 0.0, 0.0};
+  if (gains.empty()) return out;
+  Draw draw;
+  std::vector<double> sums;
+  for (int i = 0; i < kDraws; ++i) {
+    double sum = 0.0;
+    for (std::size_t e = 0; e < gains.size(); ++e) sum += gains[draw(gains.size())];
+    sums.push_back(sum);
+  }
+  std::sort(sums.begin(), sums.end());
+  out.low = sums[kDraws / 40];
+  out.high = sums[kDraws - 1 - kDraws / 40];
+  if (gains.size() < kFew && sign_flip_p(gains) > kChance) out.low = std::min(out.low, 0.0);
+  return out;
+}
+
 // Before, after and the 95 % interval of the difference, experiments drawn with replacement.
 Gain compare(const std::vector<SignalErrors>& before, const std::vector<SignalErrors>& after) {
   Gain out;
-  std::uint64_t state = 0x9E3779B97F4A7C15ULL;
-  const auto draw = [&](std::size_t n) {
-    state ^= state << 13;
-    state ^= state >> 7;
-    state ^= state << 17;
-    return static_cast<std::size_t>(state % n);
-  };
+  Draw draw;
   std::map<std::string, std::vector<std::size_t>> holders;
   for (std::size_t e = 0; e < before.size(); ++e) {
     for (const auto& [name, sum] : before[e].signal) {
@@ -122,8 +167,13 @@ Gain judge(const Campaign& campaign, const std::vector<ModelState>& before,
 }  // namespace
 
 bool Gain::better() const {
-  return std::any_of(signals.begin(), signals.end(),
-                     [](const auto& each) { return each.second.low > 0.0; });
+  constexpr double kTrifle = 0.03, kClear = 0.05;  // of the error
+  const bool all_at_once = density && density->low > 0.0;
+  return std::any_of(signals.begin(), signals.end(), [&](const auto& each) {
+    const BeforeAfter& signal = each.second;
+    const double removed = 1.0 - signal.after / std::max(signal.before, 1e-300);
+    return (signal.low > 0.0 && removed > kTrifle) || (all_at_once && removed > kClear);
+  });
 }
 
 bool Gain::worse(const std::map<std::string, double>& noise_floor) const {
@@ -317,7 +367,9 @@ Gain left_out_gain(const Engine& engine, const ModelState& nominal, const ModelS
   const std::vector<ModelState> before = leave_one_out(engine, nominal, {}).states;
   const std::vector<ModelState> after =
       slots.empty() ? before : leave_one_out(engine, extended, slots).states;
-  return judge(campaign, before, after);
+  Gain out = judge(campaign, before, after);
+  if (!slots.empty()) out.density = sum_over_experiments(engine.left_out_gains());
+  return out;
 }
 
 Gain held_out_gain(const Campaign& held_out, const ModelState& nominal,

@@ -43,7 +43,9 @@ struct Gain {
   std::map<std::string, BeforeAfter> signals;
   std::map<std::string, BeforeAfter> forward;
   std::optional<MuMaxError> mu_max;
-  // One signal is predicted better beyond chance.
+  std::optional<Interval> density;  // of the log predictive density, all signals at once
+  // One signal is predicted better, beyond chance and by more than a trifle; or clearly so, and all
+  // at once beyond chance.
   bool better() const;
   // One signal is predicted clearly worse: beyond chance, by a tenth and beyond its noise.
   bool worse(const std::map<std::string, double>& noise_floor) const;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 namespace beltgrip::diagnose {
 namespace {
@@ -358,10 +359,10 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
   return fit;
 }
 
-double left_out_density(const std::vector<Summary>& summaries, const std::vector<int>& columns,
-                        const Prior& prior) {
+std::vector<double> left_out_densities(const std::vector<Summary>& summaries,
+                                       const std::vector<int>& columns, const Prior& prior) {
   constexpr int kScatterIterations = 6;
-  double total = 0.0;
+  std::vector<double> out;
   for (std::size_t e = 0; e < summaries.size(); ++e) {
     std::vector<Summary> runs = summaries;
     runs.erase(runs.begin() + static_cast<std::ptrdiff_t>(e));
@@ -371,9 +372,15 @@ double left_out_density(const std::vector<Summary>& summaries, const std::vector
     const Fit all = fit_linear(runs, columns, prior, others.scatter, 0);
     const double ln_det = others.covariance.ldlt().vectorD().array().max(1e-300).log().sum() -
                           all.covariance.ldlt().vectorD().array().max(1e-300).log().sum();
-    total += all.log_likelihood - others.log_likelihood - 0.5 * ln_det;
+    out.push_back(all.log_likelihood - others.log_likelihood - 0.5 * ln_det);
   }
-  return total;
+  return out;
+}
+
+double left_out_density(const std::vector<Summary>& summaries, const std::vector<int>& columns,
+                        const Prior& prior) {
+  const std::vector<double> each = left_out_densities(summaries, columns, prior);
+  return std::accumulate(each.begin(), each.end(), 0.0);
 }
 
 Information information_on(const std::vector<Summary>& summaries, const std::vector<int>& others,

@@ -70,8 +70,10 @@ struct Fit {
 Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& columns,
                const Prior& prior, const Scatter& start, int scatter_iterations);
 
-// Sum over experiments of the log predictive density of each, by a fit to the others; their scatter
-// too.
+// Log predictive density of each experiment, by a fit to the others; their scatter too.
+std::vector<double> left_out_densities(const std::vector<Summary>& summaries,
+                                       const std::vector<int>& columns, const Prior& prior);
+// Their sum.
 double left_out_density(const std::vector<Summary>& summaries, const std::vector<int>& columns,
                         const Prior& prior);
 

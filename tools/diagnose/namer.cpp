@@ -1,6 +1,7 @@
 #include "tools/diagnose/namer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -8,6 +9,7 @@
 
 #include "tools/diagnose/gain.h"
 #include "tools/diagnose/parallel.h"
+#include "tools/diagnose/uncertainty.h"
 #include "tools/diagnose/unknown.h"
 
 namespace beltgrip::diagnose {
@@ -37,6 +39,9 @@ constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
 constexpr double kDisagreement = 1e-3;  // p of a size that experiments do not agree on
 constexpr double kLeftOutMin = 0.0;     // of the log predictive density
 constexpr double kRippleMin = 3e-5;     // of the speed: less is of no consequence for slip
+
+constexpr std::array kConstants{kDeformationPerkN, kLossConstant_Nm, kLossPerSpeed_Nms,
+                                kLnRatioOverdrive, kLnRatioLow};
 
 std::string_view id_of(const Engine& engine, int slot) {
   return engine.campaign().slots[static_cast<std::size_t>(slot)].row->id;
@@ -79,9 +84,25 @@ double sample_period_s(const Campaign& campaign, const Slot& slot) {
   return period_s;
 }
 
+// What bends the machine out of its range only to make up for itself: a gain of the torque and a
+// drag below zero, where the torque was never varied.
+bool bends_machine(const Engine& engine, const Hypothesis& h) {
+  constexpr double kTolerances = 3.5;
+  const auto off = [&](const ModelState& state) {
+    double squares = 0.0;
+    for (const int p : kConstants) {
+      const NuisanceRow& row = engine.campaign().nuisances[static_cast<std::size_t>(p)];
+      squares += std::pow((state.nuisance[p] - row.nominal) / row.tolerance, 2.0);
+    }
+    return std::sqrt(squares);
+  };
+  return off(h.state) > std::max(kTolerances, off(engine.state()) + 1.0);
+}
+
 // A size that no machine has is one where the data do not hold the fit; one far below the usual is
 // of no consequence, however sure; one below the time between two samples is the sampling's own.
 bool credible(const Engine& engine, const Hypothesis& h) {
+  if (bends_machine(engine, h)) return false;
   return std::all_of(h.slots.begin(), h.slots.end(), [&](int slot) {
     const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
     const EffectRow& row = *which.row;
@@ -173,23 +194,13 @@ void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& s
   }
 }
 
-// Sizes' uncertainty: from the noise, or from how the size changes when an experiment is left out,
-// whichever is larger.
 void find_intervals(const Engine& engine, Naming& naming) {
   const Hypothesis& h = naming.hypothesis;
-  const LeftOut left_out = leave_one_out(engine, h.state, h.slots);
-  const auto between = std::max(1.0, static_cast<double>(engine.summaries().size()) - 1.0);
+  const std::vector<Uncertainty> all = uncertainties(engine, h);
   for (Accepted& each : naming.accepted) {
-    const auto at = static_cast<std::size_t>(std::find(h.slots.begin(), h.slots.end(), each.slot) -
-                                             h.slots.begin());
-    const auto column = static_cast<Eigen::Index>(engine.active_nuisances().size() + at);
-    each.sigma = std::sqrt(std::max(h.fit.covariance(column, column), 0.0)) *
-                 engine.scale(kNuisanceCount + each.slot);
-    each.degrees = h.degrees[at];
-    if (left_out.spread[at] > each.sigma) {
-      each.sigma = left_out.spread[at];
-      each.degrees = std::min(each.degrees, between);
-    }
+    const auto at = std::find(h.slots.begin(), h.slots.end(), each.slot) - h.slots.begin();
+    each.sigma = all[static_cast<std::size_t>(at)].sigma;
+    each.degrees = all[static_cast<std::size_t>(at)].degrees;
   }
 }
 

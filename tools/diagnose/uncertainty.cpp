@@ -1,0 +1,65 @@
+#include "tools/diagnose/uncertainty.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tools/diagnose/gain.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+using Eigen::Index;
+
+// One sigma of what the equations themselves leave out (grid of a tenth of a second, slow copies of
+// fast signals, one form where nature has another), as a share of the size: no size is surer.
+constexpr double kEquationShare = 0.01;
+
+bool below_peak(int parameter) {
+  if (parameter < kShapeOverdrive || parameter > kEndOfShapes) return false;
+  return (parameter - kShapeOverdrive) % kShapeKnots < kKnotsBelowPeak;
+}
+
+// The fit lets the knots of the curve depart each for itself. A law that is softer than the nominal
+// one is so at every knot: what such departures add to the variance of the parameter at `column`,
+// in scaled units, where a tolerance is one.
+double common_departure(const Engine& engine, const Fit& fit, Index column) {
+  double together = 0.0, apart = 0.0;
+  for (std::size_t j = 0; j < engine.active_nuisances().size(); ++j) {
+    if (!below_peak(engine.active_nuisances()[j])) continue;
+    const double lever = fit.covariance(column, static_cast<Index>(j));
+    together += lever;
+    apart += lever * lever;
+  }
+  return std::max(0.0, together * together - apart);
+}
+
+}  // namespace
+
+std::vector<Uncertainty> uncertainties(const Engine& engine, const Hypothesis& hypothesis) {
+  const LeftOut left_out = leave_one_out(engine, hypothesis.state, hypothesis.slots);
+  const double between = std::max(1.0, static_cast<double>(engine.summaries().size()) - 1.0);
+  std::vector<Uncertainty> out;
+  for (std::size_t i = 0; i < hypothesis.slots.size(); ++i) {
+    const int slot = hypothesis.slots[i];
+    const double scale = engine.scale(kNuisanceCount + slot);
+    const auto column = static_cast<Index>(engine.active_nuisances().size() + i);
+    // From the noise, or from how the size changes when an experiment is left out, whichever is
+    // larger.
+    const double noise =
+        std::sqrt(std::max(hypothesis.fit.covariance(column, column), 0.0)) * scale;
+    const bool disagree = left_out.spread[i] > noise;
+    const double sampled = disagree ? left_out.spread[i] : noise;
+    const double degrees =
+        disagree ? std::min(hypothesis.degrees[i], between) : hypothesis.degrees[i];
+    const double equation = kEquationShare * hypothesis.state.effects[slot];
+    const double variance = sampled * sampled +
+                            common_departure(engine, hypothesis.fit, column) * scale * scale +
+                            equation * equation;
+    // Satterthwaite: only what is sampled has few degrees of freedom.
+    const double share = sampled * sampled / std::max(variance, 1e-300);
+    out.push_back({std::sqrt(variance), degrees / std::max(share * share, 1e-9)});
+  }
+  return out;
+}
+
+}  // namespace beltgrip::diagnose
