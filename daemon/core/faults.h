@@ -14,7 +14,7 @@ enum class Fault : std::uint8_t {
   kInputMissing,    // a required signal has never come
   kInputStale,      // a required signal came and has stopped
   kInputFrozen,     // a speed stands still while the other moves
-  kInputRange,      // outside the DBC's range, or the code for "not available"
+  kInputRange,      // outside the DBC's range, the code for "not available", or a spike
   kInputNotFinite,  // NaN or infinite
   kInputFrame,      // a frame of wrong length or kind
   kTimeStamp,       // a stamp went backwards

@@ -18,6 +18,15 @@ constexpr Duration kFrozenAfter = 200 * kMillisecond;
 // More than any slip an experiment may reach: the two speeds then differ by more than slip can.
 constexpr double kFrozenShare = 0.15;
 constexpr double kFrozenFloor_rad_s = 10.0;
+// Spikes that are left out in a row: so many values, and of a slow signal for so long at most.
+constexpr std::size_t kSpikeValues = 3;
+constexpr Duration kSpikeLongest = 60 * kMillisecond;
+
+std::size_t spike_values(Duration period) noexcept {
+  const Duration whole = std::max<Duration>(period, 1);
+  const auto most = static_cast<std::size_t>((kSpikeLongest + whole / 2) / whole);
+  return std::clamp<std::size_t>(most, 1, kSpikeValues);
+}
 
 // Payload bytes of a CAN FD frame that carries at least `length`.
 std::uint8_t fd_length(std::uint32_t length) {
@@ -61,6 +70,7 @@ InputMonitor::InputMonitor(const Config& config) : config_(config), uds_(config)
   for (const Role role :
        {Role::kPrimarySpeed, Role::kSecondarySpeed, Role::kSecondaryPressure, torque}) {
     required_[required_count_++] = role;
+    row(role).is_gated = true;
   }
   if (config_.trigger == Trigger::kSignal) required_[required_count_++] = Role::kExperimentActive;
 }
@@ -77,6 +87,8 @@ void InputMonitor::bind(const RoleBinding& binding) {
   if (binding.period_ms) {
     row.period = static_cast<Duration>(*binding.period_ms * static_cast<double>(kMillisecond));
   }
+  const double step = binding.codec.physical(1) - binding.codec.physical(0);
+  row.gate = SpikeGate(std::abs(binding.factor * step));
   row.delay = static_cast<Duration>(binding.delay_ms * static_cast<double>(kMillisecond));
   row.learns = !row.period;
   row.by_group = binding.sources.any();
@@ -227,10 +239,17 @@ void InputMonitor::take(Row& row, std::span<const std::uint8_t> payload, std::ui
   }
   if (another) {
     row.history.clear();
+    row.gate.reset();
     row.interval_count = 0;
     row.quality = SignalQuality::kMissing;  // until update() has judged it
   }
   row.source = source;
+  row.heard = t;
+  if (row.is_gated && row.period) {
+    const SpikeGate::Verdict verdict = row.gate.judge(value, spike_values(*row.period));
+    if (verdict == SpikeGate::Verdict::kLeftOut) return;
+    if (verdict == SpikeGate::Verdict::kTakenAfterSpike) faults.raise(Fault::kInputRange, t);
+  }
   if (row.learns) learn(row, t);
   row.history.add(t, value);
 }
@@ -248,7 +267,7 @@ void InputMonitor::learn(Row& row, MonoTime t) noexcept {
 SignalQuality InputMonitor::judge(const Row& row, MonoTime t) const noexcept {
   if (row.binding == nullptr) return SignalQuality::kUnbound;
   if (row.history.empty()) return SignalQuality::kMissing;
-  const Duration age = t - row.history.newest();
+  const Duration age = t - row.heard;
   const Duration limit =
       row.period ? std::max(kStaleMinimum, scaled(*row.period, kStalePeriods)) : kLearningStale;
   if (age > limit) return SignalQuality::kStale;
@@ -282,6 +301,10 @@ void InputMonitor::update(MonoTime t, FaultSet& faults) noexcept {
   const bool secondary_frozen = is_frozen(secondary_motion_, secondary, primary, t);
   if (primary_frozen) primary.quality = SignalQuality::kFrozen;
   if (secondary_frozen) secondary.quality = SignalQuality::kFrozen;
+  // What comes next need not go on from there.
+  for (Row& each : rows_) {
+    if (each.quality != SignalQuality::kValid) each.gate.reset();
+  }
 
   for (const Role role : required()) {
     const Row& now = row(role);

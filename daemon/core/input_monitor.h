@@ -5,7 +5,8 @@
 // A frame is taken when its kind (standard or extended, classic or FD, data) and its length are
 // those of the DBC. A value is taken when its multiplexer selects it, it is finite, and inside the
 // DBC's range; all bits one in a signal without a range counts as "not available". What is not
-// taken is as if it had not come: the row grows stale.
+// taken is as if it had not come: the row grows stale. Not so a spike of a required signal
+// (spike_gate.h): it is left out, but the signal is alive.
 //
 // Rate, counter and CRC of each message are judged by frame_guard.h; the rate where its period is
 // configured or in the DBC, and neither the message is multiplexed nor several sources may send it.
@@ -28,6 +29,7 @@
 #include "daemon/core/frame_guard.h"
 #include "daemon/core/port.h"
 #include "daemon/core/signal_history.h"
+#include "daemon/core/spike_gate.h"
 #include "daemon/core/uds_client.h"
 
 namespace beltgrip::daemon {
@@ -81,6 +83,9 @@ class InputMonitor {
     std::optional<std::uint8_t> own_source;  // of the DBC's identifier, unless it is the null one
     std::optional<std::uint8_t> source;      // that it follows
     SignalHistory history;
+    bool is_gated = false;  // its spikes are left out
+    SpikeGate gate;
+    MonoTime heard = 0;  // newest stamp, of a spike too
     SignalQuality quality = SignalQuality::kUnbound;
     std::optional<Duration> period;
     Duration delay = 0;

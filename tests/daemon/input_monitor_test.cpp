@@ -443,5 +443,84 @@ TEST(InputMonitor, AllValidNeedsEveryRequiredRole) {
   }
 }
 
+// A speed of 2000 rpm in steps of 0.25, with noise of two steps either way, every 10 ms.
+class Spikes : public testing::Test {
+ protected:
+  static constexpr double kSpeed = 2000.0;
+  Spikes()
+      : bench_(one_signal(Role::kPrimarySpeed, signal_def(16, can::ValueType::kUnsigned, 0.25))) {}
+  double tell(double value) {
+    t_ += 10 * kMillisecond;
+    const auto raw = static_cast<std::uint64_t>(std::lround(4.0 * value));
+    EXPECT_EQ(bench_.monitor.on_frame(at(t_, raw_frame(raw)), bench_.faults), FrameUse::kTaken);
+    bench_.monitor.update(t_, bench_.faults);
+    return bench_.monitor.history(Role::kPrimarySpeed).newest_value();
+  }
+  double noise() {
+    state_ = state_ * 6364136223846793005U + 1442695040888963407U;
+    return static_cast<double>(state_ >> 33U) / 2147483648.0 - 0.5;
+  }
+  void run_steady(int frames) {
+    for (int i = 0; i < frames; ++i) tell(kSpeed + noise());
+  }
+  Bench bench_;
+  MonoTime t_ = kSecond;
+  std::uint64_t state_ = 1;
+};
+
+TEST_F(Spikes, AreLeftOutWhereverTheyGo) {
+  run_steady(100);
+  for (const double spike : {1.01, 0.99, 1.03, 1.3, 0.5, 0.0}) {
+    for (int length = 1; length <= 3; ++length) {
+      for (int i = 0; i < length; ++i) {
+        ASSERT_NEAR(tell(spike * kSpeed), kSpeed, 1.0) << spike << " " << i;
+        ASSERT_EQ(bench_.monitor.quality(Role::kPrimarySpeed), SignalQuality::kValid);
+      }
+      ASSERT_NEAR(tell(kSpeed), kSpeed, 1.0);
+      EXPECT_TRUE(bench_.faults.has(Fault::kInputRange)) << spike;
+      run_steady(20);
+    }
+  }
+}
+
+TEST_F(Spikes, WhatStaysIsFollowed) {
+  run_steady(100);
+  const double now = 1.05 * kSpeed;
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(tell(now), kSpeed, 1.0) << i;
+  EXPECT_EQ(tell(now), now);
+  EXPECT_FALSE(bench_.faults.has(Fault::kInputRange));
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(tell(now), now) << i;
+}
+
+// From steady to 500 rad/s^2, the belt gone: no value of it is missed.
+TEST_F(Spikes, ARunAwayIsNone) {
+  run_steady(100);
+  for (int i = 1; i <= 50; ++i) {
+    const double gained = 0.5 * 500.0 * 60.0 / 6.283 * 1e-4 * i * i;
+    const double value = std::round(4.0 * (kSpeed + gained + noise())) / 4.0;
+    EXPECT_EQ(tell(value), value) << i;
+  }
+}
+
+TEST_F(Spikes, NoneAreSeenBeforeTheNoiseIsKnown) {
+  run_steady(20);
+  EXPECT_EQ(tell(1.5 * kSpeed), 1.5 * kSpeed);
+}
+
+// Slow signals are not kept waiting: of one every 50 ms a single value is left out.
+TEST(InputMonitor, SlowSpikesAreShort) {
+  Bench bench(
+      one_signal(Role::kSecondaryPressure, signal_def(16, can::ValueType::kUnsigned), 8, 50.0));
+  MonoTime t = kSecond;
+  const auto tell = [&](std::uint64_t raw) {
+    t += 50 * kMillisecond;
+    bench.monitor.on_frame(at(t, raw_frame(raw)), bench.faults);
+    return bench.monitor.history(Role::kSecondaryPressure).newest_value();
+  };
+  for (std::uint64_t i = 0; i < 60; ++i) tell(1000 + i % 2);
+  EXPECT_LT(tell(2000), 1002.0);
+  EXPECT_EQ(tell(2000), 2000.0);
+}
+
 }  // namespace
 }  // namespace beltgrip::daemon
