@@ -55,12 +55,12 @@ void AfterStop::begin(const ExperimentRecord& record) noexcept {
 
 void AfterStop::step(const Cell& sample) noexcept {
   if (!begun_) return;
+  if (over_) return;
   const double after_s = sample.t_s - stop_t_s_;
   if (after_s >= kSwingFrom_s && after_s <= kSwingTo_s) {
     swing_slip_percent_ += sample.slip_percent;
     ++swing_samples_;
   }
-  if (over_) return;
   samples_[count_++] = sample;
   if (count_ - group_begin_ == per_group_) judge_group();
   if (count_ == samples_.size()) over_ = true;

@@ -23,7 +23,8 @@ class AfterStop {
   // The samples of the curve, oldest first.
   std::size_t size() const noexcept { return kept_; }
   const Cell& operator[](std::size_t i) const noexcept { return samples_[i]; }
-  // Slip that rattles swings back at once; a belt that slips does not.
+  // Slip that rattles swings back at once, while the force lies where it was; a belt that slips
+  // does not.
   bool swung_back() const noexcept;
 
  private:

@@ -70,6 +70,44 @@ TEST_F(AfterTheStop, NoneIsKeptWithoutAStop) {
   EXPECT_EQ(after_.size(), 0U);
 }
 
+// Slip that shot up by 1.2 percent in the last tenth of a second before the stop.
+class AfterARise : public AfterTheStop {
+ protected:
+  static constexpr double kRise_percent = 1.2;
+  AfterARise() {
+    for (int i = 0; i < 20; ++i) {
+      record_.step(sample(4.0 + i / kRate_hz, kRise_percent * (i + 1) / 20.0, 0.0));
+    }
+    after_.reset();
+    after_.begin(record_);
+  }
+  // It stays for a time, then goes back at this rate; the force as above.
+  void go_back(double stays_s, double returns_after_s, double returns_N_per_s) {
+    for (int i = 1; i <= 100; ++i) {
+      const double after_s = i / kRate_hz;
+      const double back_percent = 100.0 * std::max(0.0, after_s - stays_s);
+      after_.step(sample(4.1 - 1.0 / kRate_hz + after_s,
+                         std::max(-1.0, kRise_percent - back_percent),
+                         returns_N_per_s * std::max(0.0, after_s - returns_after_s)));
+    }
+  }
+};
+
+TEST_F(AfterARise, SlipThatGoesBackByItselfHasSwung) {
+  go_back(0.0, 10.0, 0.0);
+  EXPECT_TRUE(after_.swung_back());
+}
+
+TEST_F(AfterARise, SlipThatStaysHasNot) {
+  go_back(10.0, 10.0, 0.0);
+  EXPECT_FALSE(after_.swung_back());
+}
+
+TEST_F(AfterARise, SlipThatTheReturningForceTakesBackHasNot) {
+  go_back(0.04, 0.04, 50000.0);
+  EXPECT_FALSE(after_.swung_back());
+}
+
 // The experiment ends with the stop, or goes on for so many samples.
 PeakEstimate estimate(const std::vector<test::TracePoint>& trace, const test::Rig& rig,
                       std::size_t after) {
