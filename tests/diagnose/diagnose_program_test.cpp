@@ -304,6 +304,7 @@ TEST_F(Diagnose, AnInterruptedRunLeavesAValidPartialReport) {
   EXPECT_EQ(WEXITSTATUS(status), 0);
   const json result = json::parse(place_.read("out.json"));
   EXPECT_FALSE(result.at("complete").get<bool>());
+  EXPECT_TRUE(result.at("verdict").is_null());
   EXPECT_EQ(result.at("experiments"), 4);
   EXPECT_EQ(result.at("findings").size(), 0U);
   EXPECT_NE(place_.read("out.html").find("</html>"), std::string::npos);
@@ -319,8 +320,45 @@ TEST_F(Diagnose, TooLittleDataSaysSo) {
   const json result = answer(logs);
   expect_silence(result);
   EXPECT_NE(run(logs).out.find("nothing can be said"), std::string::npos);
+  EXPECT_TRUE(result.at("verdict").is_null());  // never a pass
   EXPECT_NE(notes(result).find("too little data"), std::string::npos) << notes(result);
   EXPECT_GT(result.at("not_identifiable").size(), 10U);
+}
+
+TEST_F(Diagnose, ACopyOfAnExperimentIsNoReplicate) {
+  const auto table = record(rig(1)).csv[0];
+  const json result = of({table, table, table});
+  EXPECT_EQ(result.at("experiments"), 1);
+  EXPECT_NE(notes(result).find("the same data as"), std::string::npos) << notes(result);
+  EXPECT_NE(notes(result).find("fewer than three experiments"), std::string::npos);
+  expect_silence(result);
+}
+
+TEST_F(Diagnose, FrictionThatNoBeltHasAndTorquesThatFightAreSaidAndNotNamed) {
+  const auto tables = record(rig(3)).csv;
+  const auto head = [&](const std::string& role) {
+    const std::string line = tables[0].substr(0, tables[0].find('\n'));
+    std::size_t column = 0;
+    for (std::size_t at = 0; at < line.find(role); ++at) column += line[at] == ',';
+    return column;
+  };
+  const auto scaled = [&](const std::string& role, double factor) {
+    std::vector<std::string> out;
+    for (const std::string& table : tables) {
+      out.push_back(changed(table, [&](auto& cells) {
+        cells[head(role)] = std::to_string(factor * number(cells[head(role)]));
+        return true;
+      }));
+    }
+    return of(out);
+  };
+  const json pressure = scaled("secondary_pressure[", 1000.0);
+  EXPECT_EQ(pressure.at("verdict"), "unexplained");
+  EXPECT_EQ(pressure.at("findings").size(), 0U);
+  EXPECT_NE(notes(pressure).find("which no belt has"), std::string::npos) << notes(pressure);
+  const json torque = scaled("primary_torque[", -1.0);
+  EXPECT_EQ(torque.at("findings").size(), 0U);
+  EXPECT_NE(notes(torque).find("opposite sign"), std::string::npos) << notes(torque);
 }
 
 TEST_F(Diagnose, OneExperimentNamesNothingAndAsksForRepeats) {

@@ -13,9 +13,11 @@
 namespace beltgrip::diagnose {
 namespace {
 
-constexpr int kSamplesMin = 100;     // 10 s of usable data
-constexpr double kDetectable = 5.0;  // sigmas: found with 90 % and more
-constexpr double kRealistic = 3.0;   // in usual sizes: an effect is hardly ever larger
+constexpr int kSamplesMin = 100;                  // 10 s of usable data
+constexpr std::size_t kExperimentsMin = 3;        // from where on their scatter is known
+constexpr double kMuLeast = 0.03, kMuMost = 0.3;  // of any belt
+constexpr double kDetectable = 5.0;               // sigmas: found with 90 % and more
+constexpr double kRealistic = 3.0;                // in usual sizes: an effect is hardly ever larger
 
 double quantile_975(double degrees) {
   double low = 0.0, high = 100.0;
@@ -32,6 +34,13 @@ std::string text_of(double value) {
   return buffer;
 }
 
+bool same_data(const SignalTable& a, const SignalTable& b) {
+  return std::equal(a.channels.begin(), a.channels.end(), b.channels.begin(),
+                    [](const Channel& one, const Channel& other) {
+                      return one.t_s == other.t_s && one.value == other.value;
+                    });
+}
+
 class Run {
  public:
   explicit Run(Request request) : request_(std::move(request)) {}
@@ -39,6 +48,7 @@ class Run {
   Answer run() {
     answer_.extended = request_.model;
     std::vector<ExperimentData> runs;
+    drop_copies();
     runs.resize(request_.experiments.size());
     in_parallel(request_.jobs, runs.size(), [&](std::size_t i) {
       runs[i] = prepare(request_.experiments[i], request_.model.variator);
@@ -52,6 +62,7 @@ class Run {
       }
     }
     check_same_machine(runs);
+    check_torques(runs);
     if (out().samples < kSamplesMin) {
       out().notes.push_back("too little data: " + text_of(0.1 * out().samples) +
                             " s usable, at least 10 s are needed; nothing can be said");
@@ -140,7 +151,49 @@ class Run {
     note.append(" and ").append(high_name).append(": end-stop ratios ").append(text_of(low));
     note.append(" and ").append(text_of(high)).append(" cannot be of one machine");
     out().notes.push_back(std::move(note));
-    different_machines_ = true;
+    impossible_ = Unexplained{"ratio", {"experiment"}, 1.0};
+  }
+
+  // The same data under two names would count as two experiments that agree in everything.
+  void drop_copies() {
+    std::vector<SignalTable>& tables = request_.experiments;
+    for (std::size_t i = 0; i < tables.size(); ++i) {
+      for (std::size_t j = i + 1; j < tables.size();) {
+        if (!same_data(tables[i], tables[j])) {
+          ++j;
+          continue;
+        }
+        out().notes.push_back(tables[j].name + ": the same data as " + tables[i].name +
+                              "; counted once");
+        tables.erase(tables.begin() + static_cast<std::ptrdiff_t>(j));
+      }
+    }
+  }
+
+  // What goes in at one shaft comes out at the other.
+  void check_torques(const std::vector<ExperimentData>& runs) {
+    double same = 0.0, opposite = 0.0;
+    for (const ExperimentData& run : runs) {
+      if (!run.torque_s.present) continue;
+      for (int k = 0; k < run.size(); ++k) {
+        if (!run.valid[static_cast<std::size_t>(k)]) continue;
+        const double product = run.torque.value[k] * run.torque_s.value[k];
+        (product < 0.0 ? opposite : same) += std::abs(product);
+      }
+    }
+    if (!(opposite > same)) return;
+    out().notes.emplace_back(
+        "primary and secondary torque are of opposite sign: that of one is wrong");
+    impossible_ = Unexplained{"torque", {"secondary_torque"}, 1.0};
+  }
+
+  void check_friction(const ModelState& nominal) {
+    const double mu_max = std::exp(nominal.nuisance[kLnMuMax]);
+    if (mu_max > kMuLeast && mu_max < kMuMost) return;
+    out().notes.push_back("mu_max would be " + text_of(mu_max) +
+                          ", which no belt has: unit or scale of the pressure or the torque, or "
+                          "secondary_piston_area_m2 of [variator]?");
+    impossible_ = Unexplained{"friction", {"secondary_pressure", "torque"}, 1.0};
   }
 
   void fill(Engine& engine, const Naming& naming) {
@@ -154,11 +207,17 @@ class Run {
     fill_baseline(engine, naming);
     out().simulation = simulated_signals(campaign, naming.nominal);
     fill_not_identifiable(engine, naming);
-    if (different_machines_) {
-      nothing_identifiable("the experiments are not of one machine");
+    check_friction(naming.nominal);
+    if (impossible_) {
+      nothing_identifiable("the data cannot be of one belt as configured");
       out().verdict = Verdict::kUnexplained;
-      out().unexplained = Unexplained{"ratio", {"experiment"}, 1.0};
+      out().unexplained = impossible_;
       return;
+    }
+    if (campaign.runs.size() < kExperimentsMin) {
+      out().notes.push_back(
+          "fewer than three experiments: how they scatter is not known, and what "
+          "changes from one to the next (wear, temperature) cannot be seen");
     }
     std::vector<int> slots;
     slots.reserve(naming.accepted.size());
@@ -197,9 +256,10 @@ class Run {
       out().unexplained =
           Unexplained{naming.unknown->acts_on, {naming.unknown->depends_on}, naming.unknown->share};
     }
-    out().verdict = naming.unknown           ? Verdict::kUnexplained
-                    : out().findings.empty() ? Verdict::kNothingWrong
-                                             : Verdict::kExplained;
+    out().verdict = naming.unknown            ? Verdict::kUnexplained
+                    : !out().findings.empty() ? Verdict::kExplained
+                    : out().complete          ? Verdict::kNothingWrong
+                                              : Verdict::kNone;
     propose(engine, naming);
     answer_.extended = request_.model;
     const ModelState& stored = refuted ? naming.nominal : extended;
@@ -386,7 +446,7 @@ class Run {
 
   Request request_;
   Answer answer_;
-  bool different_machines_ = false;
+  std::optional<Unexplained> impossible_;  // no belt does this
 };
 
 }  // namespace

@@ -71,10 +71,11 @@ struct Rerun {
   std::optional<Measured> before, after;
 };
 
-enum class Verdict { kNothingWrong, kExplained, kUnexplained };
+// kNone: too little was seen to say anything; null in JSON.
+enum class Verdict { kNone, kNothingWrong, kExplained, kUnexplained };
 
 struct Diagnosis {
-  Verdict verdict = Verdict::kNothingWrong;
+  Verdict verdict = Verdict::kNone;
   std::map<std::string, BaselineSignal> baseline;
   std::map<std::string, SimulatedSignal> simulation;
   std::vector<Finding> findings;

@@ -193,7 +193,7 @@ void add_tables(report::HtmlPage& page, const Diagnosis& d) {
 std::string html_text(const Diagnosis& d, const Plots& plots) {
   report::HtmlPage page("BeltGrip: diagnosis");
   page.paragraph(headline(d));
-  if (d.verdict == Verdict::kNothingWrong && d.complete && !d.baseline.empty()) {
+  if (d.verdict == Verdict::kNothingWrong) {
     page.paragraph(
         "Nothing stands out from noise and from the scatter between experiments. What these "
         "experiments could not have shown is listed below.");

@@ -9,6 +9,8 @@ namespace {
 
 const char* verdict_text(Verdict verdict) {
   switch (verdict) {
+    case Verdict::kNone:
+      return nullptr;
     case Verdict::kNothingWrong:
       return "nothing_wrong";
     case Verdict::kExplained:
@@ -16,7 +18,7 @@ const char* verdict_text(Verdict verdict) {
     case Verdict::kUnexplained:
       return "unexplained";
   }
-  return "";
+  return nullptr;
 }
 
 void interval(cli::JsonWriter& json, double low, double high) {
@@ -41,7 +43,9 @@ std::string figure_text(const Rerun& rerun, const RerunFigure& figure) {
 std::string json_text(const Diagnosis& d) {
   cli::JsonWriter json;
   json.begin_object();
-  json.field("verdict", verdict_text(d.verdict));
+  const char* verdict = verdict_text(d.verdict);
+  json.key("verdict");
+  verdict == nullptr ? json.null() : json.value(verdict);
   json.field("complete", d.complete);
   json.field("experiments", d.experiments);
   json.field("usable_s", 0.1 * d.samples);
@@ -168,10 +172,11 @@ std::string json_text(const Diagnosis& d) {
 std::string headline(const Diagnosis& d) {
   std::string what;
   switch (d.verdict) {
+    case Verdict::kNone:
+      what = d.complete ? "nothing can be said" : "nothing found so far";
+      break;
     case Verdict::kNothingWrong:
-      what = d.baseline.empty() ? "nothing can be said"
-             : d.complete       ? "nothing wrong"
-                                : "nothing found so far";
+      what = "nothing wrong";
       break;
     case Verdict::kExplained:
       what = "explained";
