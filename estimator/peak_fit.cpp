@@ -21,6 +21,7 @@ constexpr double kDrift = 3.0;
 constexpr double kLongestPoint_s = 1.0;  // time does
 constexpr double kStretchFrom = 0.9;     // of the top of mu*
 constexpr std::size_t kWantedPoints = 16;
+constexpr double kBack = 6.0;  // deviations of slip
 constexpr std::size_t kMostNeighbours = 24;
 constexpr double kCoursePrecision = 0.02;
 constexpr std::size_t kNeighbours = 3;  // to each side, for a first look at the course of mu*
@@ -31,6 +32,7 @@ constexpr double kLambdaFactor = 1.35;
 constexpr std::size_t kCorners = 20;
 constexpr double kCornersOver = 0.75;  // of the span, from its upper end
 constexpr std::size_t kMostForms = 16 * (kCorners + 1) + kCorners * kCorners;
+constexpr double kFormError = 0.05;       // of how far mu* lies below its top: forms are local
 constexpr double kFormTolerance = 0.002;  // of mu: no friction is quite one of the forms
 constexpr double kNearTop = 0.98;
 constexpr double kHealthFrom = 0.6;        // of the top of mu*
@@ -340,15 +342,32 @@ void PeakFit::find_course() noexcept {
   if (next_ == point_count_) go_to(Stage::kStretch);
 }
 
+// To the stretch that is fitted, which begins right after it. Where points are few, it reaches
+// further down; but not to where slip still fell because deformation gave way: there mu* is no
+// function of slip.
+bool PeakFit::belongs(std::size_t point) const noexcept {
+  const std::size_t count = point_count_ - point - 1;
+  if (count < kFewestPoints) return true;
+  if (count >= kWantedPoints && mean_mu(point + 1) < kStretchFrom * mu_top_) return false;
+  const Point& older = points_[point];
+  const double noise = record_->slip_noise() * (1.0 / older.duration_s + 1.0 / slip_low_s_);
+  return older.slip < slip_low_ + kBack * std::sqrt(noise);
+}
+
 void PeakFit::find_stretch() noexcept {
   first_ = top_;
-  while (first_ > oldest_ &&
-         (mean_mu(first_) > kStretchFrom * mu_top_ || point_count_ - first_ < kWantedPoints)) {
+  slip_low_ = points_[first_].slip;
+  slip_low_s_ = points_[first_].duration_s;
+  while (first_ > oldest_ && belongs(first_ - 1)) {
     --first_;
+    if (points_[first_].slip > slip_low_) continue;
+    slip_low_ = points_[first_].slip;
+    slip_low_s_ = points_[first_].duration_s;
   }
   // What the noise in slip does to mu*: by the slope around.
   const double slip_noise = record_->slip_noise();
   for (std::size_t i = first_; i < point_count_; ++i) {
+    points_[i].variance += square(kFormError * std::max(0.0, mu_top_ - points_[i].mu));
     const Point& a = points_[i > first_ + kNeighbours ? i - kNeighbours : first_];
     const Point& b = points_[std::min(point_count_ - 1, i + kNeighbours)];
     const double slope = std::clamp((b.mu - a.mu) / std::max(0.1, b.slip - a.slip), 0.0, 0.1);

@@ -113,6 +113,7 @@ class PeakFit {
   void add_point(std::size_t begin, std::size_t end) noexcept;
   double mean_mu(std::size_t point) const noexcept;
   void find_course() noexcept;
+  bool belongs(std::size_t point) const noexcept;
   void find_stretch() noexcept;
   void find_reached(std::size_t length) noexcept;
   bool came_after() const noexcept;
@@ -148,11 +149,12 @@ class PeakFit {
   std::size_t oldest_ = 0;           // that counts
   std::size_t first_ = 0, top_ = 0;  // the stretch that is fitted begins at first
   double mu_top_ = 0.0;
-  double slip_low_ = 0.0, slip_high_ = 0.0;
-  std::vector<std::size_t> order_;  // points of the stretch by rising slip
-  std::vector<double> rises_;       // at the points, in that order
-  std::size_t next_ = 0;            // where the work on this stage goes on
-  Rise rise_;                       // that is being fitted, with
+  double slip_low_ = 0.0, slip_high_ = 0.0;  // of the stretch
+  double slip_low_s_ = 0.0;                  // duration of the lowest point
+  std::vector<std::size_t> order_;           // points of the stretch by rising slip
+  std::vector<double> rises_;                // at the points, in that order
+  std::size_t next_ = 0;                     // where the work on this stage goes on
+  Rise rise_;                                // that is being fitted, with
   SumsOfForm form_sums_;
   std::size_t summed_ = 0;         // so many points in the sums,
   std::size_t next_corner_ = 0;    // the corner of the next form; 0: none, i + 1: corner(i)
