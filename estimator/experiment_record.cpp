@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kFinestCell_s = 0.01;
 constexpr std::size_t kTrendCells = 4096;  // 205 s
-constexpr double kLowered = 0.97;          // of the first clamp force
+constexpr double kLowered = 0.99;          // of the first clamp force
 constexpr double kSmooth_s = 0.1;
 constexpr double kRaised = 1.05;  // of the lowest clamp force, and beyond so many deviations
 constexpr double kRaisedDeviations = 5.0;
@@ -66,7 +66,7 @@ bool ExperimentRecord::step(const Cell& sample) noexcept {
     const double force_N = force_line_.at(sample.t_s);
     if (first_force_N_ <= 0.0) first_force_N_ = force_N;
     if (force_N < kLowered * first_force_N_ &&
-        torque_watch_.step(sample.torque_Nm, slip, force_N, torque_noise())) {
+        torque_watch_.step(sample.torque_Nm, slip, slip_noise(), torque_)) {
       if (!torque_stepped_) torque_stepped_s_ = sample.t_s;
       torque_stepped_ = true;
     }

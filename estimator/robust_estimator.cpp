@@ -7,6 +7,7 @@
 #include "estimator/clamp_force.h"
 #include "estimator/excitation.h"
 #include "estimator/experiment_record.h"
+#include "estimator/follow_on.h"
 #include "estimator/frozen_reading.h"
 #include "estimator/glitch_gate.h"
 #include "estimator/peak_fit.h"
@@ -86,6 +87,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     peak_ = {};
     first_t_ns_ = 0;
     after_stop_.reset();
+    follow_on_.reset();
     next_after_ = 0;
     narrow_ = 0;
     first_mu_ = first_force_N_ = 0.0;
@@ -103,7 +105,10 @@ class RobustEstimator final : public SlipCurveEstimator {
     if (!now.usable) return out_;
     publish(now);
     if (ended) {
-      if (started_) after_stop_.step(cell_of(sample));
+      if (started_) {
+        after_stop_.step(cell_of(sample));
+        follow_on_.step(cell_of(sample));
+      }
       stepped_ = true;
       return out_;
     }
@@ -140,6 +145,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     stepped_ = false;
     if (waiting_) return (after_stop_.over() || !stepped) && follow_on();
     if (!fit_.step()) return false;
+    if (stepped && follow_on_.waits()) return false;
     judge();
     refuse_impossible(peak_);
     // What the belt did next may tell what the curve up to the stop leaves open.
@@ -224,6 +230,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     out_.friction_slope = detector_.slope();
     if (out_.stop != StopReason::kNone) {
       after_stop_.begin(record_);
+      follow_on_.begin(record_);
       out_.phase = Phase::kMacroSlip;
     } else if (detector_.level()) {
       out_.phase = Phase::kPeak;
@@ -331,6 +338,7 @@ class RobustEstimator final : public SlipCurveEstimator {
 
   bool contradictory(const PeakFitResult& fit) const noexcept {
     return record_.torque_stepped() || after_stop_.swung_back() ||
+           (fit.valid && follow_on_.stood_still(fit.mu, traction_, inertia_kg_m2_)) ||
            fit.below_chord > kChordDeviations || fit.residuals.innovation > kInnovation ||
            fit.residuals.runs > kRuns;
   }
@@ -345,6 +353,7 @@ class RobustEstimator final : public SlipCurveEstimator {
   ExperimentRecord record_;
   StopDetector detector_;
   AfterStop after_stop_;
+  FollowOn follow_on_;
   std::size_t next_after_ = 0;  // to join the record
   PeakFit fit_;
   PeakForecast peak_forecast_;

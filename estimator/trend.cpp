@@ -13,6 +13,10 @@ constexpr double kQuietSlip_percent = 0.2;  // slip that moves less does not mov
 constexpr std::size_t kShortest = 4;        // cells in the first line
 constexpr double kEnough = 6.0;             // squares before a scale is believed
 constexpr double kLargestSquare = 9.0;      // of their mean
+constexpr int kCuts = 6;
+constexpr double kSettled = 0.99;
+constexpr int kLowestBin = -30;  // of the squares, by powers of two
+constexpr double kUnbounded = 1e100;
 
 }  // namespace
 
@@ -65,13 +69,30 @@ void Trend::add(double t_s, double value, double slip_percent) noexcept {
     if (++scale.count < 3 || (scale.squares_count > kEnough && !quiet)) continue;
     // Of white noise the second difference has six times the variance of a mean.
     const double second = scale.means[0] - 2.0 * scale.means[1] + scale.means[2];
-    double square = second * second / 6.0;
-    // A corner of the course (a ramp begins or ends) is no noise.
-    if (scale.squares_count > kEnough) {
-      square = std::min(square, kLargestSquare * scale.squares / scale.squares_count);
+    scale.take(second * second / 6.0);
+  }
+}
+
+void Trend::Scale::take(double square) noexcept {
+  const int bin = std::clamp(std::ilogb(square) - kLowestBin, 0, static_cast<int>(bins.size()) - 1);
+  first_bin = squares_count > 0.0 ? std::min(first_bin, bin) : bin;
+  last_bin = squares_count > 0.0 ? std::max(last_bin, bin) : bin;
+  bins[static_cast<std::size_t>(bin)].count += 1.0;
+  bins[static_cast<std::size_t>(bin)].sum += square;
+  squares_count += 1.0;
+  // A corner of the course or a step (the load is taken up, a ramp begins or ends) is no noise:
+  // what lies beyond kLargestSquare times the mean counts for no more, and the mean is without it.
+  mean_square = kUnbounded;
+  for (int i = 0; i < kCuts; ++i) {
+    const double cut = kLargestSquare * mean_square;
+    double cut_sum = 0.0;
+    for (int k = first_bin; k <= last_bin; ++k) {
+      const Bin& each = bins[static_cast<std::size_t>(k)];
+      cut_sum += std::min(each.sum, each.count * cut);
     }
-    scale.squares += square;
-    scale.squares_count += 1.0;
+    const double before = mean_square;
+    mean_square = cut_sum / squares_count;
+    if (mean_square > kSettled * before) return;
   }
 }
 
@@ -81,9 +102,15 @@ double Trend::density(double over_s) const noexcept {
     const Scale& scale = scales_[static_cast<std::size_t>(i)];
     const double length_s = cell_s_ * (1 << i);
     if (scale.squares_count < (i == 0 ? 1.0 : kEnough) || (i > 0 && length_s > over_s)) break;
-    largest = std::max(largest, scale.squares / scale.squares_count * length_s);
+    largest = std::max(largest, scale.mean_square * length_s);
   }
   return largest;
+}
+
+double Trend::squares(double over_s) const noexcept {
+  std::size_t i = 0;
+  while (i + 1 < kScales && cell_s_ * static_cast<double>(std::size_t{1} << i) < over_s - 1e-9) ++i;
+  return scales_[i].squares_count;
 }
 
 Line Trend::through(std::size_t begin, std::size_t end, double cell_variance) const noexcept {

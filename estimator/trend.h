@@ -44,6 +44,8 @@ class Trend {
   // noise that is correlated from sample to sample (frames slower than samples, rounding) counts
   // for what it is.
   double density(double over_s) const noexcept;
+  // How many differences of means over this time have been seen.
+  double squares(double over_s) const noexcept;
   // The longest line that ends now. Not valid before a few cells have come.
   Line line() const noexcept;
 
@@ -57,8 +59,14 @@ class Trend {
     int count = 0;
     std::array<double, 3> means{};
     std::array<double, 3> slips{};
-    double squares = 0.0;
     double squares_count = 0.0;
+    double mean_square = 0.0;
+    struct Bin {
+      double count = 0.0, sum = 0.0;
+    };
+    std::array<Bin, 64> bins{};  // squares by their power of two
+    int first_bin = 0, last_bin = 0;
+    void take(double square) noexcept;
   };
   static constexpr int kScales = 9;  // up to 256 cells
   void add(double t_s, double value, double slip_percent) noexcept;

@@ -8,7 +8,9 @@
 #include <random>
 #include <vector>
 
+#include "estimator/follow_on.h"
 #include "estimator/step_watch.h"
+#include "estimator/trend.h"
 
 namespace beltgrip::estimator {
 namespace {
@@ -74,23 +76,87 @@ TEST(CurveHealth, ResidualsOfNoiseAreNoneOfACurve) {
 }
 
 TEST(StepWatch, SeesAStepAndNoDriftAndNoneWhereSlipMoves) {
-  const auto steps = [](double (*torque)(double), double slip_rate) {
+  const auto steps = [](double (*torque)(double), double (*slip)(double)) {
     std::mt19937_64 random(1);
     std::normal_distribution<double> normal;
     StepWatch watch(200.0);
+    Trend trend(200.0, 4096);
     bool seen = false;
     for (int i = 0; i < 4000; ++i) {
       const double t = i / 200.0;
-      seen |= watch.step(torque(t) + 0.3 * normal(random), slip_rate * t, 3000.0, 0.09 / 200.0);
+      const double value = torque(t) + 0.3 * normal(random);
+      trend.step(t, value, slip(t));
+      seen |= watch.step(value, slip(t), 1e-6, trend);
     }
     return seen;
   };
-  EXPECT_TRUE(steps([](double t) { return t < 10.0 ? 50.0 : 53.0; }, 0.0));
-  EXPECT_TRUE(steps([](double t) { return t < 10.0 ? -50.0 : -47.0; }, 0.0));
-  EXPECT_FALSE(steps([](double t) { return t < 10.0 ? 50.0 : 51.0; }, 0.0));
-  EXPECT_FALSE(steps([](double t) { return 50.0 - 2.0 * t; }, 0.0));
-  EXPECT_FALSE(steps([](double t) { return 50.0 + 0.5 * std::sin(4.0 * t); }, 0.0));
-  EXPECT_FALSE(steps([](double t) { return t < 10.0 ? 50.0 : 53.0; }, 2.0));
+  const auto still = [](double) { return 0.3; };
+  const auto up = [](double t) { return t < 10.0 ? 50.0 : 53.0; };
+  EXPECT_TRUE(steps(up, still));
+  EXPECT_TRUE(steps([](double t) { return t < 10.0 ? -50.0 : -47.0; }, still));
+  EXPECT_FALSE(steps([](double t) { return t < 10.0 ? 50.0 : 51.0; }, still));
+  EXPECT_FALSE(steps([](double t) { return 50.0 - 2.0 * t; }, still));
+  EXPECT_FALSE(steps([](double t) { return 50.0 + 0.5 * std::sin(4.0 * t); }, still));
+  EXPECT_FALSE(steps(up, [](double t) { return 2.0 * t; }));
+  // A torque that falls as slip begins to grow speeds some inertia up; one that rises does not.
+  const auto down = [](double t) { return t < 10.0 ? 50.0 : 47.0; };
+  const auto creeps = [](double t) { return 0.3 + 0.2 * std::max(0.0, t - 9.7); };
+  EXPECT_TRUE(steps(down, still));
+  EXPECT_FALSE(steps(down, creeps));
+  EXPECT_TRUE(steps(up, creeps));
+}
+
+TEST(Trend, LearnsTheNoiseBesideAStepAndACorner) {
+  const auto density = [](double (*course)(double)) {
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal;
+    Trend trend(200.0, 4096);
+    for (int i = 0; i < 4000; ++i) {
+      const double t = i / 200.0;
+      trend.step(t, course(t) + 0.3 * normal(random), 0.0);
+    }
+    return trend.density(0.2);
+  };
+  constexpr double kTruth = 0.09 / 200.0;
+  EXPECT_NEAR(density([](double) { return 50.0; }), kTruth, 0.5 * kTruth);
+  EXPECT_LT(density([](double t) { return 50.0 * std::min(1.0, t); }), 2.0 * kTruth);
+  EXPECT_LT(density([](double t) { return t < 10.0 ? 50.0 : 53.0; }), 2.0 * kTruth);
+}
+
+// Slip runs from 10 s on and is stopped 0.1 s later; mu* is c T / F with c = 6.
+TEST(FollowOn, TellsSlipThatComesToAStandFromSlipThatGoesOn) {
+  constexpr double kStop_s = 10.1;
+  const auto stood = [](double (*slip)(double), double (*force_N)(double)) {
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal;
+    ExperimentRecord record(200.0);
+    FollowOn follow_on;
+    for (int i = 0; i < 2200; ++i) {
+      const double t = i / 200.0;
+      const Cell sample{.t_s = t,
+                        .slip_percent = slip(t) + 0.02 * normal(random),
+                        .torque_Nm = 50.0 + 0.3 * normal(random),
+                        .clamp_force_N = force_N(t) + 30.0 * normal(random),
+                        .omega_p_rad_s = 105.0 + 0.02 * normal(random)};
+      if (t < kStop_s) {
+        record.step(sample);
+      } else {
+        follow_on.begin(record);
+        follow_on.step(sample);
+      }
+    }
+    EXPECT_FALSE(follow_on.waits());
+    return follow_on.stood_still(0.1, 6.0, 0.0);
+  };
+  const auto lowered = [](double t) { return 3300.0 - 30.0 * t; };  // 2997 N at the stop
+  const auto drift = [](double t) { return 1.0 + 2.5 * std::clamp(t - 10.0, 0.0, 0.3); };
+  const auto slipping = [](double t) { return 1.0 + 2.5 * std::max(t - 10.0, 0.0); };
+  EXPECT_TRUE(stood(drift, lowered));
+  EXPECT_FALSE(stood(slipping, lowered));
+  // Clamped again it comes to a stand as well.
+  EXPECT_FALSE(stood(drift, [](double t) {
+    return 3300.0 - 30.0 * t + 2000.0 * std::clamp(t - 10.15, 0.0, 0.3);
+  }));
 }
 
 }  // namespace
