@@ -355,7 +355,7 @@ TEST_F(Diagnose, FrictionThatNoBeltHasAndTorquesThatFightAreSaidAndNotNamed) {
   const json pressure = scaled("secondary_pressure[", 1000.0);
   EXPECT_EQ(pressure.at("verdict"), "unexplained");
   EXPECT_EQ(pressure.at("findings").size(), 0U);
-  EXPECT_NE(notes(pressure).find("which no belt has"), std::string::npos) << notes(pressure);
+  EXPECT_NE(notes(pressure).find("which no belt drive has"), std::string::npos) << notes(pressure);
   const json torque = scaled("primary_torque[", -1.0);
   EXPECT_EQ(torque.at("findings").size(), 0U);
   EXPECT_NE(notes(torque).find("opposite sign"), std::string::npos) << notes(torque);

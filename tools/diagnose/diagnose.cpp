@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/clamp_force.h"
 #include "tools/diagnose/engine.h"
 #include "tools/diagnose/gain.h"
 #include "tools/diagnose/namer.h"
@@ -13,11 +14,12 @@
 namespace beltgrip::diagnose {
 namespace {
 
-constexpr int kSamplesMin = 100;                  // 10 s of usable data
-constexpr std::size_t kExperimentsMin = 3;        // from where on their scatter is known
-constexpr double kMuLeast = 0.03, kMuMost = 0.3;  // of any belt
-constexpr double kDetectable = 5.0;               // sigmas: found with 90 % and more
-constexpr double kRealistic = 3.0;                // in usual sizes: an effect is hardly ever larger
+constexpr int kSamplesMin = 100;            // 10 s of usable data
+constexpr std::size_t kExperimentsMin = 3;  // from where on their scatter is known
+constexpr double kMuMost = 0.4;             // friction of any belt, and more
+constexpr double kPressureMost_Pa = 200e5;  // three times what variators have
+constexpr double kDetectable = 5.0;         // sigmas: found with 90 % and more
+constexpr double kRealistic = 3.0;          // in usual sizes: an effect is hardly ever larger
 
 double quantile_975(double degrees) {
   double low = 0.0, high = 100.0;
@@ -69,6 +71,7 @@ class Run {
       nothing_identifiable("too little data");
       return std::move(answer_);
     }
+    check_friction(runs);
     progress(0.1, "fit");
     Engine engine(make_campaign(std::move(runs), request_.model));
     Naming naming = name_effects(engine, stop(), request_.jobs);
@@ -187,12 +190,31 @@ class Run {
     impossible_ = Unexplained{"torque", {"secondary_torque"}, 1.0};
   }
 
-  void check_friction(const ModelState& nominal) {
-    const double mu_max = std::exp(nominal.nuisance[kLnMuMax]);
-    if (mu_max > kMuLeast && mu_max < kMuMost) return;
-    out().notes.push_back("mu_max would be " + text_of(mu_max) +
-                          ", which no belt has: unit or scale of the pressure or the torque, or "
-                          "secondary_piston_area_m2 of [variator]?");
+  // By what was measured alone: the fitted mu_max may lie far beyond what the data reached.
+  void check_friction(const std::vector<ExperimentData>& runs) {
+    const estimator::VariatorParameters& variator = request_.model.variator;
+    std::vector<double> mu;
+    double highest_Pa = 0.0;
+    for (const ExperimentData& run : runs) {
+      for (int k = 0; k < run.size(); ++k) {
+        if (!run.valid[static_cast<std::size_t>(k)]) continue;
+        const bool low = run.stop[static_cast<std::size_t>(k)] == kLowStop;
+        const double radius_m =
+            low ? variator.primary_radius_low_m : variator.primary_radius_overdrive_m;
+        const double force_N = estimator::secondary_clamp_force_N(variator, run.pressure.value[k],
+                                                                  run.omega_s.value[k]);
+        mu.push_back(std::abs(run.torque.value[k]) * std::cos(variator.half_wedge_angle_rad) /
+                     (2.0 * radius_m * std::max(force_N, 1.0)));
+        highest_Pa = std::max(highest_Pa, run.pressure.value[k]);
+      }
+    }
+    const auto top = mu.begin() + static_cast<std::ptrdiff_t>(mu.size() * 99 / 100);
+    std::nth_element(mu.begin(), top, mu.end());
+    if (*top < kMuMost && highest_Pa < kPressureMost_Pa) return;
+    out().notes.push_back("friction comes to " + text_of(*top) + " and the pressure to " +
+                          text_of(highest_Pa / 1e5) +
+                          " bar, which no belt drive has: unit or scale of the pressure or the "
+                          "torque, or secondary_piston_area_m2 of [variator]?");
     impossible_ = Unexplained{"friction", {"secondary_pressure", "torque"}, 1.0};
   }
 
@@ -207,7 +229,6 @@ class Run {
     fill_baseline(engine, naming);
     out().simulation = simulated_signals(campaign, naming.nominal);
     fill_not_identifiable(engine, naming);
-    check_friction(naming.nominal);
     if (impossible_) {
       nothing_identifiable("the data cannot be of one belt as configured");
       out().verdict = Verdict::kUnexplained;
