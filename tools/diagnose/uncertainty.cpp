@@ -10,9 +10,10 @@ namespace {
 
 using Eigen::Index;
 
-// One sigma of what the equations themselves leave out (grid of a tenth of a second, slow copies of
-// fast signals, one form where nature has another), as a share of the size: no size is surer.
-constexpr double kEquationShare = 0.01;
+// One sigma of what the equations themselves leave out (a grid of a tenth of a second, one form
+// where nature has another), as a share of the size: no size is surer. A delay or a lag works on
+// slow copies of signals: where these step, their steps are too gentle, and the delay seems longer.
+constexpr double kEquationShare = 0.01, kDelayShare = 0.1;
 
 bool below_peak(int parameter) {
   if (parameter < kShapeOverdrive || parameter > kEndOfShapes) return false;
@@ -51,7 +52,9 @@ std::vector<Uncertainty> uncertainties(const Engine& engine, const Hypothesis& h
     const double sampled = disagree ? left_out.spread[i] : noise;
     const double degrees =
         disagree ? std::min(hypothesis.degrees[i], between) : hypothesis.degrees[i];
-    const double equation = kEquationShare * hypothesis.state.effects[slot];
+    const bool is_time = engine.campaign().slots[static_cast<std::size_t>(slot)].row->unit == "s";
+    const double equation =
+        (is_time ? kDelayShare : kEquationShare) * hypothesis.state.effects[slot];
     const double variance = sampled * sampled +
                             common_departure(engine, hypothesis.fit, column) * scale * scale +
                             equation * equation;
