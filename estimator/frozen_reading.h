@@ -33,9 +33,9 @@ class FrozenReading {
   }
 
  private:
-  static constexpr double kLeast_s = 0.5;
+  static constexpr double kLeast_s = 0.15;
   static constexpr double kNever_s = 5.0;  // with one value since the beginning
-  static constexpr long kFewest = 20, kTimesLongest = 10;
+  static constexpr long kFewest = 20, kTimesLongest = 5;
 
   long least_samples_, never_samples_;
   long run_ = 0;      // samples since the last change

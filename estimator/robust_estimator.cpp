@@ -67,6 +67,8 @@ class RobustEstimator final : public SlipCurveEstimator {
         peak_forecast_(settings.sample_rate_hz),
         pressure_reading_(settings.sample_rate_hz),
         torque_reading_(settings.sample_rate_hz),
+        omega_p_reading_(settings.sample_rate_hz),
+        omega_s_reading_(settings.sample_rate_hz),
         omega_p_gate_(settings.sample_rate_hz),
         omega_s_gate_(settings.sample_rate_hz),
         torque_gate_(settings.sample_rate_hz),
@@ -80,6 +82,8 @@ class RobustEstimator final : public SlipCurveEstimator {
     record_.reset();
     pressure_reading_.reset();
     torque_reading_.reset();
+    omega_p_reading_.reset();
+    omega_s_reading_.reset();
     omega_p_gate_.reset();
     omega_s_gate_.reset();
     torque_gate_.reset();
@@ -121,6 +125,8 @@ class RobustEstimator final : public SlipCurveEstimator {
     }
     pressure_reading_.step(read.secondary_pressure_Pa);
     torque_reading_.step(read.torque_Nm);
+    omega_p_reading_.step(read.omega_p_rad_s);
+    omega_s_reading_.step(read.omega_s_rad_s);
     const bool cell = record_.step(cell_of(sample));
     if (cell) decide();
     if (peak_forecast_.step()) expect();
@@ -224,7 +230,8 @@ class RobustEstimator final : public SlipCurveEstimator {
         pressure_reading_.frozen() ||
         (out_.mu_star < kClimb * first_mu_ && out_.clamp_force_N > kLowered * first_force_N_);
     if ((out_.stop == StopReason::kSlope && still) ||
-        (out_.stop != StopReason::kNone && (torque_frozen() || !is_possible(out_.mu_star)))) {
+        (out_.stop != StopReason::kNone &&
+         (torque_frozen() || speed_frozen() || !is_possible(out_.mu_star)))) {
       out_.stop = StopReason::kInputs;
     }
     out_.friction_slope = detector_.slope();
@@ -242,6 +249,10 @@ class RobustEstimator final : public SlipCurveEstimator {
 
   // What an engine's controller computes may stand still, a sensor's torque does not.
   bool torque_frozen() const noexcept { return torque_is_sensor_ && torque_reading_.frozen(); }
+  // Slip and inertia torque that are not there, in their place.
+  bool speed_frozen() const noexcept {
+    return omega_p_reading_.frozen() || omega_s_reading_.frozen();
+  }
 
   // What the curve so far says of its top, with the sensors' constant errors; enough for a stop?
   void expect() noexcept {
@@ -293,7 +304,7 @@ class RobustEstimator final : public SlipCurveEstimator {
 
   void judge() noexcept {
     if (out_.stop == StopReason::kInputs || out_.stop == StopReason::kRatio) return;
-    if (torque_frozen()) return;
+    if (torque_frozen() || speed_frozen()) return;
     const PeakFitResult& fit = fit_.result();
     peak_ = {};
     // Torque that fades is no friction that falls.
@@ -357,7 +368,7 @@ class RobustEstimator final : public SlipCurveEstimator {
   std::size_t next_after_ = 0;  // to join the record
   PeakFit fit_;
   PeakForecast peak_forecast_;
-  FrozenReading pressure_reading_, torque_reading_;
+  FrozenReading pressure_reading_, torque_reading_, omega_p_reading_, omega_s_reading_;
   GlitchGate omega_p_gate_, omega_s_gate_, torque_gate_;
   bool torque_is_sensor_;
   CurveEstimate out_;

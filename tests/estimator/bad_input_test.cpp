@@ -140,6 +140,39 @@ INSTANTIATE_TEST_SUITE_P(Channels, FrozenChannel,
                                          Frozen{"Torque", &VariatorSample::torque_Nm}),
                          [](const auto& each) { return std::string(each.param.name); });
 
+// A third of a second before the stop is enough to be seen; without the speed that tells of slip
+// there may be no stop at all, and nothing that was seen later counts.
+TEST(BadInput, AChannelThatFreezesLateOrTellsOfNoSlipLeavesNothing) {
+  struct Late {
+    double VariatorSample::*channel;
+    double from_s;
+  };
+  const auto ends = [](const Late& late) {
+    const Rig rig = {.friction = test::round_peak(0.105, 2.5)};
+    const auto estimator = make_slip_curve_estimator(rig_settings(rig), {}, {});
+    double held = 0.0, stop_s = 0.0;
+    for (auto& point : rig_trace(rig)) {
+      double& value = point.sample.*late.channel;
+      stop_s = static_cast<double>(point.sample.t_ns) * 1e-9;
+      if (stop_s < late.from_s) held = value;
+      value = held;
+      if (estimator->step(point.sample).stop != StopReason::kNone) break;
+    }
+    for (int i = 0; i < 10000 && !estimator->conclude(); ++i) {
+    }
+    return std::pair(stop_s, estimator->peak().kind);
+  };
+  const auto [stop_s, kind] = ends({&VariatorSample::secondary_pressure_Pa, 1e9});
+  ASSERT_EQ(kind, PeakKind::kValue);
+  EXPECT_EQ(ends({&VariatorSample::secondary_pressure_Pa, stop_s - 0.35}).second, PeakKind::kNone);
+  for (const double from_s : {20.0, stop_s - 0.35}) {
+    for (double VariatorSample::*speed :
+         {&VariatorSample::omega_p_rad_s, &VariatorSample::omega_s_rad_s}) {
+      EXPECT_EQ(ends({speed, from_s}).second, PeakKind::kNone) << from_s;
+    }
+  }
+}
+
 // Readings that are wrong for 20 ms in mid ramp: a bad frame or two.
 class BadFrame : public testing::TestWithParam<Fault> {};
 

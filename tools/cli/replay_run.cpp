@@ -361,7 +361,7 @@ const char* why_no_value(const daemon::ExperimentResult& e) {
     default:
       return e.outcome == daemon::Outcome::kAborted
                  ? "the experiment was broken off"
-                 : "too short, or too little torque or clamp force, to say anything of mu_max";
+                 : "too short, or too little torque or clamp force, or an input that stood still";
   }
 }
 
