@@ -13,7 +13,7 @@ constexpr double kGroup_s = 0.02;
 constexpr double kForceDeviations = 3.0;
 // Further away slip moves on too fast for channels that are read one after the other.
 constexpr double kRunAway_percent = 1.0;
-constexpr double kSwingFrom_s = 0.02, kSwingTo_s = 0.08;
+constexpr double kSwingFrom_s = 0.02, kSwingTo_s = 0.08, kSwingShortest_s = 0.03;
 constexpr std::size_t kBeforeCells = 20, kSwingCells = 10;
 constexpr double kSwing_percent = 0.3, kSwingDeviations = 3.0, kSwingShare = 0.4;
 
@@ -87,9 +87,11 @@ void AfterStop::judge_group() noexcept {
 }
 
 bool AfterStop::swung_back() const noexcept {
-  if (swing_samples_ == 0) return false;
+  // The force was back too soon: that is no period of a rattle.
+  const double watched_s = kKeep_s * swing_samples_ / static_cast<double>(samples_.size());
+  if (watched_s < kSwingShortest_s) return false;
   const double gained = slip_at_end_percent_ - slip_before_percent_;
-  const double noise = std::sqrt(slip_noise_ / (kSwingTo_s - kSwingFrom_s));
+  const double noise = std::sqrt(slip_noise_ / watched_s);
   return gained > kSwing_percent + kSwingDeviations * noise &&
          swing_slip_percent_ / swing_samples_ < slip_before_percent_ + kSwingShare * gained;
 }
