@@ -22,6 +22,7 @@ ExperimentRecord::ExperimentRecord(double sample_rate_hz)
       torque_(sample_rate_hz, kTrendCells),
       omega_p_(sample_rate_hz, kTrendCells),
       slip_speed_(sample_rate_hz, kTrendCells),
+      held_(kTrendCells),
       torque_watch_(sample_rate_hz) {}
 
 void ExperimentRecord::reset() noexcept {
@@ -32,6 +33,8 @@ void ExperimentRecord::reset() noexcept {
   slip_speed_.reset();
   force_line_ = torque_line_ = {};
   torque_watch_.reset();
+  held_count_ = 0;
+  last_held_s_ = 0.0;
   first_force_N_ = 0.0;
   torque_stepped_ = false;
   torque_stepped_s_ = smooth_force_N_ = lowest_force_N_ = lowest_force_s_ = 0.0;
@@ -60,7 +63,12 @@ bool ExperimentRecord::step(const Cell& sample) noexcept {
   last_t_s_ = sample.t_s;
   const double slip = sample.slip_percent;
   if (force_.step(sample.t_s, sample.clamp_force_N, 0.0)) force_line_ = force_.line();
-  if (torque_.step(sample.t_s, sample.torque_Nm, slip)) torque_line_ = torque_.line();
+  if (torque_.step(sample.t_s, sample.torque_Nm, slip)) {
+    torque_line_ = torque_.line();
+    last_held_s_ = sample.t_s;
+    held_[held_count_++ % held_.size()] = {
+        torque_line_.at(last_held_s_), torque_line_.variance_at(last_held_s_), torque_line_.valid};
+  }
   // Before the force falls, the load is being taken up.
   if (force_line_.valid) {
     const double force_N = force_line_.at(sample.t_s);
@@ -75,6 +83,13 @@ bool ExperimentRecord::step(const Cell& sample) noexcept {
   slip_speed_.step(sample.t_s, slip * sample.omega_p_rad_s, 0.0);
   last_omega_rad_s_ = sample.omega_p_rad_s;
   return history_.step(sample);
+}
+
+ExperimentRecord::Held ExperimentRecord::torque_held_at(double t_s) const noexcept {
+  const double ago = std::ceil((last_held_s_ - t_s) / torque_.cell_s());
+  const auto cells = static_cast<std::size_t>(std::max(0.0, ago));
+  if (cells >= std::min(held_count_, held_.size())) return {};
+  return held_[(held_count_ - 1 - cells) % held_.size()];
 }
 
 }  // namespace beltgrip::estimator

@@ -3,6 +3,9 @@
 // memory is taken by the constructor.
 #pragma once
 
+#include <cstddef>
+#include <vector>
+
 #include "estimator/history.h"
 #include "estimator/step_watch.h"
 #include "estimator/trend.h"
@@ -22,6 +25,12 @@ class ExperimentRecord {
   // The straight lines that end now.
   const Line& force_line() const noexcept { return force_line_; }
   const Line& torque_line() const noexcept { return torque_line_; }
+  // Where the torque's line stood at t when it ended there: what was known of the torque then.
+  struct Held {
+    double torque_Nm = 0.0, variance = 0.0;
+    bool valid = false;
+  };
+  Held torque_held_at(double t_s) const noexcept;
   // Noise of the channels, as densities (variance of the mean over one second), without what is
   // true variation.
   double torque_noise() const noexcept { return torque_.density(kNoiseScale_s); }
@@ -29,6 +38,8 @@ class ExperimentRecord {
   double slip_noise() const noexcept {
     return slip_speed_.density(kNoiseScale_s) / (last_omega_rad_s_ * last_omega_rad_s_);
   }
+  // Degrees of freedom of that: differences of neighbouring means overlap by half.
+  double slip_noise_freedom() const noexcept { return 0.5 * slip_speed_.squares(0.0); }
   double omega_noise() const noexcept { return omega_p_.density(kNoiseScale_s); }
   // Clamp force at a cell: of the line where it reaches, else as measured.
   double clamp_force_N(const Cell& cell) const noexcept {
@@ -55,6 +66,9 @@ class ExperimentRecord {
   Trend force_, torque_, omega_p_;
   Trend slip_speed_;  // slip times speed
   Line force_line_, torque_line_;
+  std::vector<Held> held_;  // at the end of each cell of the torque's trend
+  std::size_t held_count_ = 0;
+  double last_held_s_ = 0.0;
   StepWatch torque_watch_;
   double first_force_N_ = 0.0;
   bool torque_stepped_ = false;

@@ -31,6 +31,24 @@ Weights engine_weights(double tau) {
           {1.0 - 4.0 * tau + 3.0 * tau * tau, 2.0 * tau - 3.0 * tau * tau}};
 }
 
+struct Known {
+  double value, variance;
+};
+
+// Torque on the belt as the window begins: of the readings just before it and of the line that the
+// torque had run along until then, by their variances. How far the two are apart counts as
+// uncertainty: a line that has begun to bend shows in the readings first.
+Known torque_at_begin(const ExperimentRecord& record, double begin_s, const Known& readings,
+                      double variation) {
+  const ExperimentRecord::Held line = record.torque_held_at(begin_s);
+  if (!line.valid) return readings;
+  const double line_variance = line.variance + variation;
+  const double share = readings.variance / (readings.variance + line_variance + kTiny);
+  const double apart = line.torque_Nm - readings.value;
+  return {readings.value + share * apart, square(share) * (line_variance + square(apart)) +
+                                              square(1.0 - share) * readings.variance};
+}
+
 }  // namespace
 
 StopDetector::StopDetector(const StopThresholds& limits) : limits_(limits) {
@@ -93,8 +111,14 @@ StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
   const double gained_variance = 2.0 * record.slip_noise() * per_quarter / cell_s;
   const double deformation =
       limits_.deformation_percent_per_N * std::abs(force_before - force_after);
+  // In a Gaussian's far tail: twice the logarithm of how much less often the window is a new one.
+  // While the noise itself is known from few data, Student's tail is as much longer (Wallace).
+  const double freedom = std::max(1.0, record.slip_noise_freedom());
+  const double normal_squared =
+      square(limits_.gain_deviations) - 2.0 * std::log(W / kShortestWindow_s);
+  const double gain_deviations_squared = freedom * std::expm1(normal_squared / freedom);
   if (out.gained < limits_.smallest_gain_percent + deformation ||
-      square(out.gained) < square(limits_.gain_deviations) * gained_variance) {
+      square(out.gained) < gain_deviations_squared * gained_variance) {
     return out;
   }
 
@@ -154,8 +178,8 @@ StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
   }
   N *= square(c_) / cell_s;
   // What is known of m_1 from before.
-  double m_1 = c_ * (engine ? T_1 : torque_before) / F_1;
-  double m_1_variance = density / W + std::max(0.0, square(torque_turn) - 4.0 * density / W);
+  double m_1 = c_ * T_1 / F_1;
+  double m_1_variance = hold_variance;
   if (engine) {
     N += square(c_ * line_share) * held.variance_at(record.duration_s()) * moments.sum *
          moments.sum.transpose();
@@ -164,8 +188,12 @@ StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
         (begin.omega_p_rad_s - history.cell(level, 2 * cells - 1).omega_p_rad_s) / span;
     const double rate_after = (history.cell(level, 0).omega_p_rad_s - begin.omega_p_rad_s) / W;
     m_1 -= c_ * inertia_ * rate_before / F_1;
-    m_1_variance = hold_variance + square(inertia_) * (square(rate_after - rate_before) +
-                                                       12.0 * record.omega_noise() / (W * W * W));
+    m_1_variance += square(inertia_) *
+                    (square(rate_after - rate_before) + 12.0 * record.omega_noise() / (W * W * W));
+  } else {
+    const Known torque = torque_at_begin(record, t_1, {torque_before, density / W}, variation / W);
+    m_1 = c_ * torque.value / F_1;
+    m_1_variance = torque.variance + std::max(0.0, square(torque_turn) - 4.0 * density / W);
   }
   m_1_variance = m_1_variance * square(c_ / F_1) + kTiny * square(m_1);
   N.diagonal() += kTiny * (y.cwiseAbs2() + Eigen::Vector2d::Constant(kTiny));
@@ -258,7 +286,7 @@ StopReason StopDetector::step(const ExperimentRecord& record) noexcept {
         std::max(1.0, slope.gained / limits_.large_gain_percent);
     if (slope.k + evidence * slope.k_deviation < slope.level ||
         slope.hold + 2.0 * slope.hold_deviation < slope.level) {
-      if (!level_) level_slip_ = slope.slip;
+      if (!level_) level_slip_ = slope.slip - slope.gained;
       level_ = true;
       level_until_s_ = std::max(level_until_s_, now_s + slope.duration_s);
     }

@@ -5,7 +5,9 @@
 // In a window that began at slip s_1 with mu* = m_1, the torque that the belt carries is
 //   c T_b = F (m_1 + k x),   x = s - s_1,   c = cos(theta) / (2 R_p)                 (equation 5)
 // T_b is measured; or it is the engine torque less J domega_p/dt. Two weighted moments over the
-// window and what is known of m_1 from before give m_1, k and their covariance. The weights do not
+// window and what is known of m_1 from before give m_1, k and their covariance. Before the peak the
+// belt carries what it is loaded with: the line that the torque had run along until the window
+// began says more about m_1 than the readings just before it. The weights do not
 // depend on the noisy slip: noise in the regressor does not flatten the slope (instrumental
 // variables). With an engine torque they vanish at both ends, so that integration by parts moves
 // the derivative from the speed to the weights.
@@ -37,19 +39,21 @@ struct StopThresholds {
   double base_deviations = 1.0;
   double deviations_per_e = 0.8;
   double most_deviations = 3.5;
-  double large_gain_percent = 0.7;
+  double large_gain_percent = 0.4;
   // For "falling" never less than:
-  double falling_deviations = 2.7;
-  // Slip by which a level curve is followed on, in search of its fall; where slip runs away, by
-  // what it will gain this much later.
-  double follow_percent = 0.65;
+  double falling_deviations = 3.0;
+  // Slip by which a level curve is followed on, in search of its fall, from where the window that
+  // showed it begins; where slip runs away, by what it will gain this much later.
+  double follow_percent = 1.1;
   double ahead_s = 0.07;
-  // A window is looked at where slip has grown by this much, and by this many deviations.
-  // Deformation moves the slip by itself as the clamp force falls: by so much at most, which counts
-  // for nothing.
+  // A window is looked at where slip has grown by this much, and by so many deviations that noise
+  // alone does so in one look of three million: an experiment has thousands of looks at the
+  // shortest windows. A longer one is new less often in proportion, and may err more often in
+  // proportion. Deformation moves the slip by itself as the clamp force falls: by so much at most,
+  // which counts for nothing.
   double smallest_gain_percent = 0.2;
   double deformation_percent_per_N = 4e-4;
-  double gain_deviations = 6.0;
+  double gain_deviations = 5.0;
   // Backups: slip above its smallest value; slip that will be reached this much later.
   double backup_slip_percent = 7.5;
   double backup_ahead_s = 0.15;

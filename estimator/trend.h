@@ -46,6 +46,7 @@ class Trend {
   double density(double over_s) const noexcept;
   // How many differences of means over this time have been seen.
   double squares(double over_s) const noexcept;
+  double cell_s() const noexcept { return cell_s_; }
   // The longest line that ends now. Not valid before a few cells have come.
   Line line() const noexcept;
 

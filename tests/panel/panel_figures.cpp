@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <thread>
 
@@ -12,7 +13,8 @@ namespace {
 using estimator::Method;
 using estimator::PeakKind;
 
-constexpr double kSlowRamp_N_per_s = 300.0;  // slip at the stop is judged up to this
+constexpr double kSlowRamp_N_per_s = 300.0;         // slip at the stop is judged up to this
+constexpr double kLeastSpeed_rad_s = 0.85 * 105.0;  // the daemon's, by default; slower: it ends
 constexpr double kBoundWanted = 0.97;
 constexpr double kOneSided99 = 2.326;
 constexpr std::size_t kOnePoint = static_cast<std::size_t>(1.0 / kPastStep_percent + 0.5);
@@ -48,6 +50,10 @@ Judged judge(Scenario scenario, const JudgeOptions& options) {
   const RunOptions paper{.method = Method::kPaper, .with_accuracies = options.biased};
   Judged out;
   out.has_peak = trace.peak_reached;
+  if (out.has_peak) {
+    const auto at = static_cast<std::size_t>(trace.t_peak_s * scenario.sample_rate_hz);
+    out.omega_p_at_peak_rad_s = trace.samples[std::min(at, trace.samples.size() - 1)].omega_p_rad_s;
+  }
   out.robust = run(scenario, trace, robust);
   if (options.paper) out.paper = run(scenario, trace, paper);
   out.bound = mu_max_bound(scenario, trace, out.robust.stop_s);
@@ -184,6 +190,27 @@ void print_table(std::FILE* out, const std::vector<Judged>& traces, bool paper) 
                    f.bias, f.sd, f.p95, f.bound, f.sd_by_bound, f.covered, f.others, f.other_value,
                    f.bound_right, f.bound_share, f.bound_possible, f.bound_share_carried,
                    f.carried);
+    }
+  }
+}
+
+void print_stops_by_speed(std::FILE* out, const std::vector<Judged>& traces) {
+  std::fprintf(
+      out,
+      "| primary at the peak | noise | peaks | stop | early | past the peak p50 / p90 / p99 "
+      "| > 10 %% |\n|---|---|---|---|---|---|---|\n");
+  for (const bool fast : {true, false}) {
+    std::vector<Judged> some;
+    std::copy_if(traces.begin(), traces.end(), std::back_inserter(some), [fast](const Judged& t) {
+      return t.has_peak && (t.omega_p_at_peak_rad_s >= kLeastSpeed_rad_s) == fast;
+    });
+    for (int i = -1; i < kNoiseClasses; ++i) {
+      const auto noise = static_cast<NoiseClass>(std::max(0, i));
+      const Figures f = figures(some, Method::kRobust, i < 0 ? std::nullopt : std::optional(noise));
+      std::fprintf(
+          out, "| %s %.0f rad/s | %s | %d | %.1f %% | %.1f %% | %.2f / %.2f / %.2f | %.1f %% |\n",
+          fast ? "from" : "below", kLeastSpeed_rad_s, i < 0 ? "all" : noise_name(noise), f.peaks,
+          f.stopped, f.early, f.past_p50, f.past_p90, f.past_p99, f.beyond_10);
     }
   }
 }

@@ -15,6 +15,7 @@ namespace beltgrip::panel {
 struct Judged {  // one trace
   Scenario scenario;
   bool has_peak = false;
+  double omega_p_at_peak_rad_s = 0.0;
   Outcome paper, robust;
   double bound = 0.0;  // of the relative deviation of mu_max, from the data up to robust's stop
   double reached_bound = 0.0;  // the same of the largest mu*, where there is no peak
@@ -61,7 +62,9 @@ inline constexpr double kBoundCounts = 0.05;
 Figures figures(const std::vector<Judged>& traces, estimator::Method method,
                 std::optional<NoiseClass> noise);
 void print_table(std::FILE* out, const std::vector<Judged>& traces, bool paper);
-// One line per trace and method. False if it could not be written.
+// The stop of robust where the primary still turned, at the peak, as fast as the daemon asks in an
+// experiment, and where it was pulled below that.
+void print_stops_by_speed(std::FILE* out, const std::vector<Judged>& traces);
 // Before the peak: how often, how right and how wide the interval was.
 void print_forecasts(std::FILE* out, const std::vector<Judged>& traces);
 struct ForecastFigures {
@@ -87,6 +90,7 @@ DisturbedFigures disturbed_figures(const std::vector<Judged>& traces,
 void print_disturbed(std::FILE* out, const std::vector<Judged>& traces);
 // With stop = "confidence": how often it ended so, where, and how right.
 void print_confidence(std::FILE* out, const std::vector<Judged>& traces);
+// One line per trace and method. False if it could not be written.
 bool write_csv(const char* path, const std::vector<Judged>& traces, bool paper);
 
 }  // namespace beltgrip::panel

@@ -93,6 +93,7 @@ int main(int argc, char** argv) {
     return 0;
   }
   print_table(stdout, traces, options.paper);
+  print_stops_by_speed(stdout, traces);
   if (options.confidence_width > 0.0) {
     print_confidence(stdout, traces);
   } else {
