@@ -26,15 +26,18 @@ class FrozenReading {
     ++values_;
     last_ = value;
   }
-  // Never so where the reading has changed a few times only: it comes in coarse steps.
+  // Never so where the reading has changed a few times only: it comes in coarse steps, or is held.
   bool frozen() const noexcept {
-    if (values_ == 1) return run_ >= never_samples_;
-    return values_ > kFewest && run_ >= std::max(least_samples_, kTimesLongest * longest_);
+    return moves() && run_ >= std::max(least_samples_, kTimesLongest * longest_);
   }
+  // One value since the beginning: frozen as well where other readings move, else data without
+  // noise.
+  bool never_moved() const noexcept { return values_ == 1 && run_ >= never_samples_; }
+  bool moves() const noexcept { return values_ > kFewest; }
 
  private:
   static constexpr double kLeast_s = 0.15;
-  static constexpr double kNever_s = 5.0;  // with one value since the beginning
+  static constexpr double kNever_s = 5.0;
   static constexpr long kFewest = 20, kTimesLongest = 5;
 
   long least_samples_, never_samples_;

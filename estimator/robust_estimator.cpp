@@ -248,7 +248,10 @@ class RobustEstimator final : public SlipCurveEstimator {
   }
 
   // What an engine's controller computes may stand still, a sensor's torque does not.
-  bool torque_frozen() const noexcept { return torque_is_sensor_ && torque_reading_.frozen(); }
+  bool torque_frozen() const noexcept {
+    return torque_is_sensor_ && (torque_reading_.frozen() ||
+                                 (torque_reading_.never_moved() && omega_p_reading_.moves()));
+  }
   // Slip and inertia torque that are not there, in their place.
   bool speed_frozen() const noexcept {
     return omega_p_reading_.frozen() || omega_s_reading_.frozen();
