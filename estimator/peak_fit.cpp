@@ -301,6 +301,10 @@ void PeakFit::add_point(std::size_t begin, std::size_t end) noexcept {
   const double traction = c_ / point.force_N;
   point.mu = traction * torque;
   point.variance = std::max(square(traction) * variance, 1e-12);
+  if (point.t_s < record_->force_line().begin_s) {
+    point.force_variance = square(point.mu / point.force_N) *
+                           record_->force().density(point.duration_s) / point.duration_s;
+  }
   if (point_count_ == points_.size()) {
     std::copy(points_.begin() + kMostPoints, points_.end(), points_.begin());
     point_count_ = kMostPoints;
@@ -686,7 +690,7 @@ void PeakFit::sum_for_health() noexcept {
   for (std::size_t i = begin; i < point_count_; ++i) {
     const Point& point = points_[i];
     if (point.t_s > until_s) break;
-    const double w = 1.0 / point.variance;
+    const double w = 1.0 / (point.variance + point.force_variance);
     const CurveSums& before = health_sums_[health_count_ - 1];
     health_sums_[health_count_++] = {.weight = before.weight + w,
                                      .slip = before.slip + w * point.slip,
@@ -708,8 +712,8 @@ void PeakFit::test_best_form() noexcept {
     const double fitted = fitted_at(point.slip - slip_high_);
     // Further down deformation makes of it what is no function of slip any more.
     if (fitted < kNearTop * result_.mu) continue;
-    residuals_[used++] =
-        (point.mu - fitted) / std::sqrt(point.variance + square(kFormTolerance * fitted));
+    residuals_[used++] = (point.mu - fitted) / std::sqrt(point.variance + point.force_variance +
+                                                         square(kFormTolerance * fitted));
   }
   result_.residuals = test_residuals({residuals_.data(), used});
 }

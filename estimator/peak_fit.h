@@ -61,7 +61,8 @@ class PeakFit {
  private:
   struct Point {  // means over a stretch of time
     double t_s, slip, mu, force_N, duration_s;
-    double variance;  // of mu, with what the noise in slip does to it
+    double variance;        // of mu, with what the noise in slip does to it
+    double force_variance;  // of mu, by readings of the force where its line does not reach
     double held_share;
     double torque_Nm;             // that the belt carries
     double torque_variance;       // of it, without
