@@ -128,7 +128,7 @@ TEST(ValueAfterTheStop, IsFoundWhereTheCurveUpToTheStopLeavesThePeakOpen) {
   int cut = 0, whole = 0;
   for (const double noise : {1.0, 4.0}) {
     for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-      const test::Rig rig{.friction = test::tent(0.105, 4.0, 5e-4),
+      const test::Rig rig{.friction = test::tent(0.105, 4.0, 4e-4),
                           .ramp_N_per_s = 30.0,
                           .noise = noise,
                           .seed = seed};
