@@ -15,8 +15,10 @@ using Eigen::VectorXd;
 
 constexpr double kSaturatedPrecision = 50.0;
 constexpr std::array<double, 3> kCoarseness{30.0, 8.0, 2.0};
-constexpr int kAttempts = 10;       // to find a step that gains, each shorter than the last
-constexpr double kSizePrior = 3.0;  // one sigma of an effect's size, in usual sizes
+constexpr int kAttempts = 10;        // to find a step that gains, each shorter than the last
+constexpr double kLongStep = 0.05;   // in tolerances and usual sizes
+constexpr double kWorthwhile = 1.0;  // of the log likelihood
+constexpr double kSizePrior = 3.0;   // one sigma of an effect's size, in usual sizes
 
 bool stop_used(const Campaign& campaign, int stop) {
   for (const ExperimentData& run : campaign.runs) {
@@ -184,16 +186,27 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
       damped.precision += damping * diagonal;
       damped.pull = here.pull.cwiseProduct(here.precision).cwiseQuotient(damped.precision);
       const Fit step = fit_linear(best.summaries, columns, damped, best.fit.scatter, 0);
-      ModelState next = best.state;
-      move(parameters, step.step, 1.0, next);
-      std::vector<Residuals> there = residuals_at(next);
-      gained = standing(next, summaries_at(next, there, {}), best.fit.scatter) - best.objective;
-      moved = gained > 0.0;
-      damping = std::clamp(moved ? 0.1 * damping : 10.0 * damping, 1e-5, 1e6);
-      if (moved) {
-        best.state = next;
-        at = std::move(there);
+      const ModelState from = best.state;
+      gained = 0.0;
+      double share = 1.0;
+      // A long step for next to nothing has gone past what it was made for.
+      const bool is_long = step.step.cwiseAbs().maxCoeff() > kLongStep;
+      for (double tried = 1.0; tried > 0.1; tried *= 0.5) {
+        ModelState next = from;
+        move(parameters, step.step, tried, next);
+        std::vector<Residuals> there = residuals_at(next);
+        const double gain =
+            standing(next, summaries_at(next, there, {}), best.fit.scatter) - best.objective;
+        if (gain > gained) {
+          gained = gain;
+          share = tried;
+          best.state = next;
+          at = std::move(there);
+        }
+        if (gain <= 0.0 || gained > kWorthwhile || !is_long) break;
       }
+      moved = gained > 0.0;
+      damping = std::clamp(moved && share == 1.0 ? 0.1 * damping : 10.0 * damping, 1e-5, 1e6);
     }
     if (!moved) break;
     best.summaries = summaries_at(best.state, at, parameters);
@@ -366,11 +379,26 @@ std::vector<Score> Engine::screen() const {
   return out;
 }
 
+bool Engine::is_constant(int slot) const {
+  constexpr double kSame = 1.0 - 1e-6;  // squared cosine of the columns
+  const int column = columns_of({kNuisanceCount + slot}).front();
+  const std::vector<int> constants = columns_of(nuisances_);
+  return std::any_of(constants.begin(), constants.end(), [&](int constant) {
+    double own = 0.0, other = 0.0, both = 0.0;
+    for (const Summary& each : summaries_) {
+      own += each.aa(column, column);
+      other += each.aa(constant, constant);
+      both += each.aa(column, constant);
+    }
+    return own > 0.0 && both * both > kSame * own * other;
+  });
+}
+
 Engine::Replacement Engine::add(const std::vector<int>& slots) const {
   const std::vector<int> parameters = with_nuisances(slots);
   const Fit fit =
       fit_linear(summaries_, columns_of(parameters), prior(parameters, state_), base_.scatter, 3);
-  Replacement out{2.0 * (fit.log_likelihood - base_.log_likelihood), state_};
+  Replacement out{2.0 * (fit.log_likelihood - base_.log_likelihood), state_, state_};
   move(parameters, fit.step, 1.0, out.state);
   return out;
 }
@@ -396,11 +424,18 @@ std::vector<Summary> Engine::summaries_without(const std::vector<int>& slots) co
 
 Engine::Replacement Engine::replace(const std::vector<int>& slots, int instead_of) const {
   const std::vector<int> parameters = with_nuisances(slots);
-  const Fit fit = fit_linear(summaries_without({instead_of}), columns_of(parameters),
-                             prior(parameters, state_), base_.scatter, 3);
-  Replacement out{2.0 * (fit.log_likelihood - base_.log_likelihood), state_};
+  const std::vector<Summary> without = summaries_without({instead_of});
+  const Fit fit =
+      fit_linear(without, columns_of(parameters), prior(parameters, state_), base_.scatter, 3);
+  Replacement out{2.0 * (fit.log_likelihood - base_.log_likelihood), state_, state_};
   out.state.effects[instead_of] = 0.0;
+  out.beside = out.state;
   move(parameters, fit.step, 1.0, out.state);
+  if (slots.empty()) return out;
+  const std::vector<int> alone(parameters.end() - static_cast<std::ptrdiff_t>(slots.size()),
+                               parameters.end());
+  move(alone, fit_linear(without, columns_of(alone), prior(alone, state_), base_.scatter, 0).step,
+       1.0, out.beside);
   return out;
 }
 

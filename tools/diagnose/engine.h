@@ -58,7 +58,8 @@ class Engine {
   // Of `slots` in place of the accepted one `instead_of`, whose size goes back to zero.
   struct Replacement {
     double gain = 0.0;
-    ModelState state;  // of the linear fit: a start for refine_from
+    ModelState state;   // of the linear fit: a start for refine_from
+    ModelState beside;  // another: the machine's constants stay, the effects alone are fitted
   };
   Replacement add(const std::vector<int>& slots) const;
   Replacement replace(const std::vector<int>& slots, int instead_of) const;
@@ -72,6 +73,9 @@ class Engine {
   double left_out_gain(int without) const;
   // The same of the whole set over none, per experiment.
   std::vector<double> left_out_gains() const;
+
+  // An effect that does what a constant of the machine does, under another name.
+  bool is_constant(int slot) const;
 
   double scale(int parameter) const;
   Prior prior(const std::vector<int>& parameters, const ModelState& at) const;

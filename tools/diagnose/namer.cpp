@@ -35,10 +35,12 @@ constexpr double kShareOfFirst = 0.02;
 // More: in these experiments the effect is no other thing than a friction curve that runs
 // otherwise.
 constexpr double kInCurveMax = 0.998;
+constexpr double kHeld = 0.5;
 constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
-constexpr double kDisagreement = 1e-3;  // p of a size that experiments do not agree on
-constexpr double kLeftOutMin = 0.0;     // of the log predictive density
-constexpr double kRippleMin = 3e-5;     // of the speed: less is of no consequence for slip
+constexpr double kDisagreement = 1e-3;   // p of a size that experiments do not agree on
+constexpr double kLeftOutMin = 0.0;      // of the log predictive density
+constexpr double kLeftOutPlain = 200.0;  // the same: beyond doubt, however few experiments show it
+constexpr double kRippleMin = 3e-5;      // of the speed: less is of no consequence for slip
 
 constexpr std::array kConstants{kDeformationPerkN, kLossConstant_Nm, kLossPerSpeed_Nms,
                                 kLnRatioOverdrive, kLnRatioLow};
@@ -100,18 +102,21 @@ bool bends_machine(const Engine& engine, const Hypothesis& h) {
 }
 
 // A size that no machine has is one where the data do not hold the fit; one far below the usual is
-// of no consequence, however sure; one below the time between two samples is the sampling's own.
+// of no consequence, however sure; a value that is held from one sample to the next is late by half
+// the time between them.
+bool credible(const Engine& engine, int slot, double size) {
+  const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
+  const EffectRow& row = *which.row;
+  const double share = std::abs(size) / row.typical;
+  if (std::abs(size) < kHeld * sample_period_s(engine.campaign(), which)) return false;
+  return share > kOfConsequence && share < kBelievable && size < row.high &&
+         (size > row.low || row.low == 0.0);
+}
+
 bool credible(const Engine& engine, const Hypothesis& h) {
   if (bends_machine(engine, h)) return false;
-  return std::all_of(h.slots.begin(), h.slots.end(), [&](int slot) {
-    const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
-    const EffectRow& row = *which.row;
-    const double size = h.state.effects[slot];
-    const double share = std::abs(size) / row.typical;
-    if (std::abs(size) < sample_period_s(engine.campaign(), which)) return false;
-    return share > kOfConsequence && share < kBelievable && size < row.high &&
-           (size > row.low || row.low == 0.0);
-  });
+  return std::all_of(h.slots.begin(), h.slots.end(),
+                     [&](int slot) { return credible(engine, slot, h.state.effects[slot]); });
 }
 
 double ln_sum(const std::vector<double>& ln_values) {
@@ -121,8 +126,16 @@ double ln_sum(const std::vector<double>& ln_values) {
   return top + std::log(sum);
 }
 
-// The group that explains what the best hypothesis cannot, if there is one. An effect's own
-// dependence is no other cause: there its equation only has another shape.
+// An effect's own dependence is no other cause: there its equation only has another shape.
+bool is_own(const Engine& engine, const std::vector<int>& slots, const UnknownGroup& group) {
+  return std::any_of(slots.begin(), slots.end(), [&](int slot) {
+    const EffectRow& row = *engine.campaign().slots[static_cast<std::size_t>(slot)].row;
+    return row.acts_on == group.acts_on &&
+           row.depends_on.find(group.depends_on) != std::string_view::npos;
+  });
+}
+
+// The group that explains what the best hypothesis cannot, if there is one.
 std::optional<UnknownGroup> better_group(const Engine& engine, const Hypothesis& best, double gain,
                                          double threshold) {
   const double certainty = *std::min_element(best.chi2.begin(), best.chi2.end());
@@ -132,14 +145,17 @@ std::optional<UnknownGroup> better_group(const Engine& engine, const Hypothesis&
         group.left_out_gain <= kLeftOutMin) {
       continue;
     }
-    const bool own = std::any_of(best.slots.begin(), best.slots.end(), [&](int slot) {
-      const EffectRow& row = *engine.campaign().slots[static_cast<std::size_t>(slot)].row;
-      return row.acts_on == group.acts_on &&
-             row.depends_on.find(group.depends_on) != std::string_view::npos;
-    });
-    if (!own) return group;
+    if (!is_own(engine, best.slots, group)) return group;
   }
   return std::nullopt;
+}
+
+// The better of both starts: the linear one may lead far along what the data hardly hold.
+Hypothesis refine_replacement(const Engine& engine, const Engine::Replacement& start,
+                              const std::vector<int>& slots) {
+  Hypothesis linear = engine.refine_from(start.state, slots);
+  Hypothesis beside = engine.refine_from(start.beside, slots);
+  return linear.log_likelihood > beside.log_likelihood ? linear : beside;
 }
 
 // Every accepted slot against every other slot in its place.
@@ -164,7 +180,7 @@ void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& s
               [](const auto& a, const auto& b) { return a.first.gain > b.first.gain; });
     std::map<std::string_view, std::vector<double>> evidence;
     evidence[id_of(engine, out.slot)].push_back(whole.log_evidence);
-    const Hypothesis without = engine.refine_from(engine.replace(others, out.slot).state, others);
+    const Hypothesis without = refine_replacement(engine, engine.replace(others, out.slot), others);
     const double loss = std::max(0.0, whole.log_likelihood - without.log_likelihood) * 2.0;
     std::size_t near = 0;
     while (near < ranked.size() && near < kRefined &&
@@ -174,7 +190,8 @@ void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& s
     std::vector<std::optional<Hypothesis>> rivals(near);
     in_parallel(jobs, near, [&](std::size_t i) {
       if (stop()) return;
-      rivals[i] = engine.refine_from(ranked[i].first.state, plus(others, ranked[i].second));
+      const std::vector<int> rival = plus(others, ranked[i].second);
+      rivals[i] = refine_replacement(engine, ranked[i].first, rival);
     });
     for (std::size_t i = 0; i < near; ++i) {
       const std::optional<Hypothesis>& rival = rivals[i];
@@ -204,50 +221,63 @@ void find_intervals(const Engine& engine, Naming& naming) {
   }
 }
 
+// Takes a slot out again. Where it had carried the machine's constants away, the way back leads
+// from the nominal machine.
+void drop(Engine& engine, const Naming& naming, int slot) {
+  std::vector<int> fewer = engine.accepted();
+  std::erase(fewer, slot);
+  ModelState start = naming.nominal;
+  for (const int kept : fewer) start.effects[kept] = engine.state().effects[kept];
+  const Hypothesis from_here = engine.refine(fewer);
+  const Hypothesis from_nominal = engine.refine_from(start, fewer);
+  engine.accept(from_here.log_likelihood > from_nominal.log_likelihood ? from_here : from_nominal);
+  engine.update_noise();
+}
+
 // What the experiments do not agree on, or what is better left out, is no finding.
 void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& stop, int jobs) {
   while (!naming.accepted.empty() && !stop()) {
     const auto doubtful =
         std::find_if(naming.accepted.begin(), naming.accepted.end(), [&](const Accepted& each) {
           const double size = naming.hypothesis.state.effects[each.slot];
-          return each.ln_odds < std::log(kClassOdds) ||
+          return each.ln_odds < std::log(kClassOdds) || !credible(engine, each.slot, size) ||
                  student_p(size / each.sigma, each.degrees) > kDisagreement;
         });
     if (doubtful == naming.accepted.end()) return;
     naming.not_confirmed.push_back(doubtful->slot);
-    std::vector<int> fewer = engine.accepted();
-    std::erase(fewer, doubtful->slot);
-    engine.accept(engine.refine(fewer));
-    engine.update_noise();
+    drop(engine, naming, doubtful->slot);
     find_classes(engine, naming, stop, jobs);
     find_intervals(engine, naming);
   }
 }
 
-// An effect that does not help to predict experiments left out of the fit is none.
+// An effect that does not help to predict experiments left out of the fit is none. One that is a
+// constant of the machine under another name cannot help there: the constant's usual values alone
+// tell it.
 void drop_unconfirmed(Engine& engine, Naming& naming) {
   if (engine.summaries().size() < 3) return;
   for (;;) {
     const std::vector<int>& set = engine.accepted();
-    const auto worst = std::min_element(set.begin(), set.end(), [&](int a, int b) {
-      return engine.left_out_gain(a) < engine.left_out_gain(b);
-    });
-    if (worst == set.end()) return;
+    std::vector<std::pair<double, int>> judged;  // gain of the log predictive density, slot
+    for (const int slot : set) {
+      if (!engine.is_constant(slot)) judged.emplace_back(engine.left_out_gain(slot), slot);
+    }
+    if (judged.empty()) return;
+    const auto [density, slot] = *std::min_element(judged.begin(), judged.end());
     const Hypothesis whole = engine.refine(set, 3);
     const Gain gain = left_out_gain(engine, naming.nominal, whole.state, set);
     // A nominal curve that no friction has predicts as well as it was bent to; that it need not be
     // bent any more counts as much.
     const bool straightened =
         !Engine::curve_rises(naming.nominal) && Engine::curve_rises(whole.state);
-    if (engine.left_out_gain(*worst) > kLeftOutMin && (gain.better() || straightened) &&
+    // What shows in one or two experiments only is not beyond the chance of drawing them.
+    const bool helps = gain.better() || straightened || density > kLeftOutPlain;
+    if (density > kLeftOutMin && helps &&
         !gain.worse(noise_floors(engine.campaign(), naming.nominal))) {
       return;
     }
-    naming.not_confirmed.push_back(*worst);
-    std::vector<int> fewer = set;
-    std::erase(fewer, *worst);
-    engine.accept(engine.refine(fewer));
-    engine.update_noise();
+    naming.not_confirmed.push_back(slot);
+    drop(engine, naming, slot);
   }
 }
 
@@ -412,7 +442,8 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
     const double bound = chance_threshold(static_cast<int>(groups.size()), kFalseUnknown);
     const auto left = std::find_if(groups.begin(), groups.end(), [&](const UnknownGroup& group) {
       return group.chi2 > bound && group.gain > bound && group.gain > kShareOfFirst * first_gain &&
-             group.size > 1.0 && group.left_out_gain > kLeftOutMin;
+             group.size > 1.0 && group.left_out_gain > kLeftOutMin &&
+             !is_own(engine, engine.accepted(), group);
     });
     if (left == groups.end()) return out;
     out.unknown = *left;

@@ -90,6 +90,16 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
       return gap_slip * gap_slip * slip_weight + gap_torque * gap_torque * torque_weight;
     };
     double distance = at(x);
+    // Right of the rising branch the next point of the curve may lie on it, at the same torque:
+    // from beyond the peak no small steps lead there.
+    if (const double rising = nominal_inverse(q.belt_torque[k] / capacity); std::isfinite(rising)) {
+      if (const double there = at(rising); there < distance) {
+        distance = there;
+        x = rising;
+      } else {
+        at(x);
+      }
+    }
     for (int i = 0; i < 12; ++i) {
       const double gap_slip = q.slip[k] - x * peak;
       const double gap_torque = q.belt_torque[k] - model;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -169,6 +170,12 @@ CurveShape::Point nominal_curve(double size) {
 }
 
 }  // namespace
+
+double nominal_inverse(double value) {
+  static const double kStiffness = std::tan(std::numbers::pi / (2.0 * kBend));
+  if (!(std::abs(value) < 1.0)) return std::numeric_limits<double>::quiet_NaN();
+  return std::tan(std::asin(value) / kBend) / kStiffness;
+}
 
 CurveShape::CurveShape(std::span<const double, kShapeKnots> departure, double fall) : fall_(fall) {
   std::array<double, kEnds> y{};

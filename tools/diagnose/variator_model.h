@@ -99,6 +99,8 @@ class CurveShape {
   std::array<std::array<double, 4>, kShapeKnots + 1> cubic_{};  // per interval, from its left end
   double fall_ = 0.0;
 };
+// Where the nominal curve, before its peak, has this value; NaN beyond.
+double nominal_inverse(double value);
 double shape_function(int knot, double x);  // d g / d departure, x >= 0
 double fall_function(double x);             // d g / d fall, x >= 0
 
