@@ -31,6 +31,7 @@ constexpr double kUsualPeak_percent = 2.5;
 constexpr double kFallDeviations = 3.0;  // by which mu* must then have fallen
 constexpr double kFormDeviation = 5e-4;  // of mu: what the forms of the fit leave
 constexpr int kNarrowInARow = 4;
+constexpr int kFollowedPerStep = 3;
 constexpr double kClimb = 1.05;    // mu* at the stop, of the first one; or
 constexpr double kLowered = 0.99;  // the clamp force
 // A jump of the reading by more is looked at: of a speed and of the torque, relative; of noise.
@@ -207,13 +208,13 @@ class RobustEstimator final : public SlipCurveEstimator {
     return clean;
   }
 
-  // One of the samples after the stop joins the record; after the last one the curve is fitted
+  // Some of the samples after the stop join the record; after the last one the curve is fitted
   // again.
   bool follow_on() noexcept {
-    if (next_after_ < after_stop_.size()) {
+    for (int i = 0; i < kFollowedPerStep && next_after_ < after_stop_.size(); ++i) {
       record_.step(after_stop_[next_after_++]);
-      return false;
     }
+    if (next_after_ < after_stop_.size()) return false;
     waiting_ = false;
     concluded_ = next_after_ == 0;
     refitting_ = !concluded_;
