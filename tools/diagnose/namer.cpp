@@ -26,8 +26,10 @@ constexpr double kNearMax = 400.0;
 constexpr double kNear = 40.0;  // linear loss within which a refit may still reach the best
 constexpr int kEffectsMax = 3;
 constexpr int kStepsMax = 4;
-constexpr int kSettling = 20;        // steps of a fit whose effects are settled
-constexpr int kGroupDegrees = 3;     // of a group of score_groups
+constexpr int kSettling = 20;     // steps of a fit whose effects are settled
+constexpr int kGroupDegrees = 3;  // of a group of score_groups
+constexpr double kPromotedOdds = 3.0;
+constexpr int kPromotions = 2;
 constexpr double kClassOdds = 20.0;  // worse by more: told apart
 // A further cause must matter beside those found: below this share of their evidence it is the
 // difference between the found effect's equation and the machine.
@@ -40,7 +42,7 @@ constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
 constexpr double kDisagreement = 1e-3;   // p of a size that experiments do not agree on
 constexpr double kLeftOutMin = 0.0;      // of the log predictive density
 constexpr double kLeftOutPlain = 200.0;  // the same: beyond doubt, however few experiments show it
-constexpr double kRippleMin = 3e-5;      // of the speed: less is of no consequence for slip
+constexpr double kRippleMin = 1e-4;      // of the speed: less is of no consequence for slip
 
 constexpr std::array kConstants{kDeformationPerkN, kLossConstant_Nm, kLossPerSpeed_Nms,
                                 kLnRatioOverdrive, kLnRatioLow};
@@ -158,8 +160,11 @@ Hypothesis refine_replacement(const Engine& engine, const Engine::Replacement& s
   return linear.log_likelihood > beside.log_likelihood ? linear : beside;
 }
 
-// Every accepted slot against every other slot in its place.
-void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& stop, int jobs) {
+// Every accepted slot against every other slot in its place. What is more probable there by more
+// than kPromotedOdds, if it is possible at all: it should have been accepted.
+std::optional<Hypothesis> compare_classes(Engine& engine, Naming& naming,
+                                          const std::function<bool()>& stop, int jobs) {
+  std::optional<Hypothesis> promoted;
   const std::vector<int>& set = engine.accepted();
   naming.accepted.clear();
   naming.hypothesis = engine.refine(set);
@@ -202,6 +207,9 @@ void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& s
           other.log_evidence > whole.log_evidence - std::log(kClassOdds)) {
         out.aliases.push_back(ranked[i].second);
       }
+      const double bar =
+          promoted ? promoted->log_evidence : whole.log_evidence + std::log(kPromotedOdds);
+      if (other.log_evidence > bar && credible(engine, other)) promoted = other;
     }
     std::vector<double> all{without.log_evidence};
     for (const auto& [id, values] : evidence) all.push_back(ln_sum(values));
@@ -209,6 +217,17 @@ void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& s
     out.probability = std::exp(ln_sum(evidence[id_of(engine, out.slot)]) - ln_sum(all));
     naming.accepted.push_back(out);
   }
+  return promoted;
+}
+
+void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& stop, int jobs) {
+  for (int i = 0; i < kPromotions; ++i) {
+    const std::optional<Hypothesis> better = compare_classes(engine, naming, stop, jobs);
+    if (!better || stop()) return;
+    engine.accept(*better);
+    engine.update_noise();
+  }
+  compare_classes(engine, naming, stop, jobs);
 }
 
 void find_intervals(const Engine& engine, Naming& naming) {

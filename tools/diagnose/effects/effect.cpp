@@ -57,7 +57,7 @@ constexpr std::array kRows{
     EffectRow{"hydraulic_lag", "time_constant_s", "s", kMeasure, 0.1, 0.0, 2.0, apply_hydraulic_lag,
               "tau dp/dt + p = p_in(t)", "clamp force", "rate of secondary_pressure",
               "clamp steps up and down at two rates below the peak"},
-    EffectRow{"hydraulic_lag", "delay_s", "s", kMeasure, 0.05, -0.5, 0.5, apply_hydraulic_delay,
+    EffectRow{"hydraulic_lag", "delay_s", "s", kMeasure, 0.05, -0.01, 0.5, apply_hydraulic_delay,
               "p(t) = p_in(t - delay)", "clamp force", "rate of secondary_pressure",
               "clamp steps up and down at two rates below the peak"},
     EffectRow{"clamp_hysteresis", "force_N", "N", kForce, 120.0, 0.0, 1500.0,
