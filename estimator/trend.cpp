@@ -74,7 +74,8 @@ void Trend::add(double t_s, double value, double slip_percent) noexcept {
 }
 
 void Trend::Scale::take(double square) noexcept {
-  const int bin = std::clamp(std::ilogb(square) - kLowestBin, 0, static_cast<int>(bins.size()) - 1);
+  const int highest_bin = kLowestBin + static_cast<int>(bins.size()) - 1;
+  const int bin = std::clamp(std::ilogb(square), kLowestBin, highest_bin) - kLowestBin;
   first_bin = squares_count > 0.0 ? std::min(first_bin, bin) : bin;
   last_bin = squares_count > 0.0 ? std::max(last_bin, bin) : bin;
   bins[static_cast<std::size_t>(bin)].count += 1.0;
