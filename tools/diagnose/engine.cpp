@@ -1,6 +1,7 @@
 #include "tools/diagnose/engine.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +12,7 @@ namespace beltgrip::diagnose {
 namespace {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kSaturatedPrecision = 50.0;
@@ -380,18 +382,25 @@ std::vector<Score> Engine::screen() const {
 }
 
 bool Engine::is_constant(int slot) const {
-  constexpr double kSame = 1.0 - 1e-6;  // squared cosine of the columns
+  constexpr double kSame = 1.0 - 1e-4;  // of the column's energy
   const int column = columns_of({kNuisanceCount + slot}).front();
   const std::vector<int> constants = columns_of(nuisances_);
-  return std::any_of(constants.begin(), constants.end(), [&](int constant) {
-    double own = 0.0, other = 0.0, both = 0.0;
-    for (const Summary& each : summaries_) {
-      own += each.aa(column, column);
-      other += each.aa(constant, constant);
-      both += each.aa(column, constant);
+  const auto n = static_cast<Eigen::Index>(constants.size());
+  MatrixXd gram = MatrixXd::Zero(n, n);
+  VectorXd along = VectorXd::Zero(n);
+  double energy = 0.0;
+  for (const Summary& each : summaries_) {
+    energy += each.aa(column, column);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const int row = constants[static_cast<std::size_t>(i)];
+      along[i] += each.aa(row, column);
+      for (Eigen::Index j = 0; j < n; ++j) {
+        gram(i, j) += each.aa(row, constants[static_cast<std::size_t>(j)]);
+      }
     }
-    return own > 0.0 && both * both > kSame * own * other;
-  });
+  }
+  const double explained = along.dot(gram.completeOrthogonalDecomposition().solve(along));
+  return energy > 0.0 && explained > kSame * energy;
 }
 
 Engine::Replacement Engine::add(const std::vector<int>& slots) const {

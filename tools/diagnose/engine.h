@@ -74,7 +74,7 @@ class Engine {
   // The same of the whole set over none, per experiment.
   std::vector<double> left_out_gains() const;
 
-  // An effect that does what a constant of the machine does, under another name.
+  // An effect that does what a constant of the machine does, or some together, by another name.
   bool is_constant(int slot) const;
 
   double scale(int parameter) const;

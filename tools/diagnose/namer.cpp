@@ -160,11 +160,16 @@ Hypothesis refine_replacement(const Engine& engine, const Engine::Replacement& s
   return linear.log_likelihood > beside.log_likelihood ? linear : beside;
 }
 
+struct Promotion {
+  Hypothesis hypothesis;
+  int slot, instead_of;
+};
+
 // Every accepted slot against every other slot in its place. What is more probable there by more
 // than kPromotedOdds, if it is possible at all: it should have been accepted.
-std::optional<Hypothesis> compare_classes(Engine& engine, Naming& naming,
-                                          const std::function<bool()>& stop, int jobs) {
-  std::optional<Hypothesis> promoted;
+std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
+                                         const std::function<bool()>& stop, int jobs) {
+  std::optional<Promotion> promoted;
   const std::vector<int>& set = engine.accepted();
   naming.accepted.clear();
   naming.hypothesis = engine.refine(set);
@@ -207,9 +212,11 @@ std::optional<Hypothesis> compare_classes(Engine& engine, Naming& naming,
           other.log_evidence > whole.log_evidence - std::log(kClassOdds)) {
         out.aliases.push_back(ranked[i].second);
       }
-      const double bar =
-          promoted ? promoted->log_evidence : whole.log_evidence + std::log(kPromotedOdds);
-      if (other.log_evidence > bar && credible(engine, other)) promoted = other;
+      const double bar = promoted ? promoted->hypothesis.log_evidence
+                                  : whole.log_evidence + std::log(kPromotedOdds);
+      if (other.log_evidence > bar && credible(engine, other)) {
+        promoted = Promotion{other, ranked[i].second, out.slot};
+      }
     }
     std::vector<double> all{without.log_evidence};
     for (const auto& [id, values] : evidence) all.push_back(ln_sum(values));
@@ -218,26 +225,6 @@ std::optional<Hypothesis> compare_classes(Engine& engine, Naming& naming,
     naming.accepted.push_back(out);
   }
   return promoted;
-}
-
-void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& stop, int jobs) {
-  for (int i = 0; i < kPromotions; ++i) {
-    const std::optional<Hypothesis> better = compare_classes(engine, naming, stop, jobs);
-    if (!better || stop()) return;
-    engine.accept(*better);
-    engine.update_noise();
-  }
-  compare_classes(engine, naming, stop, jobs);
-}
-
-void find_intervals(const Engine& engine, Naming& naming) {
-  const Hypothesis& h = naming.hypothesis;
-  const std::vector<Uncertainty> all = uncertainties(engine, h);
-  for (Accepted& each : naming.accepted) {
-    const auto at = std::find(h.slots.begin(), h.slots.end(), each.slot) - h.slots.begin();
-    each.sigma = all[static_cast<std::size_t>(at)].sigma;
-    each.degrees = all[static_cast<std::size_t>(at)].degrees;
-  }
 }
 
 // Takes a slot out again. Where it had carried the machine's constants away, the way back leads
@@ -251,6 +238,36 @@ void drop(Engine& engine, const Naming& naming, int slot) {
   const Hypothesis from_nominal = engine.refine_from(start, fewer);
   engine.accept(from_here.log_likelihood > from_nominal.log_likelihood ? from_here : from_nominal);
   engine.update_noise();
+}
+
+void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& stop, int jobs) {
+  for (int i = 0; i < kPromotions; ++i) {
+    const std::optional<Promotion> better = compare_classes(engine, naming, stop, jobs);
+    if (!better || stop()) return;
+    const bool in_curve =
+        std::any_of(naming.last_screen.begin(), naming.last_screen.end(), [&](const Score& score) {
+          return score.slot == better->slot && score.in_curve > kInCurveMax;
+        });
+    // What does better is no other thing than a friction curve that runs otherwise.
+    if (in_curve && Engine::curve_rises(naming.nominal)) {
+      naming.not_confirmed.push_back(better->instead_of);
+      drop(engine, naming, better->instead_of);
+    } else {
+      engine.accept(better->hypothesis);
+      engine.update_noise();
+    }
+  }
+  compare_classes(engine, naming, stop, jobs);
+}
+
+void find_intervals(const Engine& engine, Naming& naming) {
+  const Hypothesis& h = naming.hypothesis;
+  const std::vector<Uncertainty> all = uncertainties(engine, h);
+  for (Accepted& each : naming.accepted) {
+    const auto at = std::find(h.slots.begin(), h.slots.end(), each.slot) - h.slots.begin();
+    each.sigma = all[static_cast<std::size_t>(at)].sigma;
+    each.degrees = all[static_cast<std::size_t>(at)].degrees;
+  }
 }
 
 // What the experiments do not agree on, or what is better left out, is no finding.
@@ -315,10 +332,12 @@ std::vector<Ripple> find_ripples(const Campaign& campaign, double threshold) {
     const auto known = campaign.known_ripples.find(shaft);
     const bool is_known = known != campaign.known_ripples.end();
     const double beyond = line.amplitude() - (is_known ? known->second : 0.0);
+    // Some experiments may show a line that others do not: the amplitude's own scatter tells.
     const double sigmas = beyond / std::max(line.amplitude_sigma(), 1e-12);
     const double chi2 = is_known ? sigmas * sigmas : line.chi2();
-    out.push_back({shaft, line.amplitude(), line.amplitude_sigma(), chi2,
-                   chi2 > 3.0 * threshold && std::abs(beyond) > kRippleMin});
+    out.push_back(
+        {shaft, line.amplitude(), line.amplitude_sigma(), chi2,
+         std::min(chi2, sigmas * sigmas) > 3.0 * threshold && std::abs(beyond) > kRippleMin});
   }
   return out;
 }

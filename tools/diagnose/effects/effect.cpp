@@ -1,5 +1,6 @@
 #include "tools/diagnose/effects/effect.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -149,6 +150,37 @@ bool has_stop(const ExperimentData& run, int stop) {
   return false;
 }
 
+// Ramps at one and the same rate shift the force of a lag by one and the same amount: there it is
+// no other thing than an offset, or another shape of the friction curve.
+bool pressure_moves_variously(const std::vector<ExperimentData>& runs) {
+  constexpr double kMoves = 0.2, kVarious = 0.5;  // of the usual largest rate
+  constexpr int kBlock = 20;                      // samples: noise is no variety
+  std::vector<double> rates;
+  for (const ExperimentData& run : runs) {
+    double sum = 0.0;
+    int count = 0;
+    for (int k = 0; k < run.size(); ++k) {
+      const bool valid = run.valid[static_cast<std::size_t>(k)];
+      sum = valid ? sum + run.pressure.slow_slope[k] : 0.0;
+      count = valid ? count + 1 : 0;
+      if (count < kBlock) continue;
+      rates.push_back(sum / kBlock);
+      sum = 0.0;
+      count = 0;
+    }
+  }
+  if (rates.empty()) return false;
+  const auto quantile = [&](double share) {
+    const auto at =
+        rates.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(rates.size() - 1));
+    std::nth_element(rates.begin(), at, rates.end());
+    return *at;
+  };
+  const double largest = std::max(std::abs(quantile(0.02)), std::abs(quantile(0.98)));
+  std::erase_if(rates, [&](double rate) { return !(std::abs(rate) > kMoves * largest); });
+  return !rates.empty() && quantile(0.95) - quantile(0.05) > kVarious * largest;
+}
+
 }  // namespace
 
 std::string Slot::label() const {
@@ -180,6 +212,7 @@ std::vector<Slot> make_slots(const std::vector<ExperimentData>& runs) {
   const bool command = any(runs, [](const auto& run) { return run.command.present; });
   const bool low = any(runs, [](const auto& run) { return has_stop(run, kLowStop); });
   const bool overdrive = any(runs, [](const auto& run) { return has_stop(run, kOverdriveStop); });
+  const bool various = pressure_moves_variously(runs);
   std::vector<Slot> slots;
   for (const EffectRow& row : kRows) {
     const auto add = [&](int index, std::string_view role) {
@@ -199,7 +232,7 @@ std::vector<Slot> make_slots(const std::vector<ExperimentData>& runs) {
     } else if (row.apply == apply_wear_gradual) {
       if (runs.size() > 1) add(0, {});
     } else if (row.apply == apply_hydraulic_lag || row.apply == apply_hydraulic_delay) {
-      add(0, {});
+      if (various) add(0, {});
       if (command) add(0, "command");
     } else if (row.apply == apply_ratio_creep) {
       add(0, {});
