@@ -150,7 +150,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     }
     const bool stepped = stepped_;
     stepped_ = false;
-    if (waiting_) return (after_stop_.over() || !stepped) && follow_on();
+    if (waiting_) return (after_stop_.over() || !stepped) && join_what_followed();
     if (!fit_.step()) return false;
     if (stepped && follow_on_.waits()) return false;
     judge();
@@ -210,7 +210,7 @@ class RobustEstimator final : public SlipCurveEstimator {
 
   // Some of the samples after the stop join the record; after the last one the curve is fitted
   // again.
-  bool follow_on() noexcept {
+  bool join_what_followed() noexcept {
     for (int i = 0; i < kFollowedPerStep && next_after_ < after_stop_.size(); ++i) {
       record_.step(after_stop_[next_after_++]);
     }

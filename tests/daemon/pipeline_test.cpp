@@ -73,7 +73,7 @@ TEST(Pipeline, AnExperimentIsCompletedAndPublishedAtOnce) {
   EXPECT_LT(result.sigma_stop_percent, 10.0);
 
   // In the sample of the decision the flag leaves; the result when the evaluation, a piece of it
-  // per sample, is done: once, and a second time with what came just after the stop.
+  // per sample, is done and the half second after the stop has not spoken against it (follow_on.h).
   const auto first_stop = std::find_if(run.sent.begin(), run.sent.end(), [](const auto& each) {
     return each.frame.id.value == 0x6A1 && value_of(each.frame, "MacroSlipStop") == 1.0;
   });
