@@ -42,6 +42,8 @@ ModelState nominal_state(const Campaign& campaign) {
   for (int i = 0; i < kNuisanceCount; ++i) {
     state.nuisance[i] = campaign.nuisances[static_cast<std::size_t>(i)].nominal;
   }
+  // The curve of traction(), without departures.
+  state.nuisance.segment(kShapeOverdrive, kEndOfShapes - kShapeOverdrive + 1).setZero();
   return state;
 }
 

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "estimator/clamp_force.h"
+#include "tools/diagnose/curve_family.h"
 #include "tools/diagnose/engine.h"
 #include "tools/diagnose/gain.h"
 #include "tools/diagnose/namer.h"
@@ -16,6 +17,8 @@ namespace {
 
 constexpr int kSamplesMin = 100;            // 10 s of usable data
 constexpr std::size_t kExperimentsMin = 3;  // from where on their scatter is known
+constexpr double kSameRatio = 1.03;         // of two experiments at one end stop, most
+constexpr double kSoftestPerkN = 0.01;      // deformation of pulleys per clamp force, most
 constexpr double kMuMost = 0.4;             // friction of any belt, and more
 constexpr double kPressureMost_Pa = 200e5;  // three times what variators have
 constexpr double kDetectable = 5.0;         // sigmas: found with 90 % and more
@@ -132,10 +135,14 @@ class Run {
   }
 
   void check_same_ratio(const std::vector<ExperimentData>& runs, int stop, double direction) {
-    double low = std::numeric_limits<double>::infinity(), high = 0.0;
-    std::string low_name, high_name;
+    struct Seen {
+      double ratio = 0.0, force_kN = 0.0;
+      const ExperimentData* run = nullptr;
+    };
+    std::vector<Seen> seen;
     for (const ExperimentData& run : runs) {
-      double highest_Pa = -std::numeric_limits<double>::infinity(), ratio = 0.0;
+      double highest_Pa = -std::numeric_limits<double>::infinity();
+      Seen here;
       for (int k = 0; k < run.size(); ++k) {
         if (!run.valid[static_cast<std::size_t>(k)] ||
             run.stop[static_cast<std::size_t>(k)] != stop ||
@@ -143,18 +150,24 @@ class Run {
           continue;
         }
         highest_Pa = run.pressure.value[k];
-        ratio = run.omega_s.value[k] / run.omega_p.value[k];
+        here = {run.omega_s.value[k] / run.omega_p.value[k],
+                1e-3 * estimator::secondary_clamp_force_N(request_.model.variator, highest_Pa,
+                                                          run.omega_s.value[k]),
+                &run};
       }
-      if (ratio == 0.0) continue;
-      if (ratio < low) low = ratio, low_name = run.name;
-      if (ratio > high) high = ratio, high_name = run.name;
+      if (here.run != nullptr) seen.push_back(here);
     }
-    if (high <= 1.03 * low || !std::isfinite(low)) return;
-    std::string note = low_name;
-    note.append(" and ").append(high_name).append(": end-stop ratios ").append(text_of(low));
-    note.append(" and ").append(text_of(high)).append(" cannot be of one machine");
-    out().notes.push_back(std::move(note));
-    impossible_ = Unexplained{"ratio", {"experiment"}, 1.0};
+    for (const Seen& a : seen) {
+      for (const Seen& b : seen) {
+        const double softness = kSoftestPerkN * std::max(0.0, a.force_kN - b.force_kN);
+        if (b.ratio <= a.ratio * (kSameRatio + softness)) continue;
+        out().notes.push_back(a.run->name + " and " + b.run->name + ": end-stop ratios " +
+                              text_of(a.ratio) + " and " + text_of(b.ratio) +
+                              " cannot be of one machine");
+        impossible_ = Unexplained{"ratio", {"experiment"}, 1.0};
+        return;
+      }
+    }
   }
 
   // The same data under two names would count as two experiments that agree in everything.
@@ -299,7 +312,14 @@ class Run {
     for (std::size_t j = 0; j < engine.active_nuisances().size(); ++j) {
       const int p = engine.active_nuisances()[j];
       const auto i = static_cast<Eigen::Index>(j);
-      const double sigma = std::sqrt(std::max(fit.covariance(i, i), 0.0)) * engine.scale(p);
+      double variance = fit.covariance(i, i) * engine.scale(p) * engine.scale(p);
+      if (const int first = first_knot(p); first >= 0) {
+        const Eigen::Index block = i - (p - first);
+        const auto lever = curve_modes().row(p - first);
+        variance = lever.dot(fit.covariance.block(block, block, kShapeKnots, kShapeKnots) *
+                             lever.transpose());
+      }
+      const double sigma = std::sqrt(std::max(variance, 0.0));
       const double value = naming.hypothesis.state.nuisance[p];
       const bool ln = p == kLnMuMax || p == kLnPeakSlipOverdrive || p == kLnPeakSlipLow;
       const auto shown = [&](double v) { return ln ? std::exp(v) : v; };

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "tools/diagnose/curve_family.h"
 #include "tools/diagnose/parallel.h"
 
 namespace beltgrip::diagnose {
@@ -20,6 +21,7 @@ constexpr std::array<double, 3> kCoarseness{30.0, 8.0, 2.0};
 constexpr int kAttempts = 10;        // to find a step that gains, each shorter than the last
 constexpr double kLongStep = 0.05;   // in tolerances and usual sizes
 constexpr double kWorthwhile = 1.0;  // of the log likelihood
+constexpr double kHollow = 0.1;      // one sigma of how a slope grows with slip, of mu_max
 constexpr double kSizePrior = 3.0;   // one sigma of an effect's size, in usual sizes
 
 bool stop_used(const Campaign& campaign, int stop) {
@@ -106,7 +108,13 @@ Prior Engine::prior(const std::vector<int>& parameters, const ModelState& at) co
   Prior out{VectorXd::Zero(n), VectorXd::Ones(n)};
   for (Index j = 0; j < n; ++j) {
     const int p = parameters[static_cast<std::size_t>(j)];
-    if (p < kNuisanceCount) {
+    if (const int first = first_knot(p); first >= 0) {
+      for (int i = 0; i < kShapeKnots; ++i) {
+        out.pull[j] += curve_modes_inverse()(p - first, i) *
+                       (campaign_.nuisances[static_cast<std::size_t>(first + i)].nominal -
+                        at.nuisance[first + i]);
+      }
+    } else if (p < kNuisanceCount) {
       out.pull[j] =
           (campaign_.nuisances[static_cast<std::size_t>(p)].nominal - at.nuisance[p]) / scale(p);
     } else {
@@ -158,6 +166,7 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
       out.push_back(
           summarise(campaign, static_cast<int>(e), state, at[e], wanted, scales, whitening));
     }
+    add_curve_bounds(state, wanted, out);
     return out;
   };
   // Log likelihood of staying at a state.
@@ -328,6 +337,7 @@ void Engine::update_noise() {
     if (campaign_.runs[e].valid_count == 0) continue;
     summaries_.push_back(summary_of(campaign_, static_cast<int>(e), raw[e], whitening_));
   }
+  add_curve_bounds(state_, summary_parameters_, summaries_);
   const std::vector<int> parameters = with_nuisances(accepted_);
   base_ = fit_linear(summaries_, columns_of(parameters), prior(parameters, state_),
                      default_scatter(), 25);
@@ -382,7 +392,7 @@ std::vector<Score> Engine::screen() const {
 }
 
 bool Engine::is_constant(int slot) const {
-  constexpr double kSame = 1.0 - 1e-4;  // of the column's energy
+  constexpr double kSame = 1.0 - 1e-3;  // of the column's energy
   const int column = columns_of({kNuisanceCount + slot}).front();
   const std::vector<int> constants = columns_of(nuisances_);
   const auto n = static_cast<Eigen::Index>(constants.size());
@@ -448,11 +458,36 @@ Engine::Replacement Engine::replace(const std::vector<int>& slots, int instead_o
   return out;
 }
 
+void Engine::add_curve_bounds(const ModelState& state, const std::vector<int>& parameters,
+                              std::vector<Summary>& summaries) const {
+  if (summaries.empty()) return;
+  const Index last = summaries.front().aa.rows() - 1;
+  VectorXd row(last + 1);
+  MatrixXd all = MatrixXd::Zero(last + 1, last + 1);
+  for (const int first : {kShapeOverdrive, kShapeLow}) {
+    for (const Hollow& each : hollows(
+             std::span<const double, kShapeKnots>(state.nuisance.data() + first, kShapeKnots))) {
+      row.setZero();
+      for (std::size_t j = 0; j < parameters.size(); ++j) {
+        if (first_knot(parameters[j]) == first) {
+          row[static_cast<Index>(j)] = each.by_mode[parameters[j] - first];
+        }
+      }
+      row[last] = each.slope;
+      all += row * row.transpose();
+    }
+  }
+  all /= kHollow * kHollow * static_cast<double>(summaries.size());
+  for (Summary& each : summaries) each.aa += all;
+}
+
 void Engine::move(const std::vector<int>& parameters, const VectorXd& step, double share,
                   ModelState& state) const {
   for (std::size_t j = 0; j < parameters.size(); ++j) {
     const double by = share * step[static_cast<Index>(j)] * scale(parameters[j]);
-    if (parameters[j] < kNuisanceCount) {
+    if (const int first = first_knot(parameters[j]); first >= 0) {
+      state.nuisance.segment(first, kShapeKnots) += by * curve_modes().col(parameters[j] - first);
+    } else if (parameters[j] < kNuisanceCount) {
       state.nuisance[parameters[j]] += by;
     } else {
       const int slot = parameters[j] - kNuisanceCount;
@@ -511,19 +546,23 @@ Hypothesis Engine::refine_from(const ModelState& from, const std::vector<int>& s
   return out;
 }
 
-bool Engine::curve_rises(const ModelState& state) {
+bool Engine::curve_is_possible(const ModelState& state) {
   constexpr double kStep = 0.05, kFall = 0.02;  // of mu_max
+  constexpr double kHollowMost = 2.0;           // sigmas
+  double hollow = 0.0;
   for (const int first : {kShapeOverdrive, kShapeLow}) {
-    const CurveShape curve(
-        std::span<const double, kShapeKnots>(state.nuisance.data() + first, kShapeKnots), 0.0);
+    const std::span<const double, kShapeKnots> departure(state.nuisance.data() + first,
+                                                         kShapeKnots);
+    const CurveShape curve(departure, 0.0);
     double highest = 0.0;
     for (double x = kStep; x < 1.0; x += kStep) {
       const double here = curve.evaluate(x).value;
       if (here < highest - kFall) return false;
       highest = std::max(highest, here);
     }
+    for (const Hollow& each : hollows(departure)) hollow += each.slope * each.slope;
   }
-  return true;
+  return hollow <= kHollowMost * kHollowMost * kHollow * kHollow;
 }
 
 void Engine::accept(const Hypothesis& hypothesis) {

@@ -63,9 +63,9 @@ class Engine {
   };
   Replacement add(const std::vector<int>& slots) const;
   Replacement replace(const std::vector<int>& slots, int instead_of) const;
-  // No friction falls before its peak. A fitted curve that does has been bent to explain something
-  // else; what it hides is no longer near the present state.
-  static bool curve_rises(const ModelState& state);
+  // No friction falls before its peak, nor grows stiffer on the way to it. A fitted curve that does
+  // has been bent to explain something else; what it hides is no longer near the present state.
+  static bool curve_is_possible(const ModelState& state);
   // Makes the hypothesis the present state.
   void accept(const Hypothesis& hypothesis);
   // By how much the accepted effects predict experiments that were left out of the fit better than
@@ -81,6 +81,11 @@ class Engine {
   Prior prior(const std::vector<int>& parameters, const ModelState& at) const;
   std::vector<int> with_nuisances(const std::vector<int>& slots) const;  // parameter numbers
   double degrees(double with_scatter, double without_scatter) const;
+
+  // Adds to the matrices, in equal shares, how far the friction curves of the state are from any
+  // that grows softer all the way to its peak. Columns: the parameters (scaled), others, residual.
+  void add_curve_bounds(const ModelState& state, const std::vector<int>& parameters,
+                        std::vector<Summary>& summaries) const;
 
   // Adds a scaled step, effects kept within their bounds.
   void move(const std::vector<int>& parameters, const Eigen::VectorXd& step, double share,

@@ -17,6 +17,7 @@ constexpr double kTrim_s = 0.3;            // either end of a gapless stretch
 constexpr double kSlipMax = 0.06;          // beyond: damage, not friction to be explained
 constexpr double kSlipRateMax_1_s = 0.03;  // the run-away: ratios of derivatives, no statics
 constexpr double kRatioTolerance = 0.085;  // ln; around an end stop
+constexpr double kSoftness_1_N = 5e-6;     // and below it, as pulleys give way to the clamp force
 constexpr double kSpeedMin_rad_s = 10.0;
 constexpr double kForceMin_N = 200.0;
 // Of the clamp force: where its slow copy departs further from it, the pressure moves too fast for
@@ -109,13 +110,15 @@ std::vector<bool> saturated_samples(const Channel& channel, double start_s, int 
   return out;
 }
 
-int stop_of(double speed_ratio, const estimator::VariatorParameters& variator) {
+int stop_of(double speed_ratio, double force_N, const estimator::VariatorParameters& variator) {
   if (!(speed_ratio > 0.0)) return kNoStop;
-  if (std::abs(std::log(speed_ratio / variator.ratio_overdrive)) < kRatioTolerance) {
-    return kOverdriveStop;
-  }
-  if (std::abs(std::log(speed_ratio / variator.ratio_low)) < kRatioTolerance) return kLowStop;
-  return kNoStop;
+  const auto at = [&](double stop) {
+    const double off = std::log(speed_ratio / stop);
+    return off < kRatioTolerance && -off < kRatioTolerance + kSoftness_1_N * std::max(0.0, force_N);
+  };
+  return at(variator.ratio_overdrive) ? kOverdriveStop
+         : at(variator.ratio_low)     ? kLowStop
+                                      : kNoStop;
 }
 
 void trim_and_segment(ExperimentData& data) {
@@ -235,7 +238,9 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
     const auto i = static_cast<std::size_t>(k);
     if (!(data.omega_p.value[k] > kSpeedMin_rad_s) || !std::isfinite(data.omega_s.value[k]))
       continue;
-    data.stop[i] = stop_of(data.omega_s.value[k] / data.omega_p.value[k], variator);
+    const double force_N = variator.secondary_piston_area_m2 * data.pressure.value[k] +
+                           variator.secondary_spring_force_N;
+    data.stop[i] = stop_of(data.omega_s.value[k] / data.omega_p.value[k], force_N, variator);
     if (data.stop[i] == kNoStop) continue;
     const double ratio = data.stop[i] == kLowStop ? variator.ratio_low : variator.ratio_overdrive;
     const double slip = 1.0 - data.omega_s.value[k] / (data.omega_p.value[k] * ratio);
@@ -243,12 +248,11 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
                                   (data.omega_p.value[k] * data.omega_p.value[k]) -
                               data.omega_s.slope[k] / data.omega_p.value[k]) /
                              ratio;
-    const double force_N = variator.secondary_piston_area_m2 * data.pressure.value[k] +
-                           variator.secondary_spring_force_N;
     const double step_N =
         variator.secondary_piston_area_m2 * (data.pressure.value[k] - data.pressure.slow[k]);
-    data.valid[i] = std::abs(slip) < kSlipMax && std::abs(slip_rate) < kSlipRateMax_1_s &&
-                    data.pressure.present && force_N > kForceMin_N && data.torque.present &&
+    data.valid[i] = std::abs(slip) < kSlipMax + kSoftness_1_N * force_N &&
+                    std::abs(slip_rate) < kSlipRateMax_1_s && data.pressure.present &&
+                    force_N > kForceMin_N && data.torque.present &&
                     std::abs(step_N) < kForceStepMax * force_N && usable(data.pressure, k) &&
                     usable(data.torque, k) && usable(data.torque_s, k) && usable(data.command, k) &&
                     usable(data.temperature, k) && usable(data.pressure_p, k) && !saturated[i];

@@ -39,7 +39,7 @@ constexpr double kShareOfFirst = 0.02;
 constexpr double kInCurveMax = 0.998;
 constexpr double kHeld = 0.5;
 constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
-constexpr double kDisagreement = 1e-3;   // p of a size that experiments do not agree on
+constexpr double kDisagreement = 0.05;   // p of a size that experiments do not agree on
 constexpr double kLeftOutMin = 0.0;      // of the log predictive density
 constexpr double kLeftOutPlain = 200.0;  // the same: beyond doubt, however few experiments show it
 constexpr double kRippleMin = 1e-4;      // of the speed: less is of no consequence for slip
@@ -249,7 +249,7 @@ void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& s
           return score.slot == better->slot && score.in_curve > kInCurveMax;
         });
     // What does better is no other thing than a friction curve that runs otherwise.
-    if (in_curve && Engine::curve_rises(naming.nominal)) {
+    if (in_curve && Engine::curve_is_possible(naming.nominal)) {
       naming.not_confirmed.push_back(better->instead_of);
       drop(engine, naming, better->instead_of);
     } else {
@@ -305,7 +305,7 @@ void drop_unconfirmed(Engine& engine, Naming& naming) {
     // A nominal curve that no friction has predicts as well as it was bent to; that it need not be
     // bent any more counts as much.
     const bool straightened =
-        !Engine::curve_rises(naming.nominal) && Engine::curve_rises(whole.state);
+        !Engine::curve_is_possible(naming.nominal) && Engine::curve_is_possible(whole.state);
     // What shows in one or two experiments only is not beyond the chance of drawing them.
     const bool helps = gain.better() || straightened || density > kLeftOutPlain;
     if (density > kLeftOutMin && helps &&
@@ -374,8 +374,8 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
     const Hypothesis base = engine.refine(set, 3);
     // So far from the data, or with a curve that no friction has, the linear says little of where
     // an effect would lead.
-    const bool rises = Engine::curve_rises(engine.state());
-    const bool far = !rises || std::any_of(scores.begin(), scores.end(),
+    const bool possible = Engine::curve_is_possible(engine.state());
+    const bool far = !possible || std::any_of(scores.begin(), scores.end(),
                                            [](const Score& score) { return score.gain > kFar; });
     Hypothesis best;
     bool found = false;
@@ -401,7 +401,7 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
         found = true;
       }
     };
-    const std::vector<int> candidates = shortlist(scores, kRefined, rises ? kInCurveMax : 2.0);
+    const std::vector<int> candidates = shortlist(scores, kRefined, possible ? kInCurveMax : 2.0);
     const auto consider_all = [&](bool from_afar) {
       std::vector<std::optional<Hypothesis>> fits(candidates.size());
       in_parallel(jobs, candidates.size(), [&](std::size_t i) {
@@ -414,7 +414,7 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
     consider_all(far);
     // Something is there, but no way leads to it from here.
     const bool plain = std::any_of(scores.begin(), scores.end(), [&](const Score& score) {
-      return score.chi2 > kPlain * out.threshold && score.in_curve < kInCurveMax;
+      return score.chi2 > kPlain * out.threshold && (!possible || score.in_curve < kInCurveMax);
     });
     if (!found && !far && plain) consider_all(true);
     if (!found) break;

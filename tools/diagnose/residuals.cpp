@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tools/diagnose/curve_family.h"
+
 namespace beltgrip::diagnose {
 namespace {
 
@@ -214,7 +216,7 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
   };
   const auto bump = [&](int k, int i) {
     const double size = std::abs(at.foot[k]);
-    const double f = i < kShapeKnots ? shape_function(i, size) : fall_function(size);
+    const double f = i < kShapeKnots ? mode_function(i, size) : fall_function(size);
     return at.capacity[k] * f * std::copysign(1.0, at.foot[k]);
   };
   switch (parameter) {

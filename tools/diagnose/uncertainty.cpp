@@ -15,25 +15,6 @@ using Eigen::Index;
 // slow copies of signals: where these step, their steps are too gentle, and the delay seems longer.
 constexpr double kEquationShare = 0.01, kDelayShare = 0.1;
 
-bool below_peak(int parameter) {
-  if (parameter < kShapeOverdrive || parameter > kEndOfShapes) return false;
-  return (parameter - kShapeOverdrive) % kShapeKnots < kKnotsBelowPeak;
-}
-
-// The fit lets the knots of the curve depart each for itself. A law that is softer than the nominal
-// one is so at every knot: what such departures add to the variance of the parameter at `column`,
-// in scaled units, where a tolerance is one.
-double common_departure(const Engine& engine, const Fit& fit, Index column) {
-  double together = 0.0, apart = 0.0;
-  for (std::size_t j = 0; j < engine.active_nuisances().size(); ++j) {
-    if (!below_peak(engine.active_nuisances()[j])) continue;
-    const double lever = fit.covariance(column, static_cast<Index>(j));
-    together += lever;
-    apart += lever * lever;
-  }
-  return std::max(0.0, together * together - apart);
-}
-
 }  // namespace
 
 std::vector<Uncertainty> uncertainties(const Engine& engine, const Hypothesis& hypothesis) {
@@ -55,9 +36,7 @@ std::vector<Uncertainty> uncertainties(const Engine& engine, const Hypothesis& h
     const bool is_time = engine.campaign().slots[static_cast<std::size_t>(slot)].row->unit == "s";
     const double equation =
         (is_time ? kDelayShare : kEquationShare) * hypothesis.state.effects[slot];
-    const double variance = sampled * sampled +
-                            common_departure(engine, hypothesis.fit, column) * scale * scale +
-                            equation * equation;
+    const double variance = sampled * sampled + equation * equation;
     // Satterthwaite: only what is sampled has few degrees of freedom.
     const double share = sampled * sampled / std::max(variance, 1e-300);
     out.push_back({std::sqrt(variance), degrees / std::max(share * share, 1e-9)});

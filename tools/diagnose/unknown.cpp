@@ -131,6 +131,7 @@ std::vector<UnknownGroup> score_groups(const Engine& engine) {
     summaries.push_back(summarise(campaign, static_cast<int>(e), engine.state(), parameters, scales,
                                   engine.whitening(), extra));
   }
+  engine.add_curve_bounds(engine.state(), parameters, summaries);
   std::vector<int> base(static_cast<std::size_t>(n));
   for (std::size_t i = 0; i < base.size(); ++i) base[i] = static_cast<int>(i);
   const Prior base_prior = engine.prior(parameters, engine.state());

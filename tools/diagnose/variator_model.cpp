@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "tools/diagnose/curve_family.h"
 #include "tools/diagnose/effects/effect.h"
 
 namespace beltgrip::diagnose {
@@ -15,45 +16,51 @@ using Eigen::ArrayXd;
 // Tolerances: what differs between two healthy machines of one type (ranges of the literature for
 // pushbelt variators), so that only what lies beyond is called wrong.
 NuisanceTable default_nuisances() {
-  return {{
+  NuisanceTable table{{
       {"ln_mu_max", std::log(0.1), 0.4, 1e-3},
       {"ln_peak_slip_overdrive", std::log(0.02), 0.5, 1e-3},
       {"ln_peak_slip_low", std::log(0.03), 0.5, 1e-3},
-      {"shape_1_overdrive", 0.0, 0.05, 1e-3},
-      {"shape_2_overdrive", 0.0, 0.08, 1e-3},
-      {"shape_3_overdrive", 0.0, 0.1, 1e-3},
-      {"shape_4_overdrive", 0.0, 0.1, 1e-3},
-      {"shape_5_overdrive", 0.0, 0.1, 1e-3},
-      {"shape_6_overdrive", 0.0, 0.08, 1e-3},
-      {"shape_7_overdrive", 0.0, 0.06, 1e-3},
-      {"shape_8_overdrive", 0.0, 0.03, 1e-3},
-      {"shape_9_overdrive", 0.0, 0.03, 1e-3},
-      {"shape_10_overdrive", 0.0, 0.05, 1e-3},
-      {"shape_11_overdrive", 0.0, 0.08, 1e-3},
-      {"shape_12_overdrive", 0.0, 0.12, 1e-3},
-      {"shape_13_overdrive", 0.0, 0.2, 1e-3},
-      {"shape_1_low", 0.0, 0.05, 1e-3},
-      {"shape_2_low", 0.0, 0.08, 1e-3},
-      {"shape_3_low", 0.0, 0.1, 1e-3},
-      {"shape_4_low", 0.0, 0.1, 1e-3},
-      {"shape_5_low", 0.0, 0.1, 1e-3},
-      {"shape_6_low", 0.0, 0.08, 1e-3},
-      {"shape_7_low", 0.0, 0.06, 1e-3},
-      {"shape_8_low", 0.0, 0.03, 1e-3},
-      {"shape_9_low", 0.0, 0.03, 1e-3},
-      {"shape_10_low", 0.0, 0.05, 1e-3},
-      {"shape_11_low", 0.0, 0.08, 1e-3},
-      {"shape_12_low", 0.0, 0.12, 1e-3},
-      {"shape_13_low", 0.0, 0.2, 1e-3},
+      {"shape_1_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_2_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_3_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_4_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_5_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_6_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_7_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_8_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_9_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_10_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_11_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_12_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_13_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_1_low", 0.0, 1.0, 1e-3},
+      {"shape_2_low", 0.0, 1.0, 1e-3},
+      {"shape_3_low", 0.0, 1.0, 1e-3},
+      {"shape_4_low", 0.0, 1.0, 1e-3},
+      {"shape_5_low", 0.0, 1.0, 1e-3},
+      {"shape_6_low", 0.0, 1.0, 1e-3},
+      {"shape_7_low", 0.0, 1.0, 1e-3},
+      {"shape_8_low", 0.0, 1.0, 1e-3},
+      {"shape_9_low", 0.0, 1.0, 1e-3},
+      {"shape_10_low", 0.0, 1.0, 1e-3},
+      {"shape_11_low", 0.0, 1.0, 1e-3},
+      {"shape_12_low", 0.0, 1.0, 1e-3},
+      {"shape_13_low", 0.0, 1.0, 1e-3},
       {"deformation_per_kN", 1.0e-3, 0.7e-3, 1e-5},
-      {"loss_constant_Nm", 0.5, 0.75, 1e-2},
-      {"loss_per_rad_s_Nm", 5e-3, 5e-3, 1e-4},
+      {"loss_constant_Nm", 0.5, 0.6, 1e-2},
+      {"loss_per_rad_s_Nm", 5e-3, 4e-3, 1e-4},
       {"ln_ratio_overdrive", 0.0, 6e-4, 1e-5},
       {"ln_ratio_low", 0.0, 6e-4, 1e-5},
       {"secondary_inertia_kg_m2", 0.1, 0.3, 1e-3},
       {"command_offset_Pa", 0.0, 1e5, 10.0},
       {"command_gain", 0.0, 0.1, 1e-4},
   }};
+  for (int i = 0; i < kShapeKnots; ++i) {
+    for (const int first : {kShapeOverdrive, kShapeLow}) {
+      table[static_cast<std::size_t>(first + i)].nominal = usual_departure()[i];
+    }
+  }
+  return table;
 }
 
 namespace {
@@ -118,19 +125,6 @@ double cubic_at(const Cubics& c, double x) {
 
 }  // namespace
 
-double shape_function(int knot, double x) {
-  static const std::array<Cubics, kShapeKnots> kCardinal = [] {
-    std::array<Cubics, kShapeKnots> out{};
-    for (int i = 0; i < kShapeKnots; ++i) {
-      std::array<double, kEnds> y{};
-      y[static_cast<std::size_t>(end_of_knot(i))] = 1.0;
-      out[static_cast<std::size_t>(i)] = cubics(y);
-    }
-    return out;
-  }();
-  return cubic_at(kCardinal[static_cast<std::size_t>(knot)], x);
-}
-
 double fall_function(double x) {
   const double beyond = x - 1.0;
   return beyond <= 0.0 ? 0.0 : -beyond * beyond / (0.3 + beyond);
@@ -184,6 +178,8 @@ CurveShape::CurveShape(std::span<const double, kShapeKnots> departure, double fa
   }
   cubic_ = cubics(y);
 }
+
+double CurveShape::departure(double x) const { return cubic_at(cubic_, x); }
 
 CurveShape::Point CurveShape::evaluate(double x) const {
   const double size = std::abs(x);

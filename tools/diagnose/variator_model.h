@@ -31,7 +31,9 @@ enum Nuisance : int {
   kLnMuMax,
   kLnPeakSlipOverdrive,  // ln of the slip at the peak, a share
   kLnPeakSlipLow,
-  kShapeOverdrive,  // kShapeKnots values: departure from the nominal curve, shares of mu_max
+  // kShapeKnots values: departure from the nominal curve, shares of mu_max; fitted along the modes
+  // of curve_family.h, of which each has a tolerance of 1.
+  kShapeOverdrive,
   kShapeLow = kShapeOverdrive + kShapeKnots,
   kEndOfShapes = kShapeLow + kShapeKnots - 1,
   kDeformationPerkN,
@@ -94,6 +96,7 @@ class CurveShape {
     double slope = 0.0;
   };
   Point evaluate(double x) const;
+  double departure(double x) const;  // of the value, without the fall, x >= 0
 
  private:
   std::array<std::array<double, 4>, kShapeKnots + 1> cubic_{};  // per interval, from its left end
@@ -101,7 +104,6 @@ class CurveShape {
 };
 // Where the nominal curve, before its peak, has this value; NaN beyond.
 double nominal_inverse(double value);
-double shape_function(int knot, double x);  // d g / d departure, x >= 0
-double fall_function(double x);             // d g / d fall, x >= 0
+double fall_function(double x);  // d g / d fall, x >= 0
 
 }  // namespace beltgrip::diagnose
