@@ -8,6 +8,8 @@ namespace beltgrip::daemon {
 namespace {
 
 constexpr double kPedalReleased = 0.02;
+constexpr double kPedalMoved = 0.05;      // in an experiment: the driver wants something
+constexpr double kOilBand_K = 1.0;        // in an experiment: below what it may begin with
 constexpr double kRatioTolerance = 0.03;  // slip and deformation of a clamped belt stay below this
 constexpr double kKnownMargin = 1.05;     // the belt may have run in since its last value
 constexpr double kPeakSlipOverdrive = 0.020;
@@ -62,6 +64,19 @@ std::uint32_t Arming::preconditions(const Now& now) const noexcept {
   inhibit(c.oil_degC < settings_.oil_temperature_min_degC, Inhibit::kOil);
   inhibit(!now.cooled, Inhibit::kCooldown);
   return out;
+}
+
+estimator::StopReason Arming::ended_by(const Conditions& now) const noexcept {
+  const bool coast = trigger_ == Trigger::kCoastDown;
+  if (!now.permitted) return estimator::StopReason::kPermission;
+  if (now.brake_pressed || (coast && now.accelerator > kPedalMoved)) {
+    return estimator::StopReason::kDriver;
+  }
+  if (!now.lockup_closed) return estimator::StopReason::kTorque;
+  if (now.oil_degC < settings_.oil_temperature_min_degC - kOilBand_K) {
+    return estimator::StopReason::kPermission;
+  }
+  return estimator::StopReason::kNone;
 }
 
 bool Arming::steady(const Now& now) const noexcept {

@@ -104,6 +104,9 @@ class Arming {
   bool settled() const noexcept { return settled_; }
   bool cleared() const noexcept { return cleared_ && inhibits_ == 0; }
   std::uint32_t inhibits() const noexcept { return inhibits_; }
+  // What of these ends an experiment that has begun; kNone: nothing. A little more is allowed than
+  // at its start.
+  estimator::StopReason ended_by(const Conditions& now) const noexcept;
   const Ramp& ramp() const noexcept { return ramp_; }
   // Mean since the trigger holds, of the last half second.
   double slip_percent() const noexcept { return slip_percent_; }

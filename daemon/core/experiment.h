@@ -29,10 +29,12 @@
 //
 // How the guards are meant, by trigger and control:
 //   triggered   "signal", "always": the trigger asks for an experiment, or for it to go on.
-//               "coast_down", "steady": every precondition holds at this sample.
+//               "coast_down", "steady": every precondition holds at this sample; in an experiment
+//               that is observed, driver, permission and primary speed let it go on.
 //   settled     "signal", "always": at once. Else: triggered has held for the settling time.
 //   cleared     "observe": always. "command": the peak is reachable and a safe ramp was found.
-//   released    "observe": not triggered. "command": the clamping force is back.
+//   released    "observe": not triggered; with "coast_down" and "steady" also the torque turned
+//               round, or the force back that was lowered. "command": the clamping force is back.
 //   cooled      "observe": at once. "command": time and distance have passed since the last
 //   request. withdrawn, stuck, faulted: "command" alone.
 // From the start to "over" one experiment runs; a stop or abort raises MacroSlipStop, which stays

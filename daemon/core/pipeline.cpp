@@ -13,6 +13,7 @@ namespace beltgrip::daemon {
 
 using estimator::PeakKind;
 using estimator::StopReason;
+using estimator::VariatorSample;
 
 namespace {
 
@@ -25,7 +26,6 @@ constexpr Duration kConfirmationRetry = kSecond;  // then the frame is taken for
 
 constexpr Duration kStillComing = 50 * kMillisecond;
 
-constexpr double kPedalMoved = 0.05;    // while a request stands: the driver wants something
 constexpr double kSlipOfAPeak = 0.007;  // since the start: less of it has passed no peak
 constexpr double kBoundMargin = 0.97;   // of mu* carried without a ramp
 
@@ -172,11 +172,35 @@ bool Pipeline::Parts::by_conditions() const noexcept {
 }
 
 bool Pipeline::Parts::triggered() const noexcept {
-  if (by_conditions()) return arming.triggered();
+  if (by_conditions()) {
+    return in_experiment(state) ? ended_by() == StopReason::kNone : arming.triggered();
+  }
   if (config.trigger == Trigger::kAlways) return true;
   // A signal that has gone keeps its last word: the end of an experiment must be said.
   const SignalHistory& active = inputs.history(Role::kExperimentActive);
   return !active.empty() && active.newest_value() > 0.5;
+}
+
+// What of the car ends the experiment under way. Torque, ratio and slip are what it is about: they
+// are the estimator's to judge.
+StopReason Pipeline::Parts::ended_by() const noexcept {
+  const double speed_min_rad_s =
+      ClampRequest::kSpeedMargin * config.experiment.primary_speed_min_rad_s;
+  if (last.sample.omega_p_rad_s < speed_min_rad_s) return StopReason::kEngineSpeed;
+  return arming.ended_by(conditions);
+}
+
+// An observed experiment is over when what it needs of the car has gone, or when the force that was
+// lowered is back and holds the belt: not before, the flag tells whoever lowers it.
+bool Pipeline::Parts::observed_over() const noexcept {
+  const VariatorSample& sample = last.sample;
+  const double torque_Nm =
+      config.trigger == Trigger::kCoastDown ? -sample.torque_Nm : sample.torque_Nm;
+  if (!triggered() || inputs.any_lost() || torque_Nm < 0.0) return true;
+  const double restored_N = ClampRequest::kRestored * own_force_N;
+  return last.curve.usable && running.clamp_force_N < restored_N &&
+         measured_force_N() >= restored_N &&
+         arming.at_end_stop(sample.omega_s_rad_s / sample.omega_p_rad_s);
 }
 
 double Pipeline::Parts::value_or(Role role, double otherwise, bool& fresh) const noexcept {
@@ -222,7 +246,7 @@ ClampRequest::Now Pipeline::Parts::request_now(MonoTime t) const noexcept {
 // The trigger's preconditions, with the estimator's view of the sample before.
 void Pipeline::Parts::arm(MonoTime t) noexcept {
   conditions = read_conditions();
-  if (commands() && in_experiment(state)) return;
+  if (in_experiment(state)) return;
   Arming::Now now;
   now.t = t;
   now.usable = last.sample.usable && last.curve.usable;
@@ -276,15 +300,7 @@ void Pipeline::Parts::step_request(MonoTime t) noexcept {
   if (!commands()) return;
   if (state == State::kRamping) {
     if (!conditions.fresh || inputs.suspect()) withdraw(StopReason::kInputs);
-    if (!conditions.permitted) withdraw(StopReason::kPermission);
-    const bool coast = config.trigger == Trigger::kCoastDown;
-    if (conditions.brake_pressed || (coast && conditions.accelerator > kPedalMoved)) {
-      withdraw(StopReason::kDriver);
-    }
-    if (!conditions.lockup_closed) withdraw(StopReason::kTorque);
-    if (conditions.oil_degC < config.experiment.oil_temperature_min_degC - 1.0) {
-      withdraw(StopReason::kPermission);
-    }
+    withdraw(arming.ended_by(conditions));
     if (clamp_refused || faults.has(Fault::kForeignSender) || faults.has(Fault::kFrameRefused) ||
         unconfirmed(t)) {
       withdraw(StopReason::kBus);
@@ -323,12 +339,13 @@ void Pipeline::Parts::step_request(MonoTime t) noexcept {
 Guards Pipeline::Parts::guards(MonoTime t) const noexcept {
   Guards now;
   now.inputs_usable = last.sample.usable;
-  now.inputs_lost = inputs.any_lost() || samples_lost || starved(t);
+  now.inputs_lost =
+      inputs.any_lost() || samples_lost || starved(t) || (observes() && !conditions.fresh);
   now.bus_up = buses_up();
   now.triggered = triggered();
   now.settled = !by_conditions() || arming.settled();
   now.cleared = !commands() || arming.cleared();
-  now.released = !now.triggered;
+  now.released = observes() ? observed_over() : !now.triggered;
   now.cooled = true;
   if (!commands()) return now;
   // While a request stands, its own stops say when it ends.
@@ -408,6 +425,7 @@ void Pipeline::Parts::apply(const Transition& transition, MonoTime t) noexcept {
         request.begin(request_now(t), arming.ramp().rate_N_per_s,
                       arming.floor_N(last.sample.omega_s_rad_s));
       }
+      own_force_N = measured_force_N();
       estimator->reset();
       running = {};
       running.start = t;
@@ -427,7 +445,7 @@ void Pipeline::Parts::apply(const Transition& transition, MonoTime t) noexcept {
       stop(t, backup_stop != StopReason::kNone ? backup_stop : last.curve.stop);
       break;
     case Action::kEnd:
-      stop(t, StopReason::kNone);
+      stop(t, observes() ? ended_by() : StopReason::kNone);
       break;
     case Action::kAbort:
       macro_slip_stop = true;

@@ -30,7 +30,11 @@ struct Pipeline::Parts {
   void raise_bus_faults(MonoTime t) noexcept;
   bool by_conditions() const noexcept;  // trigger "coast_down" or "steady"
   bool commands() const noexcept { return config.control == Control::kCommand; }
+  // An experiment is what others do to the belt while the trigger's conditions hold.
+  bool observes() const noexcept { return by_conditions() && !commands(); }
   bool triggered() const noexcept;
+  estimator::StopReason ended_by() const noexcept;
+  bool observed_over() const noexcept;
   double value_or(Role role, double otherwise, bool& fresh) const noexcept;
   Conditions read_conditions() const noexcept;
   Duration slowest_stale() const noexcept;
@@ -88,6 +92,7 @@ struct Pipeline::Parts {
   EstimateValues estimate;             // the last that had a result
   estimator::LearnedFriction learned;  // over all experiments, where they are kept
   bool contradictory = false;          // the last result, in itself
+  double own_force_N = 0.0;            // before the experiment under way
   double slip_own_percent = 0.0;       // of the experiment under way, before it began
   // By direction and end stop.
   std::array<std::array<SlipShown, 2>, 2> slip_shown{};

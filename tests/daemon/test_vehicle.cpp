@@ -154,6 +154,7 @@ std::vector<can::StampedFrame> drive_frames(const Drive& drive) {
   };
   double force_N = drive.start_force_N;
   double slip = 0.0;  // fraction
+  const double sign = drive.overrun ? -1.0 : 1.0;
   const auto steps = static_cast<int>(drive.duration_s / kStep_s);
   for (int step = 0; step < steps; ++step) {
     force_N = std::max(force_N - drive.ramp_N_per_s * kStep_s, 1000.0);
@@ -170,10 +171,10 @@ std::vector<can::StampedFrame> drive_frames(const Drive& drive) {
     const double torque = mu * 2.0 * kRadius_m * force_N / kCos;
     const std::int64_t t = drive.start_ns + std::int64_t{step} * 1'000'000;
     if (step % 10 == 0) {
-      const double ratio = kRatio * (1.0 - slip);
+      const double ratio = kRatio * (1.0 - sign * slip);
       add(t, speeds_frame(noisy(kPrimary_rad_s, 0.02), noisy(kPrimary_rad_s * ratio, 0.04)));
     }
-    if (step % 10 == 3) add(t + 200'000, torque_frame(noisy(torque, 0.1)));
+    if (step % 10 == 3) add(t + 200'000, torque_frame(noisy(sign * torque, 0.1)));
     if (step % 20 == 5) {
       add(t + 400'000, pressure_frame(noisy((force_N - kSpring_N) / kArea_m2, 500.0)));
     }

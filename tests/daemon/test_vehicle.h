@@ -49,6 +49,7 @@ struct Drive {
   double start_force_N = 4500.0;
   double ramp_N_per_s = 300.0;  // 0: no experiment, the force stays
   bool noise = true;
+  bool overrun = false;  // the vehicle drives the engine
   std::int64_t start_ns = 1'000'000'000;
   std::uint32_t active_from_ms = 0, active_to_ms = 0;  // flag experiment_active
 };
