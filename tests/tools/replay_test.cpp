@@ -150,7 +150,34 @@ TEST_F(Replay, TextSaysWhyThereIsNoValue) {
     EXPECT_EQ(result.status, 0) << result.err;
     EXPECT_NE(result.out.find(wrong.says), std::string::npos) << wrong.role << "\n" << result.out;
     EXPECT_EQ(result.out.find("mu_max 0"), std::string::npos) << result.out;
+
+    // The same as JSON: no bound where nothing is known, and the reason where there is no line.
+    const RunResult lines =
+        beltgrip({"replay", path("trace.log"), "--config", path("wrong.toml"), "--json", "-"});
+    const std::vector<json> parsed = parse(lines.out);
+    const bool none = std::string(wrong.says).starts_with("no experiment");
+    ASSERT_EQ(parsed.size() > 1, !none) << lines.out;
+    EXPECT_EQ(lines.err.find(wrong.says) != std::string::npos, none) << lines.err;
+    for (const json& each : parsed) {
+      if (each.at("type") == "summary") continue;
+      EXPECT_TRUE(each.at("mu_max_lower_bound").is_null()) << lines.out;
+      EXPECT_TRUE(each.at("mu_max").is_null()) << lines.out;
+    }
   }
+}
+
+TEST_F(Replay, TextNamesTheInputThatWasLost) {
+  std::istringstream log(trace());
+  std::string kept, line;
+  // The pressure comes for the first third of the log only.
+  const auto third = lines(trace()) / 3;
+  for (auto n = 0 * third; std::getline(log, line); ++n) {
+    if (n < third || line.find(" 130#") == std::string::npos) kept += line + "\n";
+  }
+  place_->write("lost.log", kept);
+  const RunResult result = beltgrip(with_config({path("lost.log")}));
+  EXPECT_NE(result.out.find("no value: secondary_pressure was lost"), std::string::npos)
+      << result.out;
 }
 
 TEST_F(Replay, SeveralLogsAreSeparateRunsInTheirOrder) {

@@ -157,7 +157,12 @@ void run(const Options& options) {
         }
         frames += task.result->frames;
         if (json) json->write(experiment_lines(*task.result) + summary_line(*task.result));
-        if (text_to_stdout) std::fputs(text(*task.result).c_str(), stdout);
+        if (text_to_stdout) {
+          std::fputs(text(*task.result).c_str(), stdout);
+        } else if (task.result->experiments.empty()) {
+          std::fprintf(stderr, "beltgrip: %s: %s\n", task.result->log.c_str(),
+                       no_experiment(*task.result).c_str());
+        }
       });
   if (json) json->close();
   if (trace) trace->close();

@@ -35,10 +35,11 @@ const char* ratio_text(estimator::EndStop end_stop) {
 // Collects the results and writes the trace as samples come.
 class Sink final : public daemon::SampleSink {
  public:
-  Sink(ReplayResult& result, const daemon::Config& config, std::FILE* trace)
+  Sink(ReplayResult& result, const daemon::Pipeline& pipeline, const daemon::Config& config,
+       std::FILE* trace)
       : result_(result),
+        pipeline_(pipeline),
         trace_(trace),
-        counts_inhibits_(config.control == daemon::Control::kCommand),
         period_s_(1.0 / config.estimator.sample_rate_hz) {
     for (int phase = 0; phase < 4; ++phase) {
       phases_[phase] = own_label("BeltGripSlip", "Phase", phase);
@@ -52,8 +53,11 @@ class Sink final : public daemon::SampleSink {
   }
 
   void on_report(const daemon::SampleReport& report) noexcept override {
-    if (report.new_result) result_.experiments.push_back(report.result);
-    if (counts_inhibits_ && !report.in_experiment && (report.inhibits & kFeet) == 0) {
+    if (report.new_result) {
+      result_.experiments.push_back(report.result);
+      result_.lost.push_back(lost_now());
+    }
+    if (!report.in_experiment && (report.inhibits & kFeet) == 0) {
       for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
         if ((report.inhibits >> i & 1) != 0) result_.inhibited_s[i] += period_s_;
       }
@@ -82,6 +86,19 @@ class Sink final : public daemon::SampleSink {
   }
 
  private:
+  std::string lost_now() const {
+    std::string roles;
+    for (std::size_t i = 0; i < daemon::kRoleCount; ++i) {
+      const auto role = static_cast<daemon::Role>(i);
+      const daemon::SignalQuality quality = pipeline_.signal(role).quality;
+      if (quality != daemon::SignalQuality::kStale && quality != daemon::SignalQuality::kFrozen) {
+        continue;
+      }
+      roles += (roles.empty() ? "" : ", ") + std::string(daemon::role_name(role));
+    }
+    return roles;
+  }
+
   // A value that is no number leaves its cell empty.
   void append(double value) {
     row_ += ',';
@@ -95,8 +112,8 @@ class Sink final : public daemon::SampleSink {
                                          daemon::inhibit_bit(daemon::Inhibit::kInputs);
 
   ReplayResult& result_;
+  const daemon::Pipeline& pipeline_;
   std::FILE* trace_;
-  bool counts_inhibits_;
   double period_s_;
   std::string phases_[4];
   std::string row_;
@@ -212,7 +229,7 @@ std::string why_unusable(const daemon::Pipeline& pipeline, const daemon::Config&
        {Role::kPrimarySpeed, Role::kSecondarySpeed, Role::kSecondaryPressure, torque}) {
     const std::string name(daemon::role_name(role));
     const daemon::SignalObservation seen = pipeline.signal(role);
-    if (!seen.seen) return name + " never came with a value that is one";
+    if (!seen.seen) return name + ": no frame brought a value of it that is in the DBC's range";
     if (role == Role::kPrimarySpeed && seen.value <= 0.0) {
       return name + format(" is not above zero (last %.3g rad/s); is its sign wrong?", seen.value);
     }
@@ -222,7 +239,7 @@ std::string why_unusable(const daemon::Pipeline& pipeline, const daemon::Config&
 
 void run_pipeline(daemon::Port& port, daemon::Pipeline& pipeline, const daemon::Config& config,
                   estimator::StopReason end, ReplayResult& result, std::FILE* trace) {
-  Sink sink(result, config, trace);
+  Sink sink(result, pipeline, config, trace);
   daemon::run_loop(port, pipeline, config.estimator.sample_rate_hz, end, &sink);
   result.frames_decoded = pipeline.counters().frames_decoded;
   result.frames_bad = pipeline.counters().frames_bad;
@@ -306,12 +323,24 @@ ReplayResult replay(const std::vector<std::string>& paths, const std::string& in
   return result;
 }
 
+namespace {
+
+bool has_bound(const daemon::ExperimentResult& e) {
+  return e.outcome == daemon::Outcome::kInconclusive &&
+         e.peak.kind == estimator::PeakKind::kLowerBound && e.peak.mu_max > 0.0;
+}
+
+// A shaft that is read as standing still, or as turning the other way, is no slip.
+constexpr double kSlipMost_percent = 100.0;
+
+}  // namespace
+
 std::string experiment_lines(const ReplayResult& result) {
   std::string lines;
   JsonWriter json;
   for (const daemon::ExperimentResult& e : result.experiments) {
     const bool completed = e.outcome == daemon::Outcome::kCompleted;
-    const bool inconclusive = e.outcome == daemon::Outcome::kInconclusive;
+    const bool slips = e.stopped && e.sigma_stop_percent < kSlipMost_percent;
     json.begin_object()
         .field("type", "experiment")
         .field("log", result.log)
@@ -329,8 +358,8 @@ std::string experiment_lines(const ReplayResult& result) {
     } else {
       json.null();
     }
-    json.field("mu_max_lower_bound", inconclusive ? e.peak.mu_max : kJsonNull)
-        .field("sigma_stop_percent", e.stopped ? e.sigma_stop_percent : kJsonNull)
+    json.field("mu_max_lower_bound", has_bound(e) ? e.peak.mu_max : kJsonNull)
+        .field("sigma_stop_percent", slips ? e.sigma_stop_percent : kJsonNull)
         .field("contradictory", e.peak.contradictory)
         .field("impossible", e.peak.impossible)
         .field("sigma_peak_percent", completed ? e.peak.sigma_peak_percent : kJsonNull)
@@ -344,7 +373,7 @@ std::string experiment_lines(const ReplayResult& result) {
 }
 
 // Where nothing is known of mu_max.
-const char* why_no_value(const daemon::ExperimentResult& e) {
+std::string why_no_value(const daemon::ExperimentResult& e, const std::string& lost) {
   if (e.peak.contradictory) return "its points lie on no one friction curve";
   if (e.peak.impossible) {
     return "no belt has the friction that was read; is pressure, torque or their unit wrong?";
@@ -352,9 +381,9 @@ const char* why_no_value(const daemon::ExperimentResult& e) {
   switch (e.stop_reason) {
     case estimator::StopReason::kRatio:
       return "speeds and torque do not fit the ratio at the end stop; is a speed or the sign of "
-             "the "
-             "torque wrong, or the ratio off its stop?";
+             "the torque wrong, or the ratio off its stop?";
     case estimator::StopReason::kInputs:
+      if (e.outcome == daemon::Outcome::kAborted && !lost.empty()) return lost + " was lost";
       return "an input was lost, stood still, or read what cannot be";
     case estimator::StopReason::kTorque:
       return "the torque went to zero or changed its sign";
@@ -380,9 +409,33 @@ std::string summary_line(const ReplayResult& result) {
   return json.take() + "\n";
 }
 
+namespace {
+
+// What kept experiments from beginning, and how long; empty: nothing for long.
+std::string inhibits_text(const ReplayResult& result) {
+  std::string why;
+  for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
+    if (result.inhibited_s[i] < kShownInhibit_s) continue;
+    why += (why.empty() ? "" : ", ") + std::string(daemon::kInhibitNames[i]) +
+           format(" %.1f s", result.inhibited_s[i]);
+  }
+  return why;
+}
+
+}  // namespace
+
+std::string no_experiment(const ReplayResult& result) {
+  std::string why = result.unusable;
+  const std::string inhibits = inhibits_text(result);
+  if (why.empty() && !inhibits.empty()) why = "with no pedal pressed, kept away by " + inhibits;
+  if (why.empty()) why = "the trigger's conditions never held for long enough";
+  return "no experiment: " + why;
+}
+
 std::string text(const ReplayResult& result) {
   std::string out = result.log + "\n";
-  for (const daemon::ExperimentResult& e : result.experiments) {
+  for (std::size_t i = 0; i < result.experiments.size(); ++i) {
+    const daemon::ExperimentResult& e = result.experiments[i];
     out += "  " + outcome_text(e.outcome) + ", " + direction_text(e.direction) + ", " +
            ratio_text(e.end_stop) + ": ";
     const double end_s = static_cast<double>(e.end) * 1e-9;
@@ -395,22 +448,18 @@ std::string text(const ReplayResult& result) {
       out += format("  mu_max %.4f, std %.4f, 95 %% %.4f .. %.4f, peak at %.2f %% slip\n",
                     e.peak.mu_max, e.peak.mu_max_std, e.peak.ci95_low, e.peak.ci95_high,
                     e.peak.sigma_peak_percent);
-    } else if (e.outcome == daemon::Outcome::kInconclusive && e.peak.mu_max > 0.0) {
+    } else if (has_bound(e)) {
       out += format("  mu_max is at least %.4f\n", e.peak.mu_max);
     } else {
-      out += std::string("  no value: ") + why_no_value(e) + "\n";
+      out += "  no value: " + why_no_value(e, result.lost[i]) + "\n";
     }
   }
+  const std::string why = inhibits_text(result);
   if (result.experiments.empty()) {
-    out += "  no experiment" + (result.unusable.empty() ? "" : ": " + result.unusable) + "\n";
+    out += "  " + no_experiment(result) + "\n";
+  } else if (!why.empty()) {
+    out += "  neither pedal pressed, and no experiment for: " + why + "\n";
   }
-  std::string why;
-  for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
-    if (result.inhibited_s[i] < kShownInhibit_s) continue;
-    why += (why.empty() ? "" : ", ") + std::string(daemon::kInhibitNames[i]) +
-           format(" %.1f s", result.inhibited_s[i]);
-  }
-  if (!why.empty()) out += "  neither pedal pressed, and no experiment for: " + why + "\n";
   out += format("  %llu frames in %.1f s, %llu decoded, %llu bad; %llu bad lines\n",
                 static_cast<unsigned long long>(result.frames),
                 static_cast<double>(result.duration_ns) * 1e-9,

@@ -20,6 +20,7 @@ namespace beltgrip::cli {
 struct ReplayResult {
   std::string log;  // its name: the path, joined ones with "+"
   std::vector<daemon::ExperimentResult> experiments;
+  std::vector<std::string> lost;  // with each: the roles that were lost as it ended; empty: none
   std::vector<std::string> warnings;  // one line each
   std::uint64_t frames = 0;           // in the log
   std::uint64_t frames_decoded = 0;
@@ -28,7 +29,7 @@ struct ReplayResult {
   std::int64_t duration_ns = 0;
   std::string unusable;  // what was wrong with the inputs in the end; empty: nothing
   // How long each daemon::Inhibit kept an experiment from beginning while the driver's feet did
-  // not, control "command".
+  // not, triggers "coast_down" and "steady".
   std::array<double, daemon::kInhibitCount> inhibited_s{};
 };
 
@@ -57,6 +58,8 @@ void run_daemon(daemon::Port& port, const daemon::Config& config, ReplayResult& 
 // A line for each experiment, and the line of the summary.
 std::string experiment_lines(const ReplayResult& result);
 std::string summary_line(const ReplayResult& result);
+// Why there was none.
+std::string no_experiment(const ReplayResult& result);
 std::string text(const ReplayResult& result);
 
 // "12.345" without a rounding error, whatever the origin of the stamps.
