@@ -24,6 +24,7 @@ class GlitchGate {
   // further from that than `share` of it, and than `least`.
   double step(double value, double share, double least) noexcept {
     ++since_;
+    jumped_ = false;
     if (count_ < window_) return take(value);
     const double expected = next_on_line();
     if (std::abs(value - expected) <= std::max(share * std::abs(expected), least)) {
@@ -32,16 +33,21 @@ class GlitchGate {
       return take(value);
     }
     // Readings that do so again and again rattle: that is for others to judge.
+    const double away = value - expected;
     if (held_ < hold_ && (held_ > 0 || since_ > apart_)) {
-      ++held_;
+      if (held_++ == 0) first_away_ = away;
       return take(expected);
     }
+    jumped_ = held_ > 0 && std::abs(away - first_away_) < kSame * std::abs(first_away_);
     reset();
     return take(value);
   }
+  // With the last sample: it had gone to another level at once, and stayed there.
+  bool jumped() const noexcept { return jumped_; }
 
  private:
   static constexpr double kWindow_s = 0.06, kHold_s = 0.05, kApart_s = 0.5;
+  static constexpr double kSame = 0.3;
   static constexpr std::size_t kMost = 60;
   static std::size_t samples(double time_s, double rate_hz) {
     return static_cast<std::size_t>(std::lround(time_s * rate_hz));
@@ -68,7 +74,9 @@ class GlitchGate {
   std::size_t window_, hold_, apart_;
   double step_per_moment_;  // of the line, from the middle of the window to one sample beyond it
   std::size_t count_ = 0;
-  std::size_t held_ = 0;   // samples, of a jump that may come back
+  std::size_t held_ = 0;  // samples, of a jump that may come back
+  double first_away_ = 0.0;
+  bool jumped_ = false;
   std::size_t since_ = 0;  // samples since the last one came back, or since the beginning
 };
 

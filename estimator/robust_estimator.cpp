@@ -8,6 +8,7 @@
 #include "estimator/excitation.h"
 #include "estimator/experiment_record.h"
 #include "estimator/follow_on.h"
+#include "estimator/force_step.h"
 #include "estimator/frozen_reading.h"
 #include "estimator/glitch_gate.h"
 #include "estimator/peak_fit.h"
@@ -65,6 +66,7 @@ class RobustEstimator final : public SlipCurveEstimator {
         record_(settings.sample_rate_hz),
         detector_(thresholds),
         after_stop_(settings.sample_rate_hz),
+        force_step_(settings.sample_rate_hz),
         peak_forecast_(settings.sample_rate_hz),
         pressure_reading_(settings.sample_rate_hz),
         torque_reading_(settings.sample_rate_hz),
@@ -81,6 +83,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     chain_.reset();
     excitation_.reset();
     record_.reset();
+    force_step_.reset();
     pressure_reading_.reset();
     torque_reading_.reset();
     omega_p_reading_.reset();
@@ -97,7 +100,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     narrow_ = 0;
     first_mu_ = first_force_N_ = 0.0;
     started_ = concluding_ = concluded_ = false;
-    waiting_ = refitting_ = stepped_ = false;
+    waiting_ = refitting_ = stepped_ = force_stepped_ = speed_jumped_ = false;
   }
 
   const CurveEstimate& step(const VariatorSample& read) noexcept override {
@@ -128,8 +131,9 @@ class RobustEstimator final : public SlipCurveEstimator {
     torque_reading_.step(read.torque_Nm);
     omega_p_reading_.step(read.omega_p_rad_s);
     omega_s_reading_.step(read.omega_s_rad_s);
-    const bool cell = record_.step(cell_of(sample));
-    if (cell) decide();
+    const Cell cell = cell_of(sample);
+    force_stepped_ |= force_step_.step(cell, record_.slip_noise(), record_.force());
+    if (record_.step(cell)) decide();
     if (peak_forecast_.step()) expect();
     return out_;
   }
@@ -205,6 +209,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     clean.omega_s_rad_s = omega_s_gate_.step(sample.omega_s_rad_s, slip, 0.0);
     clean.torque_Nm =
         torque_gate_.step(sample.torque_Nm, kGlitchTorque, least(record_.torque_noise()));
+    speed_jumped_ |= omega_p_gate_.jumped() || omega_s_gate_.jumped();
     return clean;
   }
 
@@ -352,7 +357,8 @@ class RobustEstimator final : public SlipCurveEstimator {
   }
 
   bool contradictory(const PeakFitResult& fit) const noexcept {
-    return record_.torque_stepped() || after_stop_.swung_back() ||
+    return record_.torque_stepped() || force_stepped_ || speed_jumped_ ||
+           after_stop_.swung_back() ||
            (fit.valid && follow_on_.stood_still(fit.mu, traction_, inertia_kg_m2_)) ||
            fit.below_chord > kChordDeviations || fit.residuals.innovation > kInnovation ||
            fit.residuals.runs > kRuns;
@@ -368,6 +374,7 @@ class RobustEstimator final : public SlipCurveEstimator {
   ExperimentRecord record_;
   StopDetector detector_;
   AfterStop after_stop_;
+  ForceStep force_step_;
   FollowOn follow_on_;
   std::size_t next_after_ = 0;  // to join the record
   PeakFit fit_;
@@ -383,9 +390,11 @@ class RobustEstimator final : public SlipCurveEstimator {
   double first_mu_ = 0.0, first_force_N_ = 0.0;
   int narrow_ = 0;  // forecasts in a row within confidence_width
   bool started_ = false, concluding_ = false, concluded_ = false;
-  bool waiting_ = false;    // for what comes after the stop
-  bool refitting_ = false;  // with it
-  bool stepped_ = false;    // since the last conclude()
+  bool waiting_ = false;        // for what comes after the stop
+  bool refitting_ = false;      // with it
+  bool stepped_ = false;        // since the last conclude()
+  bool force_stepped_ = false;  // its reading
+  bool speed_jumped_ = false;   // the reading of one
 };
 
 }  // namespace

@@ -106,6 +106,47 @@ TEST(BadInput, TorqueThatGoesToZeroEndsTheExperiment) {
   EXPECT_NE(estimator->peak().kind, PeakKind::kValue);
 }
 
+// A reading that goes to another level in the midst of the ramp, and perhaps comes back.
+struct Jump {
+  const char* name;
+  double VariatorSample::*channel;
+  double factor;
+  double lasts_s;
+};
+void PrintTo(const Jump& jump, std::ostream* out) { *out << jump.name; }
+
+class ReadingThatJumps : public testing::TestWithParam<Jump> {};
+
+TEST_P(ReadingThatJumps, GivesNoValueAndIsSaid) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Rig rig = {.friction = test::round_peak(0.105, 2.5), .seed = seed};
+    const auto estimator = make_slip_curve_estimator(rig_settings(rig), {}, {});
+    double jumps_s = -1.0;
+    for (auto& point : rig_trace(rig)) {
+      const double t_s = 1e-9 * static_cast<double>(point.sample.t_ns);
+      if (jumps_s < 0.0 && point.mu > 0.09) jumps_s = t_s;
+      if (jumps_s >= 0.0 && t_s < jumps_s + GetParam().lasts_s) {
+        point.sample.*GetParam().channel *= GetParam().factor;
+      }
+      if (estimator->step(point.sample).stop != StopReason::kNone) break;
+    }
+    for (int i = 0; i < 10000 && !estimator->conclude(); ++i) {
+    }
+    EXPECT_NE(estimator->peak().kind, PeakKind::kValue) << seed;
+    EXPECT_TRUE(estimator->peak().contradictory) << seed;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Jumps, ReadingThatJumps,
+    testing::Values(
+        Jump{"PressureUp", &VariatorSample::secondary_pressure_Pa, 1.1, 1e9},
+        Jump{"PressureDown", &VariatorSample::secondary_pressure_Pa, 0.93, 1e9},
+        Jump{"SecondaryUpForAFifthOfASecond", &VariatorSample::omega_s_rad_s, 1.02, 0.2},
+        Jump{"SecondaryDown", &VariatorSample::omega_s_rad_s, 0.98, 1e9},
+        Jump{"PrimaryDownForAFifthOfASecond", &VariatorSample::omega_p_rad_s, 0.98, 0.2}),
+    [](const auto& each) { return std::string(each.param.name); });
+
 // A channel that stands still from some instant of the ramp on, its frames still arriving.
 struct Frozen {
   const char* name;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "estimator/follow_on.h"
+#include "estimator/force_step.h"
 #include "estimator/step_watch.h"
 #include "estimator/trend.h"
 
@@ -104,6 +105,39 @@ TEST(StepWatch, SeesAStepAndNoDriftAndNoneWhereSlipMoves) {
   EXPECT_TRUE(steps(down, still));
   EXPECT_FALSE(steps(down, creeps));
   EXPECT_TRUE(steps(up, creeps));
+}
+
+// mu* is T / F, the curve a straight line of slip over mu*: a belt follows the true force.
+TEST(ForceStep, SeesAReadingThatStepsWhereSlipStaysAndNoForceThatSlipFollows) {
+  using Force = double (*)(double);
+  const auto steps = [](Force truth, Force read_of_truth) {
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal;
+    ForceStep watch(200.0);
+    Trend trend(200.0, 4096);
+    bool seen = false;
+    for (int i = 0; i < 4000; ++i) {
+      const double t = i / 200.0;
+      const double force_N = truth(t) * read_of_truth(t) + 10.0 * normal(random);
+      const Cell cell{.t_s = t,
+                      .slip_percent = 8000.0 / truth(t) - 1.0 + 0.02 * normal(random),
+                      .torque_Nm = 50.0,
+                      .clamp_force_N = force_N,
+                      .omega_p_rad_s = 100.0};
+      seen |= watch.step(cell, 0.02 * 0.02 / 200.0, trend);
+      trend.step(t, force_N, 0.0);
+    }
+    return seen;
+  };
+  const auto ramp = [](double t) { return 5000.0 - 100.0 * t; };
+  const auto right = [](double) { return 1.0; };
+  EXPECT_FALSE(steps(ramp, right));
+  EXPECT_TRUE(steps(ramp, [](double t) { return t < 10.0 ? 1.0 : 0.9; }));
+  EXPECT_TRUE(steps(ramp, [](double t) { return t < 10.0 ? 1.0 : 1.05; }));
+  EXPECT_FALSE(steps(ramp, [](double t) { return t < 10.0 ? 1.0 : 1.005; }));
+  EXPECT_FALSE(
+      steps([](double t) { return (t < 10.0 ? 1.0 : 0.9) * (5000.0 - 100.0 * t); }, right));
+  EXPECT_FALSE(steps([](double t) { return 5000.0 - 200.0 * std::max(0.0, t - 5.0); }, right));
 }
 
 TEST(Trend, LearnsTheNoiseBesideAStepAndACorner) {
