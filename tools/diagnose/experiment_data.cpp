@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace beltgrip::diagnose {
 namespace {
@@ -110,6 +111,57 @@ std::vector<bool> saturated_samples(const Channel& channel, double start_s, int 
   return out;
 }
 
+// One sigma of a rounding that no noise carries from step to step, so that no averaging removes it:
+// there the samples repeat their neighbours. Relative to the mean value.
+double held_rounding(const Channel& channel) {
+  std::vector<double> steps;
+  double held = 0.0, sum = 0.0;
+  const std::vector<double>& x = channel.value;
+  for (std::size_t i = 1; i + 1 < x.size(); ++i) {
+    held += x[i - 1] == x[i] && x[i] == x[i + 1] ? 1.0 : 0.0;
+    sum += std::abs(x[i]);
+    if (x[i] != x[i - 1]) steps.push_back(std::abs(x[i] - x[i - 1]));
+  }
+  if (steps.empty() || sum == 0.0) return 0.0;
+  const auto step = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 100);
+  std::nth_element(steps.begin(), step, steps.end());
+  const auto count = static_cast<double>(x.size() - 2);
+  return *step / std::sqrt(12.0) * std::sqrt(held / count) / (sum / count);
+}
+
+struct LocalFit {
+  ArrayXd value, slope;
+};
+// Local linear fit with Gaussian weights; where there is none, what is given.
+LocalFit local_fit(const ArrayXd& values, const ArrayXd& slopes, double dt_s, double sigma_s) {
+  LocalFit out{values, slopes};
+  const auto n = static_cast<int>(values.size());
+  const int reach = static_cast<int>(std::ceil(3.0 * sigma_s / dt_s));
+  std::vector<double> weight;
+  for (int i = 0; i <= reach; ++i) {
+    weight.push_back(std::exp(-0.5 * std::pow(i * dt_s / sigma_s, 2.0)));
+  }
+  for (int k = 0; k < n; ++k) {
+    double w0 = 0.0, w1 = 0.0, w2 = 0.0, y0 = 0.0, y1 = 0.0;
+    for (int i = std::max(0, k - reach); i <= std::min(n - 1, k + reach); ++i) {
+      const double y = values[i];
+      if (!std::isfinite(y)) continue;
+      const double w = weight[static_cast<std::size_t>(std::abs(i - k))];
+      const double u = (i - k) * dt_s;
+      w0 += w;
+      w1 += w * u;
+      w2 += w * u * u;
+      y0 += w * y;
+      y1 += w * u * y;
+    }
+    const double determinant = w0 * w2 - w1 * w1;
+    if (!std::isfinite(values[k]) || determinant <= 0.02 * w0 * w0 * dt_s * dt_s) continue;
+    out.value[k] = (w2 * y0 - w1 * y1) / determinant;
+    out.slope[k] = (w0 * y1 - w1 * y0) / determinant;
+  }
+  return out;
+}
+
 int stop_of(double speed_ratio, double force_N, const estimator::VariatorParameters& variator) {
   if (!(speed_ratio > 0.0)) return kNoStop;
   const auto at = [&](double stop) {
@@ -148,31 +200,43 @@ void trim_and_segment(ExperimentData& data) {
 }  // namespace
 
 void add_slow(GridSignal& signal, double dt_s) {
+  const LocalFit fit = local_fit(signal.value, signal.slope, dt_s, kSlowSigma_s);
+  signal.slow = fit.value;
+  signal.slow_slope = fit.slope;
+}
+
+void widen_slow(GridSignal& signal, double dt_s) {
+  constexpr std::array kWider_s{0.5, 1.0, 2.0};
+  constexpr double kSigmas = 2.5;
   const auto n = static_cast<int>(signal.value.size());
-  signal.slow = signal.value;
-  signal.slow_slope = signal.slope;
-  const int reach = static_cast<int>(std::ceil(3.0 * kSlowSigma_s / dt_s));
-  std::vector<double> weight;
-  for (int i = 0; i <= reach; ++i) {
-    weight.push_back(std::exp(-0.5 * std::pow(i * dt_s / kSlowSigma_s, 2.0)));
+  std::vector<double> second;
+  for (int k = 2; k + 2 < n; ++k) {
+    const double d = signal.value[k - 2] - 2.0 * signal.value[k] + signal.value[k + 2];
+    if (std::isfinite(d)) second.push_back(std::abs(d));
   }
-  for (int k = 0; k < n; ++k) {
-    double w0 = 0.0, w1 = 0.0, w2 = 0.0, y0 = 0.0, y1 = 0.0;
-    for (int i = std::max(0, k - reach); i <= std::min(n - 1, k + reach); ++i) {
-      const double y = signal.value[i];
-      if (!std::isfinite(y)) continue;
-      const double w = weight[static_cast<std::size_t>(std::abs(i - k))];
-      const double u = (i - k) * dt_s;
-      w0 += w;
-      w1 += w * u;
-      w2 += w * u * u;
-      y0 += w * y;
-      y1 += w * u * y;
+  if (second.size() < 20) return;
+  std::nth_element(second.begin(), second.begin() + static_cast<std::ptrdiff_t>(second.size() / 2),
+                   second.end());
+  const double sigma = 1.4826 * second[second.size() / 2] / std::sqrt(6.0);
+  // One sigma of a local linear fit's value in the middle: its weights are Gaussian.
+  const auto spread = [&](double width_s) {
+    return sigma * std::sqrt(dt_s / (2.0 * std::sqrt(std::numbers::pi) * width_s));
+  };
+  ArrayXd low = signal.slow - kSigmas * spread(kSlowSigma_s);
+  ArrayXd high = signal.slow + kSigmas * spread(kSlowSigma_s);
+  std::vector<bool> agrees(static_cast<std::size_t>(n), true);
+  for (const double width_s : kWider_s) {
+    const LocalFit fit = local_fit(signal.value, signal.slope, dt_s, width_s);
+    const double around = kSigmas * spread(width_s);
+    for (int k = 0; k < n; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      agrees[i] = agrees[i] && fit.value[k] - around < high[k] && fit.value[k] + around > low[k];
+      if (!agrees[i]) continue;
+      signal.slow[k] = fit.value[k];
+      signal.slow_slope[k] = fit.slope[k];
+      low[k] = std::max(low[k], fit.value[k] - around);
+      high[k] = std::min(high[k], fit.value[k] + around);
     }
-    const double determinant = w0 * w2 - w1 * w1;
-    if (!std::isfinite(signal.value[k]) || determinant <= 0.02 * w0 * w0 * dt_s * dt_s) continue;
-    signal.slow[k] = (w2 * y0 - w1 * y1) / determinant;
-    signal.slow_slope[k] = (w0 * y1 - w1 * y0) / determinant;
   }
 }
 
@@ -224,6 +288,9 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
   data.command = on_grid(Role::kSecondaryPressureCommand);
   data.temperature = on_grid(Role::kOilTemperature);
 
+  data.rounding_slip =
+      std::hypot(held_rounding(speed), held_rounding(table[Role::kSecondarySpeed]));
+
   data.line_p = order_line(speed);
   data.line_s = order_line(table[Role::kSecondarySpeed]);
 
@@ -259,6 +326,7 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
     data.saturated_pressure |= saturated[i];
   }
   trim_and_segment(data);
+  widen_slow(data.pressure, data.dt_s);
   if (data.saturated_pressure) {
     data.notes.push_back(table.name + ": secondary_pressure rests on its bound; left out there");
   }

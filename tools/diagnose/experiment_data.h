@@ -38,6 +38,7 @@ struct ExperimentData {
   std::vector<int> start_of_segment;  // first valid sample of every gapless stretch
   int valid_count = 0;
   bool saturated_pressure = false;
+  double rounding_slip = 0.0;  // one sigma of what the rounding of the speeds leaves in the slip
   std::vector<std::string> notes;
   int size() const { return static_cast<int>(t_s.size()); }
 };
@@ -47,6 +48,10 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
 
 // Both slow copies, from value.
 void add_slow(GridSignal& signal, double dt_s);
+
+// Slow copies over the widest of some windows that agrees with all narrower ones within their
+// noise: a signal that moves on straight lines is left with next to none of its noise.
+void widen_slow(GridSignal& signal, double dt_s);
 
 // slow(t + shift), cubic; held at the ends. Seconds.
 Eigen::ArrayXd shifted(const GridSignal& signal, double dt_s, double shift_s);

@@ -28,12 +28,13 @@ std::array<ResidualColumns, kRandomEffects> random_columns(const Campaign& campa
   QuantityChange level, seat, zero, zero_out, zero_track;
   level.ln_capacity = ArrayXd::Ones(n);
   out[0] = propagate(campaign, at, level);
-  seat.slip = ArrayXd::Ones(n);
+  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+  // A speed that is held on one step of its rounding is off by the same all along.
+  seat.slip = ArrayXd::Constant(n, std::hypot(1.0, data.rounding_slip / kDefaultScatter[1]));
   out[1] = propagate(campaign, at, seat);
   zero.torque = ArrayXd::Ones(n);
   zero.balance = ArrayXd::Ones(n);
   out[2] = propagate(campaign, at, zero);
-  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   QuantityChange peak;
   peak.torque = ArrayXd::Zero(n);
   for (Index k = 0; k < n; ++k) {
@@ -121,6 +122,11 @@ Scatter default_scatter() {
     out.variance[i] = s * s;
   }
   return out;
+}
+
+bool parts_experiments(const Scatter& without, const Scatter& with) {
+  constexpr double kMore = 4.0;  // of the variance, on balance of all kinds
+  return (with.variance / without.variance).prod() > kMore;
 }
 
 Whitening identity_whitening(const Campaign& campaign) {

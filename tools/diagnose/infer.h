@@ -49,6 +49,9 @@ struct Scatter {
   Eigen::Array<double, kRandomEffects, 1> variance;
 };
 Scatter default_scatter();
+// A cause that acts in every experiment makes them more alike. What fits within each of them and
+// drives them apart is none: a noise in the regressors that it happens to divide.
+bool parts_experiments(const Scatter& without, const Scatter& with);
 
 // Parameters in play: their columns in the summaries, the prior (in scaled units around the
 // linearisation point).

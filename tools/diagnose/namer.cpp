@@ -207,6 +207,7 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
       const std::optional<Hypothesis>& rival = rivals[i];
       if (!rival) continue;
       const Hypothesis& other = *rival;
+      if (parts_experiments(without.fit.scatter, other.fit.scatter)) continue;
       evidence[id_of(engine, ranked[i].second)].push_back(other.log_evidence);
       if (id_of(engine, ranked[i].second) != id_of(engine, out.slot) &&
           other.log_evidence > whole.log_evidence - std::log(kClassOdds)) {
@@ -376,7 +377,7 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
     // an effect would lead.
     const bool possible = Engine::curve_is_possible(engine.state());
     const bool far = !possible || std::any_of(scores.begin(), scores.end(),
-                                           [](const Score& score) { return score.gain > kFar; });
+                                              [](const Score& score) { return score.gain > kFar; });
     Hypothesis best;
     bool found = false;
     // From the linear estimate, and where that leaves the range of the linear, from the present.
@@ -395,6 +396,7 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
         if (!(chi2 > out.threshold)) return;
       }
       if (!credible(engine, h)) return;
+      if (parts_experiments(base.fit.scatter, h.fit.scatter)) return;
       if (gain < out.threshold || (first_gain > 0.0 && gain < kShareOfFirst * first_gain)) return;
       if (!found || h.log_evidence > best.log_evidence) {
         best = std::move(h);

@@ -354,7 +354,8 @@ std::vector<double> estimate_slip_noise_shares(const Campaign& campaign, const M
       slip.push_back((q.slip[k - 4] - 2.0 * q.slip[k] + q.slip[k + 4]) / std::sqrt(6.0));
     }
     const double here = robust_sigma(slip);
-    sigma.push_back(here > 0.0 ? std::clamp(here / campaign.noise.slip, kLeast, kMost) : 1.0);
+    const double share = here > 0.0 ? std::clamp(here / campaign.noise.slip, kLeast, kMost) : 1.0;
+    sigma.push_back(std::max(share, data.rounding_slip / campaign.noise.slip));
   }
   return sigma;
 }

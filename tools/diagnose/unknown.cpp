@@ -199,6 +199,10 @@ std::vector<UnknownGroup> score_groups(const Engine& engine) {
       const double energy = direction.dot(plain.bottomRightCorner(3, 3) * direction);
       const double own = energy - mixed.dot(plain.topLeftCorner(n, n).ldlt().solve(mixed));
       if (own < kOwnShareMin * energy) continue;
+      // What fits no better and only spares the machine's constants their way explains nothing.
+      if (group.share <= 0.0 || parts_experiments(none.scatter, fit.scatter)) continue;
+      // Its rest alone is seen; what they imitate is whatever fits best.
+      group.size *= std::sqrt(std::min(own / energy, 1.0));
       const double degrees =
           engine.degrees(direction.dot(with * direction), direction.dot(without * direction));
       group.chi2 = chi2_of_f(wald / 3.0, 3.0, degrees);

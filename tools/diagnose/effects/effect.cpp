@@ -131,7 +131,7 @@ constexpr std::array kRows{
         "omega_measured = (1 + x) omega_true", "speed", "secondary_speed",
         "high clamp force and little torque at both end stops: a speed scale shows the same at "
         "both"},
-    EffectRow{"channel_skew", "delay_s", "s", kMeasure, 0.02, -0.3, 0.3, apply_channel_skew,
+    EffectRow{"channel_skew", "delay_s", "s", kMeasure, 0.03, -0.3, 0.3, apply_channel_skew,
               "x_measured(t) = x_true(t - delay)", "speed", "rate of the channel",
               "speed steps at constant torque and clamp force"},
 };
