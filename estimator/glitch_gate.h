@@ -35,14 +35,15 @@ class GlitchGate {
     // Readings that do so again and again rattle: that is for others to judge.
     const double away = value - expected;
     if (held_ < hold_ && (held_ > 0 || since_ > apart_)) {
-      if (held_++ == 0) first_away_ = away;
+      if (++held_ == (hold_ + 1) / 2) half_way_ = away;
       return take(expected);
     }
-    jumped_ = held_ > 0 && std::abs(away - first_away_) < kSame * std::abs(first_away_);
+    jumped_ = held_ > 0 && std::abs(away - half_way_) < kSame * std::abs(half_way_);
     reset();
     return take(value);
   }
-  // With the last sample: it had gone to another level at once, and stayed there.
+  // With the last sample: it had gone to another level, within half of what is held, and stayed
+  // there. What runs away goes on doing so.
   bool jumped() const noexcept { return jumped_; }
 
  private:
@@ -74,8 +75,8 @@ class GlitchGate {
   std::size_t window_, hold_, apart_;
   double step_per_moment_;  // of the line, from the middle of the window to one sample beyond it
   std::size_t count_ = 0;
-  std::size_t held_ = 0;  // samples, of a jump that may come back
-  double first_away_ = 0.0;
+  std::size_t held_ = 0;   // samples, of a jump that may come back
+  double half_way_ = 0.0;  // how far away it was then
   bool jumped_ = false;
   std::size_t since_ = 0;  // samples since the last one came back, or since the beginning
 };

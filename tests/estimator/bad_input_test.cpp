@@ -112,6 +112,7 @@ struct Jump {
   double VariatorSample::*channel;
   double factor;
   double lasts_s;
+  double takes_s = 0.0;  // from one frame to the next
 };
 void PrintTo(const Jump& jump, std::ostream* out) { *out << jump.name; }
 
@@ -126,7 +127,9 @@ TEST_P(ReadingThatJumps, GivesNoValueAndIsSaid) {
       const double t_s = 1e-9 * static_cast<double>(point.sample.t_ns);
       if (jumps_s < 0.0 && point.mu > 0.09) jumps_s = t_s;
       if (jumps_s >= 0.0 && t_s < jumps_s + GetParam().lasts_s) {
-        point.sample.*GetParam().channel *= GetParam().factor;
+        const double share =
+            GetParam().takes_s > 0.0 ? std::min(1.0, (t_s - jumps_s) / GetParam().takes_s) : 1.0;
+        point.sample.*GetParam().channel *= 1.0 + share * (GetParam().factor - 1.0);
       }
       if (estimator->step(point.sample).stop != StopReason::kNone) break;
     }
@@ -143,6 +146,8 @@ INSTANTIATE_TEST_SUITE_P(
         Jump{"PressureUp", &VariatorSample::secondary_pressure_Pa, 1.1, 1e9},
         Jump{"PressureDown", &VariatorSample::secondary_pressure_Pa, 0.93, 1e9},
         Jump{"SecondaryUpForAFifthOfASecond", &VariatorSample::omega_s_rad_s, 1.02, 0.2},
+        Jump{"SecondaryDownFromFrameToFrame", &VariatorSample::omega_s_rad_s, 0.95, 0.2, 0.02},
+        Jump{"PrimaryUpFromFrameToFrame", &VariatorSample::omega_p_rad_s, 1.05, 1e9, 0.02},
         Jump{"SecondaryDown", &VariatorSample::omega_s_rad_s, 0.98, 1e9},
         Jump{"PrimaryDownForAFifthOfASecond", &VariatorSample::omega_p_rad_s, 0.98, 0.2}),
     [](const auto& each) { return std::string(each.param.name); });
