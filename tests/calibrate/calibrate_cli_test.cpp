@@ -28,6 +28,28 @@ class Calibrate : public testing::Test {
   Workplace place;
 };
 
+// The shipped traffic, with kick-downs: a ratio that moves quickly passes for no inertia.
+TEST_F(Calibrate, TheShippedCityDriveTellsItsInertia) {
+  for (const char* seed : {"11", "21"}) {
+    ASSERT_EQ(
+        beltgrip({"simulate", "--scenario", "city", "--seed", seed, "--out-dir", place.path(seed)})
+            .status,
+        0);
+    const std::string at = place.path(seed) + "/";
+    const RunResult result =
+        beltgrip({"calibrate", at + "trace.log", "--config", at + "beltgrip.toml", "--json", "-"});
+    ASSERT_EQ(result.status, 0) << result.err;
+    const auto json = nlohmann::json::parse(result.out);
+    for (const auto& each : json["findings"]) {
+      if (each["key"] != "variator.primary_inertia_kg_m2") continue;
+      const double truth = 0.14 + 0.04;  // engine and primary pulley of coast-overdrive.toml
+      EXPECT_LE(each["ci95"][0].get<double>(), truth) << seed;
+      EXPECT_GE(each["ci95"][1].get<double>(), truth) << seed;
+      EXPECT_NEAR(each["value"].get<double>(), truth, 0.006) << seed;
+    }
+  }
+}
+
 TEST_F(Calibrate, WritesKeysThatAreTaken) {
   DriveTruth truth;
   truth.ratio_overdrive = 2.262;

@@ -39,7 +39,7 @@ Finding pressure_zero(std::span<const diagnose::SignalTable> logs);
 
 // Steps of the engine torque (fuel cut and its end): over each, with its own constant and slope for
 // the load,
-//   T_engine(t + delay) = J omega_p' + M r omega_s' + c_0 + c_1 t
+//   T_engine(t + delay) = J omega_p' + r (M omega_s' + c_0 + c_1 t)
 // with J and M common to all. J is what the configuration calls primary_inertia_kg_m2; the
 // vehicle's inertia M is told from it by different ratios, or by a ratio that moves.
 std::vector<Finding> inertia(std::span<const diagnose::SignalTable> logs,

@@ -141,7 +141,8 @@ struct Fitted {
   double ratio_low = std::numeric_limits<double>::infinity(), ratio_high = 0.0;
 };
 
-// Every event takes off its own constant and slope: the load, which changes slowly.
+// Every event takes off its own constant and slope: the load, which changes slowly and comes
+// through the ratio.
 Fitted fit_all(const std::vector<Event>& all, double delay_s) {
   Observations data;
   Eigen::MatrixXd noise = Eigen::MatrixXd::Zero(2, 2);
@@ -154,16 +155,20 @@ Fitted fit_all(const std::vector<Event>& all, double delay_s) {
     Eigen::VectorXd y(cells);
     double ratio_square = 0.0;
     for (int i = 0; i < cells; ++i) {
-      const double ratio = mean(event.secondary, i) / mean(event.primary, i);
+      // Where the derivatives are: at the joint of both cells. Half a cell beside it, a ratio that
+      // moves passes for an inertia.
+      const double ratio = (mean(event.secondary, i) + mean(event.secondary, i + 1)) /
+                           (mean(event.primary, i) + mean(event.primary, i + 1));
       result.ratio_low = std::min(result.ratio_low, ratio);
       result.ratio_high = std::max(result.ratio_high, ratio);
       x(i, 0) = (mean(event.primary, i + 1) - mean(event.primary, i)) / kCell_s;
       x(i, 1) = ratio * (mean(event.secondary, i + 1) - mean(event.secondary, i)) / kCell_s;
       y[i] = under_triangle(torque, i);
-      load(i, 0) = 1.0;
-      load(i, 1) = i - 0.5 * (cells - 1);
+      load(i, 0) = ratio;
+      load(i, 1) = ratio * (i - 0.5 * (cells - 1));
       ratio_square += ratio * ratio / cells;
     }
+    load.col(1) -= load.col(0) * (load.col(0).dot(load.col(1)) / load.col(0).squaredNorm());
     const Eigen::VectorXd norm = load.colwise().squaredNorm();
     for (Eigen::Index j = 0; j < 2; ++j) {
       const Eigen::VectorXd column = load.col(j);
