@@ -8,13 +8,11 @@ namespace {
 
 constexpr double kCell_s = 0.05;
 constexpr std::size_t kGapCells = 2;
-constexpr std::size_t kShortest = 2, kLongest = 32;  // cells in each of four groups
+constexpr std::size_t kShortest = 2, kLongest = 64;  // cells in each of four groups
 constexpr double kDeviations = 5.0;
 constexpr double kShare = 0.015;    // of the force
 constexpr double kLeastMove = 0.4;  // of what slip would have to move by
 constexpr double kSlipDeviations = 4.0, kSlopeDeviations = 2.0;
-constexpr double kDriftDeviations = 4.0;
-
 double square(double x) { return x * x; }
 
 }  // namespace
@@ -55,11 +53,8 @@ bool ForceStep::steps(std::size_t length, double slip_noise, const Trend& force)
       std::max(kDeviations * spread * force_deviation_N, kShare * std::abs(before.force_N))) {
     return false;
   }
-  // A force that falls or rises otherwise than before has a course of its own.
-  if (std::abs(drift_after_N - drift_N) >
-      std::abs(drift_N) + kDriftDeviations * force_deviation_N) {
-    return false;
-  }
+  // A corner of the force's course, in one of the groups, looks like a step of less than this.
+  if (std::abs(jump_N) < std::abs(drift_after_N - drift_N)) return false;
   const double mu_after = after.torque_Nm / after.force_N;
   // Relative to mu*.
   const double rise =

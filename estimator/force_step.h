@@ -27,7 +27,7 @@ class ForceStep {
   struct Means {
     double force_N = 0.0, torque_Nm = 0.0, slip_percent = 0.0;
   };
-  static constexpr std::size_t kCells = 256;  // of 50 ms
+  static constexpr std::size_t kCells = 512;  // of 50 ms
   // Over the cells from `from` to `to`, counted back from now.
   Means means(std::size_t from, std::size_t to) const noexcept;
   bool steps(std::size_t length, double slip_noise, const Trend& force) const noexcept;

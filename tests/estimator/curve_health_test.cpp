@@ -133,11 +133,16 @@ TEST(ForceStep, SeesAReadingThatStepsWhereSlipStaysAndNoForceThatSlipFollows) {
   const auto right = [](double) { return 1.0; };
   EXPECT_FALSE(steps(ramp, right));
   EXPECT_TRUE(steps(ramp, [](double t) { return t < 10.0 ? 1.0 : 0.9; }));
-  EXPECT_TRUE(steps(ramp, [](double t) { return t < 10.0 ? 1.0 : 1.05; }));
+  EXPECT_TRUE(steps(ramp, [](double t) { return t < 10.0 ? 1.0 : 1.1; }));
   EXPECT_FALSE(steps(ramp, [](double t) { return t < 10.0 ? 1.0 : 1.005; }));
   EXPECT_FALSE(
       steps([](double t) { return (t < 10.0 ? 1.0 : 0.9) * (5000.0 - 100.0 * t); }, right));
   EXPECT_FALSE(steps([](double t) { return 5000.0 - 200.0 * std::max(0.0, t - 5.0); }, right));
+  // The end of a ramp, with a reading that falls a little too fast before it.
+  const auto ends = [](double t) {
+    return 1.0 - 0.02 * std::clamp(t - 9.0, 0.0, 1.0) * std::clamp(51.0 - 5.0 * t, 0.0, 1.0);
+  };
+  EXPECT_FALSE(steps([](double t) { return 5000.0 - 300.0 * std::min(t, 10.0); }, ends));
 }
 
 TEST(Trend, LearnsTheNoiseBesideAStepAndACorner) {
