@@ -13,12 +13,14 @@ constexpr double kDeviations = 5.0;
 constexpr double kShare = 0.015;    // of the force
 constexpr double kLeastMove = 0.4;  // of what slip would have to move by
 constexpr double kSlipDeviations = 4.0, kSlopeDeviations = 2.0;
+constexpr double kStairs = 1.5;  // steps of a signal that is rounded coarsely are no steps
 double square(double x) { return x * x; }
 
 }  // namespace
 
-ForceStep::ForceStep(double sample_rate_hz)
-    : per_cell_(static_cast<int>(std::max(1.0, std::ceil(kCell_s * sample_rate_hz - 1e-6)))) {}
+ForceStep::ForceStep(double sample_rate_hz, double resolution_N)
+    : stair_N_(kStairs * resolution_N),
+      per_cell_(static_cast<int>(std::max(1.0, std::ceil(kCell_s * sample_rate_hz - 1e-6)))) {}
 
 void ForceStep::reset() noexcept {
   count_ = 0;
@@ -49,8 +51,8 @@ bool ForceStep::steps(std::size_t length, double slip_noise, const Trend& force)
   const double drift_after_N = later.force_N - after.force_N;
   const double jump_N = after.force_N - before.force_N - on * (drift_N + drift_after_N);
   const double force_deviation_N = std::sqrt(force.density(length_s) / length_s);
-  if (std::abs(jump_N) <
-      std::max(kDeviations * spread * force_deviation_N, kShare * std::abs(before.force_N))) {
+  if (std::abs(jump_N) < std::max({kDeviations * spread * force_deviation_N,
+                                   kShare * std::abs(before.force_N), stair_N_})) {
     return false;
   }
   // A corner of the force's course, in one of the groups, looks like a step of less than this.

@@ -17,7 +17,8 @@ namespace beltgrip::estimator {
 
 class ForceStep {
  public:
-  explicit ForceStep(double sample_rate_hz);
+  // resolution_N: of the clamp force, as its pressure's signal is rounded; 0: not known.
+  ForceStep(double sample_rate_hz, double resolution_N);
   void reset() noexcept;
   // One sample; slip_noise: a density, force: the trend of the clamp force. True when a step has
   // just been seen.
@@ -34,6 +35,7 @@ class ForceStep {
 
   std::array<Means, kCells> sums_{};  // of all cells before
   std::size_t count_ = 0;
+  double stair_N_;
   int per_cell_;
   int filled_ = 0;
   Means sum_;

@@ -45,6 +45,7 @@ struct EstimatorSettings {
   StopRule stop_rule = StopRule::kPeak;
   bool torque_is_engine = true;  // role engine_torque (inertia compensated) or primary_torque
   double sample_rate_hz = 200.0;
+  double pressure_step_Pa = 0.0;  // least change that the secondary pressure's signal can show
   double ramp_rate_max_N_per_s = 300.0;
   // kConfidence: the 95 % interval of mu_max, as a share of it, at which the experiment ends.
   double confidence_width = 0.15;

@@ -102,6 +102,11 @@ void Loader::load(ConfigScope scope) {
       accuracy(Role::kPrimarySpeed), accuracy(Role::kSecondarySpeed),
       accuracy(Role::kSecondaryPressure),
       accuracy(config_.estimator.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque)};
+  for (const RoleBinding& each : config_.roles) {
+    if (each.role != Role::kSecondaryPressure || each.codec.is_float()) continue;
+    config_.estimator.pressure_step_Pa =
+        std::abs(each.factor * (each.codec.physical(1) - each.codec.physical(0)));
+  }
   result_.config = std::move(config_);
 }
 

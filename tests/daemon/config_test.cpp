@@ -503,6 +503,7 @@ TEST_F(ConfigTest, Sensors) {
   EXPECT_EQ(result.config->sensors.torque.bias, 2.5);
   EXPECT_EQ(result.config->sensors.torque.gain, 0.05);
   EXPECT_EQ(result.config->sensors.secondary_pressure.bias, 20e3);
+  EXPECT_NEAR(result.config->estimator.pressure_step_Pa, 100.0, 1e-9);  // 0.001 bar per bit
   EXPECT_EQ(result.config->sensors.omega_p.gain, 0.0005);
   EXPECT_EQ(result.config->sensors.omega_s.gain, 0.0);
   for (std::size_t i = 0; i < kRoleCount; ++i) {

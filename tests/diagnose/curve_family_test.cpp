@@ -16,7 +16,7 @@ using Curve = std::function<double(double x)>;
 // Slip over slip at the peak, friction over mu_max.
 double nominal(double x) { return std::sin(1.3 * std::atan(std::tan(M_PI / 2.6) * x)); }
 double burckhardt(double x) { return (1.1 * -std::expm1(-4.0 * x) - 0.08 * x) / 1.0; }
-double inverse_tangent(double x) { return std::atan(5.0 * x) / std::atan(5.0); }
+double parabola(double x) { return x < 1.0 ? x * (2.0 - x) : 1.0 - 0.05 * (x - 1.0); }
 
 Knots departures(const Curve& curve) {
   Knots out;
@@ -31,10 +31,10 @@ double squared_sigmas(const Knots& departure) {
   return (curve_modes_inverse() * (departure - usual_departure())).squaredNorm();
 }
 
-double hollow_sum(const Knots& departure) {
+double faults_of(const Knots& departure) {
   double sum = 0.0;
-  for (const Hollow& each :
-       hollows(std::span<const double, kShapeKnots>(departure.data(), kShapeKnots))) {
+  for (const CurveFault& each :
+       curve_faults(std::span<const double, kShapeKnots>(departure.data(), kShapeKnots))) {
     sum += each.slope;
   }
   return sum;
@@ -44,15 +44,15 @@ double hollow_sum(const Knots& departure) {
 double shifted(double x) { return nominal(std::max(0.0, x - 0.2) / 0.8); }
 
 TEST(CurveFamily, FormsOfFrictionAreInIt) {
-  for (const Curve& curve : {Curve(nominal), Curve(burckhardt), Curve(inverse_tangent)}) {
+  for (const Curve& curve : {Curve(nominal), Curve(burckhardt), Curve(parabola)}) {
     EXPECT_LT(squared_sigmas(departures(curve)), 2.0 * kShapeKnots);
-    EXPECT_LT(hollow_sum(departures(curve)), 0.05);
+    EXPECT_LT(faults_of(departures(curve)), 0.05);
   }
 }
 
 TEST(CurveFamily, AFootThatIsShiftedIsNot) {
   EXPECT_GT(squared_sigmas(departures(shifted)), 10.0 * kShapeKnots);
-  EXPECT_GT(hollow_sum(departures(shifted)), 1.0);
+  EXPECT_GT(faults_of(departures(shifted)), 1.0);
 }
 
 TEST(CurveFamily, ModesAndTheirInverseAreOne) {
@@ -66,14 +66,14 @@ TEST(CurveFamily, ModesAndTheirInverseAreOne) {
   }
 }
 
-TEST(CurveFamily, DerivativesOfTheHollowsAreThoseOfDifferences) {
+TEST(CurveFamily, DerivativesOfTheFaultsAreThoseOfDifferences) {
   constexpr double kStep = 1e-6;
   const Knots at = departures(shifted);
   const auto sums = [](const Knots& departure) {
     double slope = 0.0;
     Knots by_mode = Knots::Zero();
-    for (const Hollow& each :
-         hollows(std::span<const double, kShapeKnots>(departure.data(), kShapeKnots))) {
+    for (const CurveFault& each :
+         curve_faults(std::span<const double, kShapeKnots>(departure.data(), kShapeKnots))) {
       slope += each.slope;
       by_mode += each.by_mode;
     }

@@ -110,15 +110,18 @@ TEST(StepWatch, SeesAStepAndNoDriftAndNoneWhereSlipMoves) {
 // mu* is T / F, the curve a straight line of slip over mu*: a belt follows the true force.
 TEST(ForceStep, SeesAReadingThatStepsWhereSlipStaysAndNoForceThatSlipFollows) {
   using Force = double (*)(double);
-  const auto steps = [](Force truth, Force read_of_truth) {
+  // rounded_to_N: what the signal shows changes by; known_N: by what it is known to.
+  const auto steps = [](Force truth, Force read_of_truth, double rounded_to_N = 0.0,
+                        double known_N = 0.0) {
     std::mt19937_64 random(1);
     std::normal_distribution<double> normal;
-    ForceStep watch(200.0);
+    ForceStep watch(200.0, known_N);
     Trend trend(200.0, 4096);
     bool seen = false;
     for (int i = 0; i < 4000; ++i) {
       const double t = i / 200.0;
-      const double force_N = truth(t) * read_of_truth(t) + 10.0 * normal(random);
+      double force_N = truth(t) * read_of_truth(t) + 10.0 * normal(random);
+      if (rounded_to_N > 0.0) force_N = std::round(force_N / rounded_to_N) * rounded_to_N;
       const Cell cell{.t_s = t,
                       .slip_percent = 8000.0 / truth(t) - 1.0 + 0.02 * normal(random),
                       .torque_Nm = 50.0,
@@ -143,6 +146,12 @@ TEST(ForceStep, SeesAReadingThatStepsWhereSlipStaysAndNoForceThatSlipFollows) {
     return 1.0 - 0.02 * std::clamp(t - 9.0, 0.0, 1.0) * std::clamp(51.0 - 5.0 * t, 0.0, 1.0);
   };
   EXPECT_FALSE(steps([](double t) { return 5000.0 - 300.0 * std::min(t, 10.0); }, ends));
+  // Rounded to steps larger than its noise: its stairs are none.
+  const auto slow = [](double t) { return 5000.0 - 50.0 * t; };
+  EXPECT_TRUE(steps(slow, right, 150.0, 0.0));
+  EXPECT_FALSE(steps(slow, right, 150.0, 150.0));
+  EXPECT_TRUE(steps(
+      slow, [](double t) { return t < 10.0 ? 1.0 : 1.15; }, 150.0, 150.0));
 }
 
 TEST(Trend, LearnsTheNoiseBesideAStepAndACorner) {

@@ -95,7 +95,7 @@ const Eigen::Matrix<double, kShapeKnots, 1>& usual_departure() { return modes().
 const KnotMatrix& curve_modes() { return modes().forward; }
 const KnotMatrix& curve_modes_inverse() { return modes().inverse; }
 
-std::vector<Hollow> hollows(std::span<const double, kShapeKnots> departure) {
+std::vector<CurveFault> curve_faults(std::span<const double, kShapeKnots> departure) {
   // The origin, the knots below the peak, the peak.
   constexpr std::size_t kPoints = kKnotsBelowPeak + 2;
   static const std::array<double, kPoints> kX = [] {
@@ -118,7 +118,7 @@ std::vector<Hollow> hollows(std::span<const double, kShapeKnots> departure) {
     if (i == 0 || i + 1 == kPoints) return Knots::Zero();
     return curve_modes().row(static_cast<Eigen::Index>(i) - 1).transpose();
   };
-  std::vector<Hollow> out;
+  std::vector<CurveFault> out;
   for (std::size_t i = 1; i + 1 < kPoints; ++i) {
     const double before = kX[i] - kX[i - 1], behind = kX[i + 1] - kX[i];
     const double slope = (value(i + 1) - value(i)) / behind - (value(i) - value(i - 1)) / before;

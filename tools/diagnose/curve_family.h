@@ -23,13 +23,13 @@ const KnotMatrix& curve_modes_inverse();
 // Departure at x = slip / slip at the peak, x >= 0, of one sigma of a mode.
 double mode_function(int mode, double x);
 
-// By how much the slope of a curve grows from one interval between its knots to the next, up to the
-// peak (0: it does not, as of any friction), and its derivatives by the modes.
-struct Hollow {
+// What no friction does: by how much the slope of a curve grows from one interval between its knots
+// to the next on the way to the peak, and its derivatives by the modes.
+struct CurveFault {
   double slope = 0.0;  // of mu over mu_max, per slip at the peak
   Eigen::Matrix<double, kShapeKnots, 1> by_mode;
 };
-std::vector<Hollow> hollows(std::span<const double, kShapeKnots> departure);
+std::vector<CurveFault> curve_faults(std::span<const double, kShapeKnots> departure);
 
 // Of the curve that a parameter of the machine is a mode of; -1: it is none.
 int first_knot(int parameter);

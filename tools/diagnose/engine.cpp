@@ -21,7 +21,7 @@ constexpr std::array<double, 3> kCoarseness{30.0, 8.0, 2.0};
 constexpr int kAttempts = 10;        // to find a step that gains, each shorter than the last
 constexpr double kLongStep = 0.05;   // in tolerances and usual sizes
 constexpr double kWorthwhile = 1.0;  // of the log likelihood
-constexpr double kHollow = 0.1;      // one sigma of how a slope grows with slip, of mu_max
+constexpr double kCurveFault = 0.1;  // one sigma of curve_faults()
 constexpr double kSizePrior = 3.0;   // one sigma of an effect's size, in usual sizes
 
 bool stop_used(const Campaign& campaign, int stop) {
@@ -465,7 +465,7 @@ void Engine::add_curve_bounds(const ModelState& state, const std::vector<int>& p
   VectorXd row(last + 1);
   MatrixXd all = MatrixXd::Zero(last + 1, last + 1);
   for (const int first : {kShapeOverdrive, kShapeLow}) {
-    for (const Hollow& each : hollows(
+    for (const CurveFault& each : curve_faults(
              std::span<const double, kShapeKnots>(state.nuisance.data() + first, kShapeKnots))) {
       row.setZero();
       for (std::size_t j = 0; j < parameters.size(); ++j) {
@@ -477,7 +477,7 @@ void Engine::add_curve_bounds(const ModelState& state, const std::vector<int>& p
       all += row * row.transpose();
     }
   }
-  all /= kHollow * kHollow * static_cast<double>(summaries.size());
+  all /= kCurveFault * kCurveFault * static_cast<double>(summaries.size());
   for (Summary& each : summaries) each.aa += all;
 }
 
@@ -548,8 +548,8 @@ Hypothesis Engine::refine_from(const ModelState& from, const std::vector<int>& s
 
 bool Engine::curve_is_possible(const ModelState& state) {
   constexpr double kStep = 0.05, kFall = 0.02;  // of mu_max
-  constexpr double kHollowMost = 2.0;           // sigmas
-  double hollow = 0.0;
+  constexpr double kFaultMost = 2.0;            // sigmas
+  double faults = 0.0;
   for (const int first : {kShapeOverdrive, kShapeLow}) {
     const std::span<const double, kShapeKnots> departure(state.nuisance.data() + first,
                                                          kShapeKnots);
@@ -560,9 +560,9 @@ bool Engine::curve_is_possible(const ModelState& state) {
       if (here < highest - kFall) return false;
       highest = std::max(highest, here);
     }
-    for (const Hollow& each : hollows(departure)) hollow += each.slope * each.slope;
+    for (const CurveFault& each : curve_faults(departure)) faults += each.slope * each.slope;
   }
-  return hollow <= kHollowMost * kHollowMost * kHollow * kHollow;
+  return faults <= kFaultMost * kFaultMost * kCurveFault * kCurveFault;
 }
 
 void Engine::accept(const Hypothesis& hypothesis) {

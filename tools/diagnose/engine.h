@@ -63,8 +63,9 @@ class Engine {
   };
   Replacement add(const std::vector<int>& slots) const;
   Replacement replace(const std::vector<int>& slots, int instead_of) const;
-  // No friction falls before its peak, nor grows stiffer on the way to it. A fitted curve that does
-  // has been bent to explain something else; what it hides is no longer near the present state.
+  // No friction falls before its peak or grows stiffer on the way to it. A fitted
+  // curve that does has been bent to explain something else; what it hides is no longer near the
+  // present state.
   static bool curve_is_possible(const ModelState& state);
   // Makes the hypothesis the present state.
   void accept(const Hypothesis& hypothesis);
@@ -82,8 +83,8 @@ class Engine {
   std::vector<int> with_nuisances(const std::vector<int>& slots) const;  // parameter numbers
   double degrees(double with_scatter, double without_scatter) const;
 
-  // Adds to the matrices, in equal shares, how far the friction curves of the state are from any
-  // that grows softer all the way to its peak. Columns: the parameters (scaled), others, residual.
+  // Adds to the matrices, in equal shares, what the friction curves of the state do that no
+  // friction does (curve_faults). Columns: the parameters (scaled), others, residual.
   void add_curve_bounds(const ModelState& state, const std::vector<int>& parameters,
                         std::vector<Summary>& summaries) const;
 

@@ -18,7 +18,7 @@ constexpr double kHuber = 3.0;
 constexpr double kScatterCap = 8.0;  // in usual scatters: beyond, it is an effect and not scatter
 
 // One sigma between healthy experiments: what replicates on rigs scatter by.
-constexpr std::array<double, kRandomEffects> kDefaultScatter{3e-3, 1.5e-4, 0.08, 0.02, 0.08, 500.0};
+constexpr std::array<double, kRandomEffects> kDefaultScatter{4e-3, 1.5e-4, 0.1, 0.02, 0.1, 500.0};
 
 std::array<ResidualColumns, kRandomEffects> random_columns(const Campaign& campaign, int run,
                                                            const ModelState& state,

@@ -89,7 +89,7 @@ struct Information {
 Information information_on(const std::vector<Summary>& summaries, const std::vector<int>& others,
                            const Prior& prior, int column, const Scatter& scatter);
 
-inline constexpr double kScatterPriorRuns = 3.0;
+inline constexpr double kScatterPriorRuns = 4.0;
 
 Whitening identity_whitening(const Campaign& campaign);
 
