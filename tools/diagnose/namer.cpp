@@ -26,6 +26,7 @@ constexpr double kNearMax = 400.0;
 constexpr double kNear = 40.0;  // linear loss within which a refit may still reach the best
 constexpr int kEffectsMax = 3;
 constexpr int kStepsMax = 4;
+constexpr int kRounds = 3;
 constexpr int kSettling = 20;     // steps of a fit whose effects are settled
 constexpr int kGroupDegrees = 3;  // of a group of score_groups
 constexpr double kPromotedOdds = 3.0;
@@ -56,8 +57,9 @@ std::vector<int> plus(std::vector<int> set, int slot) {
   return set;
 }
 
-// The slots to refit: by gain and by significance.
-std::vector<int> shortlist(const std::vector<Score>& scores, int count, double in_curve_max) {
+// The slots to refit: by gain and by significance, none that is barred.
+std::vector<int> shortlist(const std::vector<Score>& scores, int count, double in_curve_max,
+                           const std::vector<int>& barred) {
   std::vector<Score> by_gain = scores, by_chi2 = scores;
   std::sort(by_gain.begin(), by_gain.end(), [](auto& a, auto& b) { return a.gain > b.gain; });
   std::sort(by_chi2.begin(), by_chi2.end(), [](auto& a, auto& b) { return a.chi2 > b.chi2; });
@@ -65,6 +67,7 @@ std::vector<int> shortlist(const std::vector<Score>& scores, int count, double i
   for (std::size_t i = 0; i < scores.size() && static_cast<int>(out.size()) < count; ++i) {
     for (const Score* score : {&by_gain[i], &by_chi2[i]}) {
       if (score->gain > 4.0 && score->in_curve < in_curve_max &&
+          std::find(barred.begin(), barred.end(), score->slot) == barred.end() &&
           std::find(out.begin(), out.end(), score->slot) == out.end()) {
         out.push_back(score->slot);
       }
@@ -318,54 +321,9 @@ void drop_unconfirmed(Engine& engine, Naming& naming) {
   }
 }
 
-}  // namespace
-
-std::vector<Ripple> find_ripples(const Campaign& campaign, double threshold) {
-  OrderLine primary, secondary;
-  for (const ExperimentData& run : campaign.runs) {
-    primary.add(run.line_p);
-    secondary.add(run.line_s);
-  }
-  std::vector<Ripple> out;
-  for (const auto& [shaft, line] : {std::pair{"primary", primary}, {"secondary", secondary}}) {
-    // Sums of exponential variables have heavier tails than the normal: three times the bound.
-    // What the model knows of is no news, unless it is of another size.
-    const auto known = campaign.known_ripples.find(shaft);
-    const bool is_known = known != campaign.known_ripples.end();
-    const double beyond = line.amplitude() - (is_known ? known->second : 0.0);
-    // Some experiments may show a line that others do not: the amplitude's own scatter tells.
-    const double sigmas = beyond / std::max(line.amplitude_sigma(), 1e-12);
-    const double chi2 = is_known ? sigmas * sigmas : line.chi2();
-    out.push_back(
-        {shaft, line.amplitude(), line.amplitude_sigma(), chi2,
-         std::min(chi2, sigmas * sigmas) > 3.0 * threshold && std::abs(beyond) > kRippleMin});
-  }
-  return out;
-}
-
-double chance_threshold(int candidates, double probability) {
-  const double target = probability / std::max(candidates, 1);
-  double low = 0.0, high = 200.0;
-  for (int i = 0; i < 80; ++i) {
-    const double middle = 0.5 * (low + high);
-    (std::erfc(std::sqrt(middle / 2.0)) > target ? low : high) = middle;
-  }
-  return low;
-}
-
-Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs) {
-  Naming out;
-  out.threshold = chance_threshold(static_cast<int>(engine.campaign().slots.size()), kFalseName);
-  out.ripples = find_ripples(engine.campaign(), out.threshold);
-  engine.fit_machine(jobs);
-  engine.update_noise();
-  for (int i = 0; i < 2; ++i) {
-    engine.accept(engine.refine({}, kSettling));
-    engine.update_noise();
-  }
-  out.nominal = engine.state();
-  out.nominal_groups = score_groups(engine);
-  double first_gain = 0.0;
+// Adds to the accepted effects as long as any is there. first_gain: the largest so far.
+void add_effects(Engine& engine, Naming& out, double& first_gain, const std::function<bool()>& stop,
+                 int jobs) {
   // A member may be dropped again: the number of steps is bounded, not only that of effects.
   for (int step = 0; step < kStepsMax && !stop(); ++step) {
     if (static_cast<int>(engine.accepted().size()) >= kEffectsMax) break;
@@ -403,7 +361,8 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
         found = true;
       }
     };
-    const std::vector<int> candidates = shortlist(scores, kRefined, possible ? kInCurveMax : 2.0);
+    const std::vector<int> candidates =
+        shortlist(scores, kRefined, possible ? kInCurveMax : 2.0, out.not_confirmed);
     const auto consider_all = [&](bool from_afar) {
       std::vector<std::optional<Hypothesis>> fits(candidates.size());
       in_parallel(jobs, candidates.size(), [&](std::size_t i) {
@@ -467,8 +426,65 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
       }
     }
   }
-  if (!stop()) out.last_screen = engine.screen();
-  drop_unconfirmed(engine, out);
+}
+
+}  // namespace
+
+std::vector<Ripple> find_ripples(const Campaign& campaign, double threshold) {
+  OrderLine primary, secondary;
+  for (const ExperimentData& run : campaign.runs) {
+    primary.add(run.line_p);
+    secondary.add(run.line_s);
+  }
+  std::vector<Ripple> out;
+  for (const auto& [shaft, line] : {std::pair{"primary", primary}, {"secondary", secondary}}) {
+    // Sums of exponential variables have heavier tails than the normal: three times the bound.
+    // What the model knows of is no news, unless it is of another size.
+    const auto known = campaign.known_ripples.find(shaft);
+    const bool is_known = known != campaign.known_ripples.end();
+    const double beyond = line.amplitude() - (is_known ? known->second : 0.0);
+    // Some experiments may show a line that others do not: the amplitude's own scatter tells.
+    const double sigmas = beyond / std::max(line.amplitude_sigma(), 1e-12);
+    const double chi2 = is_known ? sigmas * sigmas : line.chi2();
+    out.push_back(
+        {shaft, line.amplitude(), line.amplitude_sigma(), chi2,
+         std::min(chi2, sigmas * sigmas) > 3.0 * threshold && std::abs(beyond) > kRippleMin});
+  }
+  return out;
+}
+
+double chance_threshold(int candidates, double probability) {
+  const double target = probability / std::max(candidates, 1);
+  double low = 0.0, high = 200.0;
+  for (int i = 0; i < 80; ++i) {
+    const double middle = 0.5 * (low + high);
+    (std::erfc(std::sqrt(middle / 2.0)) > target ? low : high) = middle;
+  }
+  return low;
+}
+
+Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs) {
+  Naming out;
+  out.threshold = chance_threshold(static_cast<int>(engine.campaign().slots.size()), kFalseName);
+  out.ripples = find_ripples(engine.campaign(), out.threshold);
+  engine.fit_machine(jobs);
+  engine.update_noise();
+  for (int i = 0; i < 2; ++i) {
+    engine.accept(engine.refine({}, kSettling));
+    engine.update_noise();
+  }
+  out.nominal = engine.state();
+  out.nominal_groups = score_groups(engine);
+  double first_gain = 0.0;
+  // What left-out experiments do not confirm may have stood before what they would.
+  for (int round = 0; round < kRounds && !stop(); ++round) {
+    const std::size_t dropped = out.not_confirmed.size();
+    first_gain = 0.0;
+    add_effects(engine, out, first_gain, stop, jobs);
+    if (!stop()) out.last_screen = engine.screen();
+    drop_unconfirmed(engine, out);
+    if (out.not_confirmed.size() == dropped || out.unknown) break;
+  }
   find_classes(engine, out, stop, jobs);
   find_intervals(engine, out);
   drop_doubtful(engine, out, stop, jobs);
