@@ -57,7 +57,8 @@ NuisanceTable default_nuisances() {
   }};
   for (int i = 0; i < kShapeKnots; ++i) {
     for (const int first : {kShapeOverdrive, kShapeLow}) {
-      table[static_cast<std::size_t>(first + i)].nominal = usual_departure()[i];
+      const int knot = first + i;
+      table[static_cast<std::size_t>(knot)].nominal = usual_departure()[i];
     }
   }
   return table;
