@@ -3,10 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
-
-#include "tools/diagnose/effects/effect.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -80,7 +77,7 @@ TEST(SlowCopy, LosesItsNoiseOnStraightLinesAndKeepsWhatMovesFast) {
 }
 
 // Two shafts in overdrive; rounded to the step, with noise before the rounding.
-ExperimentData shafts(double step_rad_s, double noise_rad_s, double torque_rate_Nm_s = 0.0) {
+ExperimentData shafts(double step_rad_s, double noise_rad_s) {
   SignalTable table;
   Noise noise;
   const auto rounded = [&](double value) {
@@ -95,7 +92,7 @@ ExperimentData shafts(double step_rad_s, double noise_rad_s, double torque_rate_
     add(Role::kPrimarySpeed, rounded(100.03 + 0.2 * std::sin(0.1 * t_s)));
     add(Role::kSecondarySpeed, rounded(222.0 - 0.5 * std::sin(0.1 * t_s)));
     add(Role::kSecondaryPressure, 3e5);
-    add(Role::kPrimaryTorque, 50.0 + torque_rate_Nm_s * t_s + noise());
+    add(Role::kPrimaryTorque, 50.0);
   }
   return prepare(table, estimator::VariatorParameters{});
 }
@@ -105,18 +102,6 @@ TEST(Rounding, StaysWhereNoNoiseCarriesTheSamplesFromStepToStep) {
   EXPECT_NEAR(shafts(0.1, 0.0).rounding_slip, held, 0.1 * held);
   EXPECT_LT(shafts(0.1, 0.1).rounding_slip, 0.4 * held);
   EXPECT_LT(shafts(1e-4, 0.02).rounding_slip, 0.001 * held);
-}
-
-TEST(Slots, WhatFollowsTheTorqueNeedsOneThatMoves) {
-  const auto has = [](double torque_rate_Nm_s, std::string_view id) {
-    const std::vector<Slot> slots = make_slots({shafts(0.1, 0.1, torque_rate_Nm_s)});
-    return std::any_of(slots.begin(), slots.end(), [&](const Slot& s) { return s.row->id == id; });
-  };
-  for (const std::string_view id : {"radius_tilt", "torque_delay"}) {
-    EXPECT_FALSE(has(0.0, id)) << id;
-    EXPECT_TRUE(has(0.5, id)) << id;
-  }
-  EXPECT_TRUE(has(0.0, "torque_bias"));
 }
 
 }  // namespace

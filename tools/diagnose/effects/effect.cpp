@@ -181,21 +181,6 @@ bool pressure_moves_variously(const std::vector<ExperimentData>& runs) {
   return !rates.empty() && quantile(0.95) - quantile(0.05) > kVarious * largest;
 }
 
-// A torque that is the same all along moves nothing that follows it; noise is no variety.
-bool torque_moves(const std::vector<ExperimentData>& runs) {
-  constexpr double kMoves = 0.15;  // of the middle
-  std::vector<double> torque;
-  for (const ExperimentData& run : runs) {
-    for (int k = 0; k < run.size(); ++k) {
-      if (run.valid[static_cast<std::size_t>(k)]) torque.push_back(run.torque.slow[k]);
-    }
-  }
-  if (torque.empty()) return false;
-  std::sort(torque.begin(), torque.end());
-  const std::size_t last = torque.size() - 1;
-  return torque[last * 95 / 100] - torque[last * 5 / 100] > kMoves * std::abs(torque[last / 2]);
-}
-
 }  // namespace
 
 std::string Slot::label() const {
@@ -228,7 +213,6 @@ std::vector<Slot> make_slots(const std::vector<ExperimentData>& runs) {
   const bool low = any(runs, [](const auto& run) { return has_stop(run, kLowStop); });
   const bool overdrive = any(runs, [](const auto& run) { return has_stop(run, kOverdriveStop); });
   const bool various = pressure_moves_variously(runs);
-  const bool loaded_variously = torque_moves(runs);
   std::vector<Slot> slots;
   for (const EffectRow& row : kRows) {
     const auto add = [&](int index, std::string_view role) {
@@ -250,8 +234,6 @@ std::vector<Slot> make_slots(const std::vector<ExperimentData>& runs) {
     } else if (row.apply == apply_hydraulic_lag || row.apply == apply_hydraulic_delay) {
       if (various) add(0, {});
       if (command) add(0, "command");
-    } else if (row.apply == apply_radius_tilt || row.apply == apply_torque_delay) {
-      if (loaded_variously) add(0, {});
     } else if (row.apply == apply_ratio_creep) {
       add(0, {});
       add(0, "clamp force");
