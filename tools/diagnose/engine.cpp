@@ -110,9 +110,10 @@ Prior Engine::prior(const std::vector<int>& parameters, const ModelState& at) co
     const int p = parameters[static_cast<std::size_t>(j)];
     if (const int first = first_knot(p); first >= 0) {
       for (int i = 0; i < kShapeKnots; ++i) {
-        out.pull[j] += curve_modes_inverse()(p - first, i) *
-                       (campaign_.nuisances[static_cast<std::size_t>(first + i)].nominal -
-                        at.nuisance[first + i]);
+        const int knot = first + i;
+        out.pull[j] +=
+            curve_modes_inverse()(p - first, i) *
+            (campaign_.nuisances[static_cast<std::size_t>(knot)].nominal - at.nuisance[knot]);
       }
     } else if (p < kNuisanceCount) {
       out.pull[j] =
