@@ -32,6 +32,7 @@ struct Copies {
   double slow = 0.0, wide = 0.0;  // rms of what is left of the noise
   double slow_slope = 0.0, wide_slope = 0.0;
   double largest = 0.0;  // departure of the wide copy from the truth
+  double sharp = 0.0, slow_at_turn = 0.0, sharp_at_turn = 0.0;
 };
 
 // A signal that falls on a straight line and rises again, twenty times as fast or in a step.
@@ -56,6 +57,7 @@ Copies copies_of(bool with_step) {
   for (int k = 100; k < 250; ++k) {
     out.slow += square(before.slow[k] - truth(k)) / 150.0;
     out.wide += square(signal.slow[k] - truth(k)) / 150.0;
+    out.sharp += square(signal.sharp[k] - truth(k)) / 150.0;
     out.slow_slope += square(before.slow_slope[k] + 80.0) / 150.0;
     out.wide_slope += square(signal.slow_slope[k] + 80.0) / 150.0;
   }
@@ -63,6 +65,8 @@ Copies copies_of(bool with_step) {
     // Next to the corner the slow copy itself is off; the wide one may not be off by more.
     const double off = std::abs(before.slow[k] - truth(k));
     out.largest = std::max(out.largest, std::abs(signal.slow[k] - truth(k)) - off);
+    out.slow_at_turn = std::max(out.slow_at_turn, off);
+    out.sharp_at_turn = std::max(out.sharp_at_turn, std::abs(signal.sharp[k] - truth(k)));
   }
   return out;
 }
@@ -74,6 +78,13 @@ TEST(SlowCopy, LosesItsNoiseOnStraightLinesAndKeepsWhatMovesFast) {
     EXPECT_LT(out.wide_slope, 0.1 * out.slow_slope);
     EXPECT_LT(out.largest, 60.0);
   }
+}
+
+TEST(SharpCopy, LosesItsNoiseOnStraightLinesAndIsNotRoundedWhereTheSignalTurns) {
+  const Copies step = copies_of(true), turn = copies_of(false);
+  for (const Copies& out : {step, turn}) EXPECT_LT(out.sharp, 0.4 * out.slow);
+  EXPECT_LT(step.sharp_at_turn, 0.2 * step.slow_at_turn);
+  EXPECT_LT(turn.sharp_at_turn, 0.6 * turn.slow_at_turn);
 }
 
 // Two shafts in overdrive; rounded to the step, with noise before the rounding.

@@ -251,7 +251,8 @@ History Experiment::run() {
                    fault_("spring_force.force_N");
     const double friction_N = fault_("clamp_hysteresis.force_N");
     if (friction_N > 0.0) {
-      if (first) play_N = force + friction_N;
+      // Where it rests when the recording begins: whatever went before.
+      if (first) play_N = force + friction_N * (static_cast<double>(trial_.seed % 3) - 1.0);
       play_N = std::clamp(play_N, force - friction_N, force + friction_N);
       force = play_N;
     }

@@ -3,6 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <string_view>
+#include <vector>
+
+#include "tools/diagnose/effects/effect.h"
+
 namespace beltgrip::diagnose {
 namespace {
 
@@ -34,6 +39,33 @@ TEST(ModelFile, NominalMachineSurvivesTheWayThroughTheFile) {
   for (std::size_t i = 0; i < direct.size(); ++i) {
     EXPECT_NEAR(through[i].nominal, direct[i].nominal, 1e-12) << direct[i].name;
   }
+}
+
+// Instances of one effect: a role takes the value to the one that has it alone; one that these data
+// do not have, or none, to the one without.
+TEST(ModelFile, ARoleSaysWhichInstanceIsMeant) {
+  const auto row = [](std::string_view id) -> const EffectRow* {
+    for (const EffectRow& each : effect_rows()) {
+      if (each.id == id) return &each;
+    }
+    return nullptr;
+  };
+  const EffectRow* hysteresis = row("clamp_hysteresis");
+  const std::vector<Slot> slots{{hysteresis, 0, ""},
+                                {hysteresis, 0, "raised"},
+                                {hysteresis, 0, "lowered"},
+                                {row("hydraulic_lag"), 0, ""}};
+  const auto values = [&](const std::string& role, const std::string& lag_role) {
+    ModelFile model = nominal_model({});
+    model.effects["clamp_hysteresis"].parameters = {{"force_N", 150.0}};
+    model.effects["clamp_hysteresis"].role = role;
+    model.effects["hydraulic_lag"].parameters = {{"time_constant_s", 0.1}};
+    model.effects["hydraulic_lag"].role = lag_role;
+    const Eigen::VectorXd out = slot_values(model, slots);
+    return std::vector<double>(out.begin(), out.end());
+  };
+  EXPECT_EQ(values("", ""), (std::vector<double>{150.0, 0.0, 0.0, 0.1}));
+  EXPECT_EQ(values("lowered", "command"), (std::vector<double>{0.0, 0.0, 150.0, 0.1}));
 }
 
 TEST(ModelFile, ErrorsNameFileLineAndKey) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 
 namespace beltgrip::diagnose {
 namespace {
@@ -162,6 +163,24 @@ LocalFit local_fit(const ArrayXd& values, const ArrayXd& slopes, double dt_s, do
   return out;
 }
 
+// One sigma of the samples' noise; 0: too few.
+double sigma_of_samples(const ArrayXd& values) {
+  std::vector<double> second;
+  for (Eigen::Index k = 2; k + 2 < values.size(); ++k) {
+    const double d = values[k - 2] - 2.0 * values[k] + values[k + 2];
+    if (std::isfinite(d)) second.push_back(std::abs(d));
+  }
+  if (second.size() < 20) return 0.0;
+  std::nth_element(second.begin(), second.begin() + static_cast<std::ptrdiff_t>(second.size() / 2),
+                   second.end());
+  return 1.4826 * second[second.size() / 2] / std::sqrt(6.0);
+}
+
+// One sigma of a local linear fit's value in the middle: its weights are Gaussian.
+double spread(double sigma, double width_s, double dt_s) {
+  return sigma * std::sqrt(dt_s / (2.0 * std::sqrt(std::numbers::pi) * width_s));
+}
+
 int stop_of(double speed_ratio, double force_N, const estimator::VariatorParameters& variator) {
   if (!(speed_ratio > 0.0)) return kNoStop;
   const auto at = [&](double stop) {
@@ -205,39 +224,46 @@ void add_slow(GridSignal& signal, double dt_s) {
   signal.slow_slope = fit.slope;
 }
 
-void widen_slow(GridSignal& signal, double dt_s) {
-  constexpr std::array kWider_s{0.5, 1.0, 2.0};
+namespace {
+// Of a local linear fit over some windows, per sample the widest that agrees with all narrower ones
+// within their noise. narrowest: over the first of them, of a noise of narrowest_sigma.
+LocalFit widest_fit(const GridSignal& signal, double dt_s, const LocalFit& narrowest,
+                    double narrowest_sigma, double sigma, std::span<const double> wider_s) {
   constexpr double kSigmas = 2.5;
   const auto n = static_cast<int>(signal.value.size());
-  std::vector<double> second;
-  for (int k = 2; k + 2 < n; ++k) {
-    const double d = signal.value[k - 2] - 2.0 * signal.value[k] + signal.value[k + 2];
-    if (std::isfinite(d)) second.push_back(std::abs(d));
-  }
-  if (second.size() < 20) return;
-  std::nth_element(second.begin(), second.begin() + static_cast<std::ptrdiff_t>(second.size() / 2),
-                   second.end());
-  const double sigma = 1.4826 * second[second.size() / 2] / std::sqrt(6.0);
-  // One sigma of a local linear fit's value in the middle: its weights are Gaussian.
-  const auto spread = [&](double width_s) {
-    return sigma * std::sqrt(dt_s / (2.0 * std::sqrt(std::numbers::pi) * width_s));
-  };
-  ArrayXd low = signal.slow - kSigmas * spread(kSlowSigma_s);
-  ArrayXd high = signal.slow + kSigmas * spread(kSlowSigma_s);
+  LocalFit out = narrowest;
+  ArrayXd low = out.value - kSigmas * narrowest_sigma;
+  ArrayXd high = out.value + kSigmas * narrowest_sigma;
   std::vector<bool> agrees(static_cast<std::size_t>(n), true);
-  for (const double width_s : kWider_s) {
+  for (const double width_s : wider_s) {
     const LocalFit fit = local_fit(signal.value, signal.slope, dt_s, width_s);
-    const double around = kSigmas * spread(width_s);
+    const double around = kSigmas * spread(sigma, width_s, dt_s);
     for (int k = 0; k < n; ++k) {
       const auto i = static_cast<std::size_t>(k);
       agrees[i] = agrees[i] && fit.value[k] - around < high[k] && fit.value[k] + around > low[k];
       if (!agrees[i]) continue;
-      signal.slow[k] = fit.value[k];
-      signal.slow_slope[k] = fit.slope[k];
+      out.value[k] = fit.value[k];
+      out.slope[k] = fit.slope[k];
       low[k] = std::max(low[k], fit.value[k] - around);
       high[k] = std::min(high[k], fit.value[k] + around);
     }
   }
+  return out;
+}
+}  // namespace
+
+void widen_slow(GridSignal& signal, double dt_s) {
+  constexpr std::array kWidths_s{kSlowSigma_s, 0.5, 1.0, 2.0};
+  signal.sharp = signal.value;
+  const double sigma = sigma_of_samples(signal.value);
+  if (sigma == 0.0) return;
+  const LocalFit slow =
+      widest_fit(signal, dt_s, {signal.slow, signal.slow_slope}, spread(sigma, kSlowSigma_s, dt_s),
+                 sigma, std::span(kWidths_s).subspan(1));
+  signal.sharp =
+      widest_fit(signal, dt_s, {signal.value, signal.slope}, sigma, sigma, kWidths_s).value;
+  signal.slow = slow.value;
+  signal.slow_slope = slow.slope;
 }
 
 ArrayXd shifted(const GridSignal& signal, double dt_s, double shift_s) {

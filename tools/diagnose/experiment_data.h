@@ -22,6 +22,7 @@ struct GridSignal {
   Eigen::ArrayXd slope;       // per second, of the same fit
   Eigen::ArrayXd slow;        // smoother copy: what a shift, lag or play changes is taken from it,
   Eigen::ArrayXd slow_slope;  // else such an effect would win by averaging the channel's noise
+  Eigen::ArrayXd sharp;       // the pressure's: without noise, yet where it turns not rounded
   double period_s = 0.0;      // median time between the channel's samples
   bool present = false;
 };
@@ -50,7 +51,8 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
 void add_slow(GridSignal& signal, double dt_s);
 
 // Slow copies over the widest of some windows that agrees with all narrower ones within their
-// noise: a signal that moves on straight lines is left with next to none of its noise.
+// noise: a signal that moves on straight lines is left with next to none of its noise. sharp is the
+// same from the samples on.
 void widen_slow(GridSignal& signal, double dt_s);
 
 // slow(t + shift), cubic; held at the ends. Seconds.

@@ -43,7 +43,7 @@ std::string sizes(const Finding& finding) {
 }
 
 std::string name_of(const Finding& finding) {
-  return finding.effect + (finding.role.empty() ? "" : " of " + finding.role);
+  return finding.effect + (finding.role.empty() ? "" : " (" + finding.role + ")");
 }
 
 std::string sentence(const Finding& finding) {

@@ -1,5 +1,6 @@
 #include "tools/diagnose/model_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -90,11 +91,12 @@ Eigen::VectorXd slot_values(const ModelFile& model, const std::vector<Slot>& slo
     const auto at = effect->second.parameters.find("at");
     const bool counted = slot.counts_experiments();
     if (counted && (at == effect->second.parameters.end() || at->second != slot.index)) continue;
-    if (slot.row->id == "channel_skew" && effect->second.role != slot.role) continue;
-    // A slot of several inputs: the first one that exists.
-    if (slot.row->id != "channel_skew" && !slot.role.empty() && slot.role != effect->second.role) {
-      continue;
-    }
+    // A role that these data do not have: the slot without one.
+    const bool exists = slot.row->id == "channel_skew" ||
+                        std::any_of(slots.begin(), slots.end(), [&](const Slot& other) {
+                          return other.row == slot.row && other.role == effect->second.role;
+                        });
+    if (slot.role != (exists ? effect->second.role : "")) continue;
     out[static_cast<Eigen::Index>(i)] = slot.from_contract(value->second, model.friction);
   }
   return out;

@@ -33,23 +33,16 @@ ArrayXd lag_change(const ArrayXd& in, double dt_s, double time_constant_s) {
 }
 
 // play(x) - x: follows only after the input has moved by the width on either side. Odd in the
-// width.
-ArrayXd play_change(const ArrayXd& in, double half_width) {
+// width. first: where it rests before the input has moved, in widths above it; what went before a
+// recording is not in it.
+ArrayXd play_change(const ArrayXd& in, double half_width, double first) {
   const double w = std::abs(half_width);
   ArrayXd out = ArrayXd::Zero(in.size());
   double y = std::nan("");
   for (Eigen::Index k = 0; k < in.size(); ++k) {
     const double x = in[k];
     if (!std::isfinite(x)) continue;
-    if (!std::isfinite(y)) {  // the side it rests on: against the first movement
-      y = x;
-      for (Eigen::Index j = k + 1; j < in.size(); ++j) {
-        if (std::abs(in[j] - x) > 2.0 * w + 10.0) {
-          y = in[j] > x ? x - w : x + w;
-          break;
-        }
-      }
-    }
+    if (!std::isfinite(y)) y = x + first * w;
     y = std::clamp(y, x - w, x + w);
     out[k] = std::copysign(1.0, half_width) * (y - x);
   }
@@ -78,9 +71,10 @@ void apply_centrifugal_force(Context& c, const Slot&, double coefficient_N_s2) {
 
 void apply_spring_force(Context& c, const Slot&, double force_N) { c.force_N += force_N; }
 
-void apply_clamp_hysteresis(Context& c, const Slot&, double force_N) {
-  const ArrayXd model_N = c.variator.secondary_piston_area_m2 * c.run.pressure.slow;
-  c.force_N += play_change(model_N, force_N);
+void apply_clamp_hysteresis(Context& c, const Slot& slot, double force_N) {
+  const ArrayXd model_N = c.variator.secondary_piston_area_m2 * c.run.pressure.sharp;
+  const double first = slot.role == "raised" ? -1.0 : slot.role == "lowered" ? 1.0 : 0.0;
+  c.force_N += play_change(model_N, force_N, first);
 }
 
 }  // namespace beltgrip::diagnose

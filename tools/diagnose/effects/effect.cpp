@@ -234,6 +234,9 @@ std::vector<Slot> make_slots(const std::vector<ExperimentData>& runs) {
     } else if (row.apply == apply_hydraulic_lag || row.apply == apply_hydraulic_delay) {
       if (various) add(0, {});
       if (command) add(0, "command");
+    } else if (row.apply == apply_clamp_hysteresis) {
+      // The clamp force before each experiment: unknown, raised to where it begins, lowered.
+      for (const std::string_view before : {"", "raised", "lowered"}) add(0, before);
     } else if (row.apply == apply_ratio_creep) {
       add(0, {});
       add(0, "clamp force");

@@ -37,7 +37,8 @@ struct EffectRow {
 struct Slot {
   const EffectRow* row = nullptr;
   int index = 0;
-  std::string_view role;  // of channel_skew; the input of hydraulic_lag
+  // Of channel_skew; the input of hydraulic_lag; what clamp_hysteresis rests from at the start.
+  std::string_view role;
   double step() const { return 0.2 * row->typical; }
   std::string label() const;        // "wear.step@4"
   bool counts_experiments() const;  // index is the experiment it begins with
