@@ -248,7 +248,7 @@ json run_trial(std::uint64_t number) {
   Random random(number);
   json truth = json::array();
   std::vector<int> true_slots;
-  diagnose::ModelState true_sizes = naming.nominal;
+  diagnose::ModelState true_sizes = naming.nominal.state;
   const Eigen::MatrixXd m = information(engine, naming.hypothesis.fit.scatter);
   for (const Planted& planted : envelope.trial.planted) {
     for (const auto& [name, value] : planted.parameters) {
@@ -284,7 +284,7 @@ json run_trial(std::uint64_t number) {
       out["removable"][name] = {value.before, value.after, value.low};
     }
   }
-  out["rivals"] = rivals(engine, naming.nominal);
+  out["rivals"] = rivals(engine, naming.nominal.state);
   json left = json::array();
   auto scores = naming.last_screen;
   std::sort(scores.begin(), scores.end(), [](auto& a, auto& b) { return a.chi2 > b.chi2; });

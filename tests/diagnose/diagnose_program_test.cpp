@@ -124,6 +124,10 @@ TEST_F(Diagnose, NamesTheCauseWritesTheModelAndIsContentWithIt) {
       EXPECT_TRUE(signal.contains(key)) << name << " " << key;
     }
   }
+  // As given: the machine whose constants come nearest, not one that has lost the belt's grip. Of a
+  // drag of 0.6 Nm/kN a constant one covers all but how the clamp force of some kN varies.
+  EXPECT_LT(first.at("baseline").at("primary_torque").at("rmse").get<double>(), 2.0);
+  EXPECT_LT(first.at("baseline").at("secondary_speed").at("rmse").get<double>(), 0.3);
   const json& tests = first.at("baseline").at("secondary_torque").at("tests");
   for (const char* name : {"whiteness", "secondary_pressure"}) {
     EXPECT_LT(tests.at(name).get<double>(), 1e-6) << name << tests;
@@ -136,7 +140,10 @@ TEST_F(Diagnose, NamesTheCauseWritesTheModelAndIsContentWithIt) {
     const json& forward = first.at("simulation").at(name);
     EXPECT_GT(forward.at("rmse"), forward.at("noise_floor")) << name;
     const json& gain = forward.at("held_out");
-    EXPECT_LT(gain.at("rmse_after").get<double>(), 0.5 * gain.at("rmse_before").get<double>())
+    // How the belt sits from one experiment to the next, a share of the speed that no model
+    // removes, is as large as most of what the drag does to the speed.
+    const double most = name == std::string("secondary_speed") ? 0.7 : 0.5;
+    EXPECT_LT(gain.at("rmse_after").get<double>(), most * gain.at("rmse_before").get<double>())
         << name << gain;
     EXPECT_GT(gain.at("ci95")[0], 0.0) << name << gain;
   }

@@ -81,7 +81,7 @@ class Run {
     progress(0.8, "gain");
     fill(engine, naming);
     if (request_.with_plots) {
-      answer_.plots = make_plots(engine.campaign(), naming.nominal, naming.hypothesis.state,
+      answer_.plots = make_plots(engine.campaign(), naming.nominal.state, naming.hypothesis.state,
                                  request_.experiments);
     }
     progress(1.0, "done");
@@ -240,7 +240,7 @@ class Run {
     }
     fill_machine(engine, naming);
     fill_baseline(engine, naming);
-    out().simulation = simulated_signals(campaign, naming.nominal);
+    out().simulation = simulated_signals(campaign, naming.nominal.state);
     fill_not_identifiable(engine, naming);
     if (impossible_) {
       nothing_identifiable("the data cannot be of one belt as configured");
@@ -267,8 +267,8 @@ class Run {
       }
       Campaign held_out = campaign;
       held_out.runs = std::move(runs);
-      held_out.slip_noise_share = estimate_slip_noise_shares(held_out, naming.nominal);
-      gain = held_out_gain(held_out, naming.nominal, extended);
+      held_out.slip_noise_share = estimate_slip_noise_shares(held_out, naming.nominal.state);
+      gain = held_out_gain(held_out, naming.nominal.state, extended);
     }
     for (const int slot : naming.not_confirmed) {
       out().notes.push_back(campaign.slots[static_cast<std::size_t>(slot)].label() +
@@ -276,8 +276,9 @@ class Run {
                             "fit; not named");
     }
     // What does not help on the experiments that the user has set aside is no finding either.
-    const bool refuted = !request_.held_out.empty() && !gain.signals.empty() && !slots.empty() &&
-                         (!gain.better() || gain.worse(noise_floors(campaign, naming.nominal)));
+    const bool refuted =
+        !request_.held_out.empty() && !gain.signals.empty() && !slots.empty() &&
+        (!gain.better() || gain.worse(noise_floors(campaign, naming.nominal.state)));
     if (refuted) {
       out().notes.push_back(
           "what was found does not help to predict the held-out experiments; not named");
@@ -296,7 +297,7 @@ class Run {
                                               : Verdict::kNone;
     propose(engine, naming);
     answer_.extended = request_.model;
-    const ModelState& stored = refuted ? naming.nominal : extended;
+    const ModelState& stored = refuted ? naming.nominal.state : extended;
     store_machine(stored.nuisance, answer_.extended);
     for (const Ripple& ripple : naming.ripples) {
       if (ripple.found) {
@@ -335,13 +336,13 @@ class Run {
     std::map<std::string, SignalErrors::Sum> sums;
     for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
       for (const auto& [name, sum] :
-           signal_errors(campaign, static_cast<int>(e), naming.nominal).signal) {
+           signal_errors(campaign, static_cast<int>(e), naming.nominal.state).signal) {
         sums[name].squares += sum.squares;
         sums[name].count += sum.count;
       }
     }
-    const auto floors = noise_floors(campaign, naming.nominal);
-    std::vector<ResidualTest> tests = test_residuals(engine, naming.nominal);
+    const auto floors = noise_floors(campaign, naming.nominal.state);
+    std::vector<ResidualTest> tests = test_residuals(engine, naming.nominal.state);
     for (const UnknownGroup& group : naming.nominal_groups) {
       tests.push_back({group.acts_on, group.depends_on, chi2_p(group.chi2, 1)});
     }
@@ -430,6 +431,8 @@ class Run {
     for (const Score& score : naming.last_screen) {
       const Slot& slot = campaign.slots[static_cast<std::size_t>(score.slot)];
       const std::string id(slot.row->id), parameter(slot.row->parameter);
+      visible.try_emplace(id, false);
+      if (!(score.in_curve < kInCurveMax)) continue;
       const double size =
           score.sigma > 0.0 ? kDetectable * score.sigma : std::numeric_limits<double>::infinity();
       auto& known = smallest[id];
@@ -437,22 +440,23 @@ class Run {
       visible[id] |= size < kRealistic * slot.row->typical;
       absorbed[id] = std::max(absorbed[id], score.absorbed);
     }
+    const auto named = [&](std::string_view id) {
+      return std::any_of(naming.accepted.begin(), naming.accepted.end(), [&](const Accepted& each) {
+        return campaign.slots[static_cast<std::size_t>(each.slot)].row->id == id;
+      });
+    };
     for (const EffectRow& row : effect_rows()) {
       const std::string id(row.id);
-      if (visible.contains(id) || row.apply == nullptr) continue;
-      visible[id] = false;
-      const bool accepted =
-          std::any_of(naming.accepted.begin(), naming.accepted.end(), [&](const Accepted& each) {
-            return campaign.slots[static_cast<std::size_t>(each.slot)].row->id == id;
-          });
-      if (!accepted) out().not_identifiable.push_back({id, {}, "no signal in these data shows it"});
+      if (visible.contains(id) || named(id) || row.apply == nullptr) continue;
+      out().not_identifiable.push_back({id, {}, "no signal in these data shows it"});
     }
     for (const auto& [id, seen] : visible) {
-      if (seen || smallest[id].empty()) continue;
-      out().not_identifiable.push_back({id, smallest[id],
-                                        absorbed[id] > 0.99
-                                            ? "absorbed by a fitted constant of the machine"
-                                            : "the experiments hardly move what it depends on"});
+      if (seen || named(id)) continue;
+      out().not_identifiable.push_back(
+          {id, smallest[id],
+           smallest[id].empty()  ? "no other thing here than a friction curve that runs otherwise"
+           : absorbed[id] > 0.99 ? "absorbed by a fitted constant of the machine"
+                                 : "the experiments hardly move what it depends on"});
     }
   }
 

@@ -18,6 +18,7 @@ using Eigen::VectorXd;
 
 constexpr double kSaturatedPrecision = 50.0;
 constexpr std::array<double, 3> kCoarseness{30.0, 8.0, 2.0};
+constexpr double kCovered = 2.0;     // rms in units of noise that is told apart from none by eye
 constexpr int kAttempts = 10;        // to find a step that gains, each shorter than the last
 constexpr double kLongStep = 0.05;   // in tolerances and usual sizes
 constexpr double kWorthwhile = 1.0;  // of the log likelihood
@@ -56,6 +57,25 @@ void reweigh(const Campaign& campaign, const ModelState& state, Whitening& white
       }
     }
   }
+}
+
+// What the model leaves of the data, rms in units of their noise: of the kind where that is most.
+double leaves(const Campaign& campaign, const ModelState& state) {
+  std::array<double, kResidualKinds> squares{}, count{};
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    if (campaign.runs[e].valid_count == 0) continue;
+    const Residuals at = residuals_of(campaign, static_cast<int>(e), state);
+    for (std::size_t kind = 0; kind < kResidualKinds; ++kind) {
+      const Eigen::ArrayXd& value = at.value[kind];
+      squares[kind] += value.square().sum();
+      count[kind] += static_cast<double>((value != 0.0).count());
+    }
+  }
+  double most = 0.0;
+  for (std::size_t kind = 0; kind < kResidualKinds; ++kind) {
+    most = std::max(most, squares[kind] / std::max(count[kind], 1.0));
+  }
+  return std::sqrt(most);
 }
 
 }  // namespace
@@ -242,6 +262,7 @@ void Engine::fit_machine(int jobs) {
   const double ln_mu_seen = ln_mu_reached();
   struct Attempt {
     ModelState first, last;
+    std::vector<ModelState> way;
     Whitening whitening;
     double objective = 0.0;
   };
@@ -260,6 +281,7 @@ void Engine::fit_machine(int jobs) {
     for (const Campaign& coarse : coarse_) {
       state = minimise(coarse, nuisances_, state, whitening, default_scatter(), 8, 0).state;
       reweigh(coarse, state, whitening);
+      attempt.way.push_back(state);
     }
     for (const int iterations : {8, 6}) {
       state =
@@ -277,7 +299,22 @@ void Engine::fit_machine(int jobs) {
       [](const Attempt& a, const Attempt& b) { return a.objective < b.objective; });
   state_ = best.last;
   first_ = best.first;
+  way_ = best.way;
   whitening_ = best.whitening;
+}
+
+Nominal Engine::nominal_from(const ModelState& sharp) const {
+  if (leaves(campaign_, sharp) < kCovered) return {sharp, campaign_.noise, true};
+  const Whitening whitening = identity_whitening(campaign_);
+  Nominal out;
+  out.is_covered = false;
+  for (std::size_t i = coarse_.size(); i-- > 0;) {
+    const Campaign& coarse = coarse_[i];
+    out.noise = coarse.noise;
+    out.state = minimise(coarse, nuisances_, way_[i], whitening, default_scatter(), 8, 0).state;
+    if (leaves(coarse, out.state) < kCovered) break;
+  }
+  return out;
 }
 
 Hypothesis Engine::refine_from_afar(const std::vector<int>& slots) const {

@@ -20,6 +20,10 @@ struct Hypothesis {
   std::vector<double> degrees;  // per slot: of freedom
 };
 
+// Of Score::in_curve. More: in these experiments the effect is no other thing than a friction curve
+// that runs otherwise.
+inline constexpr double kInCurveMax = 0.998;
+
 struct Score {
   int slot = 0;
   double chi2 = 0.0;      // equivalent chi-square(1), sparse scatter counted
@@ -28,6 +32,16 @@ struct Score {
   double sigma = 0.0;     // its one sigma
   double absorbed = 0.0;  // share of the column's energy that the machine's constants explain
   double in_curve = 0.0;  // that the friction curve alone could explain, however it runs
+};
+
+// The machine without effects, as near to the data as its constants alone lead it. A fit by the
+// sharp noise of the sensors lets scatter between experiments and correlated noise take over what
+// the machine misses, and then goes far astray: where the machine misses much, it is fitted with
+// as much noise as it leaves.
+struct Nominal {
+  ModelState state;
+  NoiseLevels noise;       // that covers what it leaves
+  bool is_covered = true;  // the sensors' own noise does
 };
 
 class Engine {
@@ -43,6 +57,8 @@ class Engine {
 
   // Constants of the nominal machine from the data: robust, from several starts.
   void fit_machine(int jobs = 1);
+  // sharp: the fit of the machine alone by the noise of the sensors.
+  Nominal nominal_from(const ModelState& sharp) const;
   // Noise model and matrices at the present state; call after fit_machine and accept.
   void update_noise();
   // All slots one at a time on top of the accepted ones.
@@ -110,6 +126,7 @@ class Engine {
 
   Campaign campaign_;
   std::vector<Campaign> coarse_;  // the same with more noise, falling
+  std::vector<ModelState> way_;   // of the best fit of the machine alone: its state behind each
   ModelState state_;
   ModelState first_;  // where the best fit of the machine alone began
   std::vector<int> accepted_;

@@ -186,9 +186,10 @@ bool Gain::worse(const std::map<std::string, double>& noise_floor) const {
   });
 }
 
-LeftOut leave_one_out(const Engine& engine, const ModelState& state,
-                      const std::vector<int>& slots) {
-  const Campaign& campaign = engine.campaign();
+namespace {
+
+LeftOut leave_one_out(const Engine& engine, const Campaign& campaign, const Whitening& whitening,
+                      const ModelState& state, const std::vector<int>& slots) {
   const std::vector<int> parameters = engine.with_nuisances(slots);
   VectorXd scales(static_cast<Index>(parameters.size()));
   std::vector<int> columns;
@@ -200,7 +201,7 @@ LeftOut leave_one_out(const Engine& engine, const ModelState& state,
   summaries.reserve(campaign.runs.size());
   for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
     summaries.push_back(
-        summarise(campaign, static_cast<int>(e), state, parameters, scales, engine.whitening()));
+        summarise(campaign, static_cast<int>(e), state, parameters, scales, whitening));
   }
   const Prior prior = engine.prior(parameters, state);
   std::vector<Summary> used;
@@ -235,6 +236,20 @@ LeftOut leave_one_out(const Engine& engine, const ModelState& state,
                                  : 0.0);
   }
   return out;
+}
+
+}  // namespace
+
+LeftOut leave_one_out(const Engine& engine, const ModelState& state,
+                      const std::vector<int>& slots) {
+  return leave_one_out(engine, engine.campaign(), engine.whitening(), state, slots);
+}
+
+LeftOut leave_one_out(const Engine& engine, const Nominal& nominal) {
+  if (nominal.is_covered) return leave_one_out(engine, nominal.state, {});
+  Campaign covering = engine.campaign();
+  covering.noise = nominal.noise;
+  return leave_one_out(engine, covering, identity_whitening(covering), nominal.state, {});
 }
 
 SignalErrors signal_errors(const Campaign& campaign, int run, const ModelState& state) {
@@ -361,10 +376,10 @@ std::map<std::string, SimulatedSignal> simulated_signals(const Campaign& campaig
   return out;
 }
 
-Gain left_out_gain(const Engine& engine, const ModelState& nominal, const ModelState& extended,
+Gain left_out_gain(const Engine& engine, const Nominal& nominal, const ModelState& extended,
                    const std::vector<int>& slots) {
   const Campaign& campaign = engine.campaign();
-  const std::vector<ModelState> before = leave_one_out(engine, nominal, {}).states;
+  const std::vector<ModelState> before = leave_one_out(engine, nominal).states;
   const std::vector<ModelState> after =
       slots.empty() ? before : leave_one_out(engine, extended, slots).states;
   Gain out = judge(campaign, before, after);

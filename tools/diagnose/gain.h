@@ -57,10 +57,11 @@ struct LeftOut {
   std::vector<double> spread;      // per slot asked for: jackknife one sigma of its size
 };
 LeftOut leave_one_out(const Engine& engine, const ModelState& state, const std::vector<int>& slots);
+LeftOut leave_one_out(const Engine& engine, const Nominal& nominal);
 
 // Every experiment predicted by a machine (nominal, and with the effects) that was fitted to the
 // others.
-Gain left_out_gain(const Engine& engine, const ModelState& nominal, const ModelState& extended,
+Gain left_out_gain(const Engine& engine, const Nominal& nominal, const ModelState& extended,
                    const std::vector<int>& slots);
 // Experiments of another campaign, predicted by the two states.
 Gain held_out_gain(const Campaign& held_out, const ModelState& nominal, const ModelState& extended);

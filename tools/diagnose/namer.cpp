@@ -35,9 +35,6 @@ constexpr double kClassOdds = 20.0;  // worse by more: told apart
 // A further cause must matter beside those found: below this share of their evidence it is the
 // difference between the found effect's equation and the machine.
 constexpr double kShareOfFirst = 0.02;
-// More: in these experiments the effect is no other thing than a friction curve that runs
-// otherwise.
-constexpr double kInCurveMax = 0.998;
 constexpr double kHeld = 0.5;
 constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
 constexpr double kDisagreement = 0.05;   // p of a size that experiments do not agree on
@@ -236,7 +233,7 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
 void drop(Engine& engine, const Naming& naming, int slot) {
   std::vector<int> fewer = engine.accepted();
   std::erase(fewer, slot);
-  ModelState start = naming.nominal;
+  ModelState start = naming.nominal.state;
   for (const int kept : fewer) start.effects[kept] = engine.state().effects[kept];
   const Hypothesis from_here = engine.refine(fewer);
   const Hypothesis from_nominal = engine.refine_from(start, fewer);
@@ -253,7 +250,7 @@ void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& s
           return score.slot == better->slot && score.in_curve > kInCurveMax;
         });
     // What does better is no other thing than a friction curve that runs otherwise.
-    if (in_curve && Engine::curve_is_possible(naming.nominal)) {
+    if (in_curve && naming.nominal_is_possible) {
       naming.not_confirmed.push_back(better->instead_of);
       drop(engine, naming, better->instead_of);
     } else {
@@ -308,12 +305,11 @@ void drop_unconfirmed(Engine& engine, Naming& naming) {
     const Gain gain = left_out_gain(engine, naming.nominal, whole.state, set);
     // A nominal curve that no friction has predicts as well as it was bent to; that it need not be
     // bent any more counts as much.
-    const bool straightened =
-        !Engine::curve_is_possible(naming.nominal) && Engine::curve_is_possible(whole.state);
+    const bool straightened = !naming.nominal_is_possible && Engine::curve_is_possible(whole.state);
     // What shows in one or two experiments only is not beyond the chance of drawing them.
     const bool helps = gain.better() || straightened || density > kLeftOutPlain;
     if (density > kLeftOutMin && helps &&
-        !gain.worse(noise_floors(engine.campaign(), naming.nominal))) {
+        !gain.worse(noise_floors(engine.campaign(), naming.nominal.state))) {
       return;
     }
     naming.not_confirmed.push_back(slot);
@@ -473,7 +469,8 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
     engine.accept(engine.refine({}, kSettling));
     engine.update_noise();
   }
-  out.nominal = engine.state();
+  out.nominal = engine.nominal_from(engine.state());
+  out.nominal_is_possible = Engine::curve_is_possible(engine.state());
   out.nominal_groups = score_groups(engine);
   double first_gain = 0.0;
   // What left-out experiments do not confirm may have stood before what they would.

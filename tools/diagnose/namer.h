@@ -48,7 +48,9 @@ struct Naming {
   double threshold = 0.0;
   // Effects that were found, but do not help to predict experiments left out of the fit.
   std::vector<int> not_confirmed;
-  ModelState nominal;                        // the nominal machine, fitted, without any effect
+  Nominal nominal;  // the machine without any effect
+  // The friction curve that fits the sharp data best without an effect is one of friction.
+  bool nominal_is_possible = true;
   std::vector<UnknownGroup> nominal_groups;  // dependences of its residual
 };
 
