@@ -266,21 +266,43 @@ void widen_slow(GridSignal& signal, double dt_s) {
   signal.slow_slope = slow.slope;
 }
 
+namespace {
+// Where a grid is read that is shifted by so many samples.
+struct Place {
+  Eigen::Index before = 0;
+  double share = 0.0;  // on the way to the next
+};
+Place shifted_place(Eigen::Index k, double by, Eigen::Index n) {
+  const double at = std::clamp(static_cast<double>(k) + by, 0.0, static_cast<double>(n - 1));
+  const auto before = std::min(static_cast<Eigen::Index>(at), n - 2);
+  return {before, at - static_cast<double>(before)};
+}
+}  // namespace
+
 ArrayXd shifted(const GridSignal& signal, double dt_s, double shift_s) {
   const ArrayXd& x = signal.slow;
   const auto n = x.size();
   ArrayXd out(n);
   for (Eigen::Index k = 0; k < n; ++k) {
-    const double at = static_cast<double>(k) + shift_s / dt_s;
-    const double clamped = std::clamp(at, 0.0, static_cast<double>(n - 1));
-    const auto i = std::min(static_cast<Eigen::Index>(clamped), n - 2);
-    const double u = clamped - static_cast<double>(i);
+    const auto [i, u] = shifted_place(k, shift_s / dt_s, n);
     // Hermite: values and slopes of the fit at both ends.
     const double a = x[i], b = x[i + 1];
     const double da = signal.slow_slope[i] * dt_s, db = signal.slow_slope[i + 1] * dt_s;
     const double v = 1.0 - u;
     const double y =
         v * v * (1.0 + 2.0 * u) * a + u * u * (1.0 + 2.0 * v) * b + u * v * (v * da - u * db);
+    out[k] = std::isfinite(y) ? y : x[k];
+  }
+  return out;
+}
+
+ArrayXd shifted_slope(const GridSignal& signal, double dt_s, double shift_s) {
+  const ArrayXd& x = signal.slow_slope;
+  const auto n = x.size();
+  ArrayXd out(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const auto [i, u] = shifted_place(k, shift_s / dt_s, n);
+    const double y = (1.0 - u) * x[i] + u * x[i + 1];
     out[k] = std::isfinite(y) ? y : x[k];
   }
   return out;

@@ -55,7 +55,8 @@ void add_slow(GridSignal& signal, double dt_s);
 // same from the samples on.
 void widen_slow(GridSignal& signal, double dt_s);
 
-// slow(t + shift), cubic; held at the ends. Seconds.
+// slow(t + shift), cubic; held at the ends. Seconds. slow_slope, linear.
 Eigen::ArrayXd shifted(const GridSignal& signal, double dt_s, double shift_s);
+Eigen::ArrayXd shifted_slope(const GridSignal& signal, double dt_s, double shift_s);
 
 }  // namespace beltgrip::diagnose

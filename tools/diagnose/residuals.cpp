@@ -132,6 +132,7 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
   }
   out.capacity = q.capacity;
   out.slip = q.slip;
+  out.slope_s = q.slope_s;
   out.balance_weight = ArrayXd::Zero(n);
   for (int k = 0; k < n; ++k) {
     const auto i = static_cast<std::size_t>(k);
@@ -257,7 +258,7 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
       return ratio_change(here);
     }
     case kSecondaryInertia_kgm2:
-      change.balance = -at.ratio * data.omega_s.slow_slope;
+      change.balance = -at.ratio * at.slope_s;
       return propagate(campaign, at, change);
     default:
       break;

@@ -210,6 +210,8 @@ Quantities evaluate(const ExperimentData& run, int experiment,
             run.omega_s.value,
             run.pressure.value,
             run.torque.value,
+            run.omega_p.slow_slope,
+            run.omega_s.slow_slope,
             run.command.present ? run.command.value : ArrayXd(),
             {},
             {},
@@ -232,7 +234,10 @@ Quantities evaluate(const ExperimentData& run, int experiment,
               variator.secondary_centrifugal_N_s2 * c.omega_s.square();
   apply(Stage::kForce);
   c.loss_Nm = nuisance[kLossConstant_Nm] + nuisance[kLossPerSpeed_Nms] * c.omega_p;
-  if (run.torque_is_engine) c.loss_Nm += variator.primary_inertia_kg_m2 * run.omega_p.slope;
+  if (run.torque_is_engine) {
+    c.loss_Nm +=
+        variator.primary_inertia_kg_m2 * (run.omega_p.slope + c.slope_p - run.omega_p.slow_slope);
+  }
   apply(Stage::kDriveline);
   c.belt_torque = c.torque - c.loss_Nm;
   c.deformation = nuisance[kDeformationPerkN] * 1e-3 * c.force_N;
@@ -257,9 +262,8 @@ Quantities evaluate(const ExperimentData& run, int experiment,
   if (run.torque_s.present) {
     // From the slow copies of all three channels: the inertia's share would else be fitted to the
     // noise of the speed's slope.
-    q.balance =
-        c.belt_torque + run.torque.slow - run.torque.value -
-        ratio * (run.torque_s.slow + nuisance[kSecondaryInertia_kgm2] * run.omega_s.slow_slope);
+    q.balance = c.belt_torque + run.torque.slow - run.torque.value -
+                ratio * (run.torque_s.slow + nuisance[kSecondaryInertia_kgm2] * c.slope_s);
   }
   if (run.command.present) {
     q.tracking =
@@ -269,6 +273,7 @@ Quantities evaluate(const ExperimentData& run, int experiment,
   q.belt_torque = std::move(c.belt_torque);
   q.omega_p = std::move(c.omega_p);
   q.omega_s = std::move(c.omega_s);
+  q.slope_s = std::move(c.slope_s);
   q.ln_peak_slip = c.ln_peak_slip;
   q.fall = c.fall;
   return q;

@@ -62,6 +62,7 @@ struct Context {
   const estimator::VariatorParameters& variator;
   int experiment = 0;                                 // its place in the order given
   Eigen::ArrayXd omega_p, omega_s, pressure, torque;  // the true ones, as the model believes
+  Eigen::ArrayXd slope_p, slope_s;                    // of both speeds, slow copies
   Eigen::ArrayXd track;        // what p_s should be by the command (tracking residual)
   Eigen::ArrayXd force_N;      // F_s
   Eigen::ArrayXd loss_Nm;      // between shaft and belt, drag positive
@@ -76,6 +77,7 @@ struct Context {
 struct Quantities {
   Eigen::ArrayXd slip, belt_torque, capacity, force_N, ratio, balance, tracking;
   Eigen::ArrayXd omega_p, omega_s;  // the true ones
+  Eigen::ArrayXd slope_s;           // of omega_s
   std::array<double, kStops> ln_peak_slip{}, fall{};
 };
 

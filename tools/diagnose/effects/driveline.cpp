@@ -21,7 +21,7 @@ void shift_ratio_at(Context& c, int stop, double relative) {
 }  // namespace
 
 void apply_inertia_torque(Context& c, const Slot&, double inertia_kg_m2) {
-  c.loss_Nm += inertia_kg_m2 * c.run.omega_p.slow_slope;
+  c.loss_Nm += inertia_kg_m2 * c.slope_p;
 }
 void apply_loss_constant(Context& c, const Slot&, double constant_Nm) { c.loss_Nm += constant_Nm; }
 void apply_loss_per_kN(Context& c, const Slot&, double per_kN_Nm) {

@@ -30,8 +30,10 @@ void apply_channel_skew(Context& c, const Slot& slot, double delay_s) {
   const double dt_s = c.run.dt_s;
   if (slot.role == "primary_speed") {
     c.omega_p += shift_change(c.run.omega_p, dt_s, delay_s);
+    c.slope_p = shifted_slope(c.run.omega_p, dt_s, delay_s);
   } else if (slot.role == "secondary_speed") {
     c.omega_s += shift_change(c.run.omega_s, dt_s, delay_s);
+    c.slope_s = shifted_slope(c.run.omega_s, dt_s, delay_s);
   } else {
     c.pressure += shift_change(c.run.pressure, dt_s, delay_s);
   }
