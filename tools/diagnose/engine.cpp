@@ -22,6 +22,7 @@ constexpr double kCovered = 2.0;     // rms in units of noise that is told apart
 constexpr int kAttempts = 10;        // to find a step that gains, each shorter than the last
 constexpr double kLongStep = 0.05;   // in tolerances and usual sizes
 constexpr double kWorthwhile = 1.0;  // of the log likelihood
+constexpr double kSameStep = 1e-3;   // apart by less of their length: both fail
 constexpr double kCurveFault = 0.1;  // one sigma of curve_faults()
 constexpr double kSizePrior = 3.0;   // one sigma of an effect's size, in usual sizes
 
@@ -213,11 +214,16 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
     const Prior here = prior(parameters, best.state);
     double gained = 0.0;
     bool moved = false;
+    VectorXd failed = VectorXd::Zero(scales.size());  // the last step that did
     for (int attempt = 0; attempt < kAttempts && !moved; ++attempt) {
       Prior damped = here;
       damped.precision += damping * diagonal;
       damped.pull = here.pull.cwiseProduct(here.precision).cwiseQuotient(damped.precision);
       const Fit step = fit_linear(best.summaries, columns, damped, best.fit.scatter, 0);
+      if ((step.step - failed).norm() < kSameStep * failed.norm()) {
+        damping = std::clamp(10.0 * damping, 1e-5, 1e6);
+        continue;
+      }
       const ModelState from = best.state;
       gained = 0.0;
       double share = 1.0;
@@ -229,15 +235,15 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
         std::vector<Residuals> there = residuals_at(next);
         const double gain =
             standing(next, summaries_at(next, there, {}), best.fit.scatter) - best.objective;
-        if (gain > gained) {
-          gained = gain;
-          share = tried;
-          best.state = next;
-          at = std::move(there);
-        }
-        if (gain <= 0.0 || gained > kWorthwhile || !is_long) break;
+        if (gain <= gained) break;  // a shorter one gains less still
+        gained = gain;
+        share = tried;
+        best.state = next;
+        at = std::move(there);
+        if (gained > kWorthwhile || !is_long) break;
       }
       moved = gained > 0.0;
+      failed = step.step;
       damping = std::clamp(moved && share == 1.0 ? 0.1 * damping : 10.0 * damping, 1e-5, 1e6);
     }
     if (!moved) break;

@@ -199,11 +199,16 @@ std::vector<WhiteBlock> whitened(const Campaign& campaign, int run, const RawCol
 
 }  // namespace
 
-RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& state, Residuals at,
-                       const std::vector<int>& parameters, const VectorXd& scale, bool with_random,
-                       const ExtraColumns& extra) {
+RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& state,
+                       const Residuals& residuals, const std::vector<int>& parameters,
+                       const VectorXd& scale, bool with_random, const ExtraColumns& extra) {
   RawColumns out;
   out.with_random = with_random;
+  if (!with_random && parameters.empty() && !extra) {  // nothing that asks for derivatives
+    out.columns.push_back(residuals.value);
+    return out;
+  }
+  Residuals at = residuals;
   if (with_random || !parameters.empty()) prepare_derivatives(campaign, run, state, at);
   for (std::size_t j = 0; j < parameters.size(); ++j) {
     ResidualColumns column = derivative(campaign, run, state, at, parameters[j]);
@@ -263,13 +268,13 @@ Summary summary_of(const Campaign& campaign, int run, const RawColumns& raw,
   return out;
 }
 
-Summary summarise(const Campaign& campaign, int run, const ModelState& state, Residuals at,
+Summary summarise(const Campaign& campaign, int run, const ModelState& state, const Residuals& at,
                   const std::vector<int>& parameters, const VectorXd& scale,
                   const Whitening& whitening, const ExtraColumns& extra) {
-  return summary_of(campaign, run,
-                    raw_columns(campaign, run, state, std::move(at), parameters, scale,
-                                whitening.random.empty(), extra),
-                    whitening);
+  return summary_of(
+      campaign, run,
+      raw_columns(campaign, run, state, at, parameters, scale, whitening.random.empty(), extra),
+      whitening);
 }
 
 Summary summarise(const Campaign& campaign, int run, const ModelState& state,
@@ -306,8 +311,11 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
   const Index last = summaries.empty() ? 0 : summaries[0].aa.rows() - 1;
   std::vector<int> picked = columns;
   picked.push_back(static_cast<int>(last));
+  using RandomRows = Eigen::Matrix<double, kRandomEffects, Eigen::Dynamic>;
+  using RandomSquare = Eigen::Matrix<double, kRandomEffects, kRandomEffects>;
   struct Part {
-    MatrixXd aa, ua;
+    MatrixXd aa;
+    RandomRows ua;
   };
   std::vector<Part> parts(runs);
   for (std::size_t e = 0; e < runs; ++e) {
@@ -320,15 +328,19 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
   for (int iteration = 0;; ++iteration) {
     MatrixXd total = MatrixXd::Zero(n + 1, n + 1);
     double ln_det = 0.0;
-    std::vector<MatrixXd> posterior(runs);  // covariance of the random effects given the parameters
-    const MatrixXd inverse = (1.0 / fit.scatter.variance).matrix().asDiagonal();
+    std::vector<RandomSquare> posterior(
+        runs);  // covariance of the random effects given the parameters
+    const RandomSquare inverse = (1.0 / fit.scatter.variance).matrix().asDiagonal();
     for (std::size_t e = 0; e < runs; ++e) {
-      const Eigen::LLT<MatrixXd> llt(summaries[e].uu + inverse);
-      posterior[e] = llt.solve(MatrixXd::Identity(kRandomEffects, kRandomEffects));
-      total += parts[e].aa - parts[e].ua.transpose() * posterior[e] * parts[e].ua;
+      const Eigen::LLT<RandomSquare> llt(summaries[e].uu + inverse);
+      posterior[e] = llt.solve(RandomSquare::Identity());
+      const RandomRows root = llt.matrixL().solve(parts[e].ua);
+      total += parts[e].aa;
+      total.selfadjointView<Eigen::Lower>().rankUpdate(root.transpose(), -1.0);
       ln_det +=
           2.0 * llt.matrixLLT().diagonal().array().log().sum() + fit.scatter.variance.log().sum();
     }
+    total.triangularView<Eigen::StrictlyUpper>() = total.transpose();
     MatrixXd information = total.topLeftCorner(n, n);
     VectorXd right = -total.topRightCorner(n, 1);
     for (Index j = 0; j < n; ++j) {
@@ -353,10 +365,11 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
     Eigen::Array<double, kRandomEffects, 1> square =
         Eigen::Array<double, kRandomEffects, 1>::Zero();
     for (std::size_t e = 0; e < runs; ++e) {
-      const VectorXd u = -posterior[e] * (parts[e].ua * full);
-      const MatrixXd lever = posterior[e] * parts[e].ua.leftCols(n);
+      const Eigen::Matrix<double, kRandomEffects, 1> u = -posterior[e] * (parts[e].ua * full);
+      const RandomRows lever = posterior[e] * parts[e].ua.leftCols(n);
+      const RandomRows spread = lever * fit.covariance;
       square += u.array().square() + posterior[e].diagonal().array() +
-                (lever * fit.covariance * lever.transpose()).diagonal().array();
+                spread.cwiseProduct(lever).rowwise().sum().array();
     }
     fit.scatter.variance = (square + kScatterPriorRuns * usual.variance) /
                            (static_cast<double>(runs) + kScatterPriorRuns);
@@ -368,14 +381,23 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
 std::vector<double> left_out_densities(const std::vector<Summary>& summaries,
                                        const std::vector<int>& columns, const Prior& prior) {
   constexpr int kScatterIterations = 6;
+  std::vector<int> picked = columns;
+  picked.push_back(static_cast<int>(summaries.empty() ? 0 : summaries[0].aa.rows() - 1));
+  std::vector<Summary> own;  // of these columns alone: copied for every experiment
+  own.reserve(summaries.size());
+  for (const Summary& each : summaries) {
+    own.push_back({each.aa(picked, picked), each.ua(Eigen::all, picked), each.uu, each.samples});
+  }
+  std::vector<int> all_of_them(columns.size());
+  std::iota(all_of_them.begin(), all_of_them.end(), 0);
   std::vector<double> out;
   for (std::size_t e = 0; e < summaries.size(); ++e) {
-    std::vector<Summary> runs = summaries;
+    std::vector<Summary> runs = own;
     runs.erase(runs.begin() + static_cast<std::ptrdiff_t>(e));
-    const Fit others = fit_linear(runs, columns, prior, default_scatter(), kScatterIterations);
+    const Fit others = fit_linear(runs, all_of_them, prior, default_scatter(), kScatterIterations);
     // The others' posterior as the prior of the one left out; its gain in evidence.
-    runs.push_back(summaries[e]);
-    const Fit all = fit_linear(runs, columns, prior, others.scatter, 0);
+    runs.push_back(own[e]);
+    const Fit all = fit_linear(runs, all_of_them, prior, others.scatter, 0);
     const double ln_det = others.covariance.ldlt().vectorD().array().max(1e-300).log().sum() -
                           all.covariance.ldlt().vectorD().array().max(1e-300).log().sum();
     out.push_back(all.log_likelihood - others.log_likelihood - 0.5 * ln_det);

@@ -12,10 +12,9 @@ using Eigen::ArrayXd;
 
 // The foot point of what stands in the regressors: of the misfit in torque, the clamp force takes
 // its share.
-void move_to_foot(const Quantities& q, const ExperimentData& data,
-                  const estimator::VariatorParameters& variator, const ArrayXd& force_share,
-                  Residuals& out) {
-  out.ratio = q.ratio;
+void move_to_foot(const ExperimentData& data, const estimator::VariatorParameters& variator,
+                  const ArrayXd& force_share, Residuals& out) {
+  const Quantities& q = out.measured;
   out.clean_Nm = out.model_Nm;
   out.clean = data;
   for (int k = 0; k < data.size(); ++k) {
@@ -61,78 +60,70 @@ std::array<CurveShape, kStops> shapes(const Eigen::VectorXd& nuisance, const Qua
 
 Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state) {
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
-  const Quantities q = quantities(campaign, data, run, state);
+  Residuals out;
+  out.measured = quantities(campaign, data, run, state);
+  const Quantities& q = out.measured;
   const auto curve = shapes(state.nuisance, q);
   const int n = data.size();
-  Residuals out;
   out.value[kFrictionResidual] = ArrayXd::Zero(n);
   out.foot = ArrayXd::Zero(n);
   out.slope = ArrayXd::Zero(n);
   out.model_Nm = ArrayXd::Zero(n);
   out.weight = ArrayXd::Zero(n);
   const double slip_variance = campaign.slip_noise(run) * campaign.slip_noise(run);
+  const double slip_weight = 1.0 / slip_variance;
   const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
+  const std::array<double, kStops> peak_slip{std::exp(q.ln_peak_slip[0]),
+                                             std::exp(q.ln_peak_slip[1])};
   for (int k = 0; k < n; ++k) {
     if (!data.valid[static_cast<std::size_t>(k)]) continue;
     const auto stop = static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)]);
-    const double peak = std::exp(q.ln_peak_slip[stop]);
+    const double peak = peak_slip[stop], per_peak = 1.0 / peak;
     const double capacity = q.capacity[k];
     const double carried_Nm = q.belt_torque[k] * campaign.noise.force_N / q.force_N[k];
     const double torque_variance = sensor_variance + carried_Nm * carried_Nm;
-    const double slip_weight = 1.0 / slip_variance, torque_weight = 1.0 / torque_variance;
-    double x = q.slip[k] / peak;
-    double model = 0.0, slope = 0.0;
+    const double torque_weight = 1.0 / torque_variance;
     // Foot point: Gauss-Newton, halved while the distance would grow.
-    const auto at = [&](double where) {
-      const CurveShape::Point point = curve[stop].evaluate(where);
-      model = capacity * point.value;
-      slope = capacity * point.slope / peak;
-      const double gap_slip = q.slip[k] - where * peak;
-      const double gap_torque = q.belt_torque[k] - model;
-      return gap_slip * gap_slip * slip_weight + gap_torque * gap_torque * torque_weight;
+    struct Place {
+      double x = 0.0, model_Nm = 0.0, slope = 0.0, distance = 0.0;
     };
-    double distance = at(x);
+    const auto at = [&](double x) -> Place {
+      const CurveShape::Point point = curve[stop].evaluate(x);
+      const double model_Nm = capacity * point.value;
+      const double gap_slip = q.slip[k] - x * peak;
+      const double gap_Nm = q.belt_torque[k] - model_Nm;
+      return {x, model_Nm, capacity * point.slope * per_peak,
+              gap_slip * gap_slip * slip_weight + gap_Nm * gap_Nm * torque_weight};
+    };
+    Place foot = at(q.slip[k] * per_peak);
     // Right of the rising branch the next point of the curve may lie on it, at the same torque:
     // from beyond the peak no small steps lead there.
     if (const double rising = nominal_inverse(q.belt_torque[k] / capacity); std::isfinite(rising)) {
-      if (const double there = at(rising); there < distance) {
-        distance = there;
-        x = rising;
-      } else {
-        at(x);
-      }
+      if (const Place there = at(rising); there.distance < foot.distance) foot = there;
     }
     for (int i = 0; i < 12; ++i) {
-      const double gap_slip = q.slip[k] - x * peak;
-      const double gap_torque = q.belt_torque[k] - model;
-      double step = (gap_slip * slip_weight + slope * gap_torque * torque_weight) /
-                    ((slip_weight + slope * slope * torque_weight) * peak);
+      const double gap_slip = q.slip[k] - foot.x * peak;
+      const double gap_Nm = q.belt_torque[k] - foot.model_Nm;
+      double step = (gap_slip * slip_weight + foot.slope * gap_Nm * torque_weight) /
+                    ((slip_weight + foot.slope * foot.slope * torque_weight) * peak);
       step = std::clamp(step, -0.5, 0.5);
-      const double before = x;
+      const double before = foot.x;
       for (int halving = 0; halving < 6; ++halving, step *= 0.4) {
-        x = before + step;
-        if (const double there = at(x); there <= distance) {
-          distance = there;
+        if (const Place there = at(before + step); there.distance <= foot.distance) {
+          foot = there;
           break;
         }
-        x = before;
       }
-      if (x == before) {
-        at(x);
-        break;
-      }
-      if (std::abs(x - before) < 1e-5) break;  // the distance is flat there
+      if (std::abs(foot.x - before) < 1e-5) break;  // the distance is flat there
     }
-    out.foot[k] = x;
-    out.slope[k] = slope;
-    out.model_Nm[k] = model;
-    out.weight[k] = 1.0 / std::sqrt(torque_variance + slope * slope * slip_variance);
+    out.foot[k] = foot.x;
+    out.slope[k] = foot.slope;
+    out.model_Nm[k] = foot.model_Nm;
+    out.weight[k] = 1.0 / std::sqrt(torque_variance + foot.slope * foot.slope * slip_variance);
     out.value[kFrictionResidual][k] =
-        (q.belt_torque[k] - model - slope * (q.slip[k] - x * peak)) * out.weight[k];
+        (q.belt_torque[k] - foot.model_Nm - foot.slope * (q.slip[k] - foot.x * peak)) *
+        out.weight[k];
   }
-  out.capacity = q.capacity;
-  out.slip = q.slip;
-  out.slope_s = q.slope_s;
   out.balance_weight = ArrayXd::Zero(n);
   for (int k = 0; k < n; ++k) {
     const auto i = static_cast<std::size_t>(k);
@@ -156,12 +147,16 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
 void prepare_derivatives(const Campaign& campaign, int run, const ModelState& state,
                          Residuals& at) {
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
-  const Quantities q = quantities(campaign, data, run, state);
+  const Quantities& q = at.measured;
   // Share of the misfit that is the clamp force's: its noise comes with the torque it carries.
   const ArrayXd carried_variance = (q.belt_torque * campaign.noise.force_N / q.force_N).square();
   const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
-  move_to_foot(q, data, campaign.variator, carried_variance / (sensor_variance + carried_variance),
+  move_to_foot(data, campaign.variator, carried_variance / (sensor_variance + carried_variance),
                at);
+  at.there = quantities(campaign, at.clean, run, state);
+  at.place.resize(static_cast<std::size_t>(at.foot.size()));
+  std::transform(at.foot.begin(), at.foot.end(), at.place.begin(),
+                 [](double x) { return place_on_curve(std::abs(x)); });
 }
 
 ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
@@ -206,19 +201,23 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   const int n = data.size();
   QuantityChange change;
-  const auto per_stop = [&](int stop, auto&& f) {
-    change.torque = ArrayXd::Zero(n);
+  // A change of the belt's torque at one stop, by sample; zero where the stop is never used.
+  const auto per_stop = [&](int stop, auto&& f) -> ResidualColumns {
+    if (std::find(data.stop.begin(), data.stop.end(), stop) == data.stop.end()) return {};
+    ResidualColumns out;
+    ArrayXd& column = out[kFrictionResidual];
+    column = ArrayXd::Zero(n);
     for (int k = 0; k < n; ++k) {
       if (data.stop[static_cast<std::size_t>(k)] == stop && at.weight[k] > 0.0) {
-        change.torque[k] = -f(k);
+        column[k] = -f(k) * at.weight[k];
       }
     }
-    return propagate(campaign, at, change);
+    return out;
   };
   const auto bump = [&](int k, int i) {
-    const double size = std::abs(at.foot[k]);
-    const double f = i < kShapeKnots ? mode_function(i, size) : fall_function(size);
-    return at.capacity[k] * f * std::copysign(1.0, at.foot[k]);
+    const double f = i < kShapeKnots ? mode_function(i, at.place[static_cast<std::size_t>(k)])
+                                     : fall_function(std::abs(at.foot[k]));
+    return at.measured.capacity[k] * f * std::copysign(1.0, at.foot[k]);
   };
   switch (parameter) {
     case kLnMuMax:
@@ -235,8 +234,10 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
   }
   // A change of ln(r_g): slip and, through the torque out, balance.
   const auto ratio_change = [&](const ArrayXd& ln_ratio) {
-    change.slip = (1.0 - at.slip) * ln_ratio;
-    if (at.output_torque.size() > 0) change.balance = -at.ratio * at.output_torque * ln_ratio;
+    change.slip = (1.0 - at.measured.slip) * ln_ratio;
+    if (at.output_torque.size() > 0) {
+      change.balance = -at.measured.ratio * at.output_torque * ln_ratio;
+    }
     return propagate(campaign, at, change);
   };
   const auto torque_change = [&](const ArrayXd& torque) {
@@ -257,8 +258,21 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
       for (int k = 0; k < n; ++k) here[k] = data.stop[static_cast<std::size_t>(k)] == stop;
       return ratio_change(here);
     }
+    case kDeformationPerkN: {
+      const Quantities& q = at.there;
+      const ArrayXd ln_ratio = -1e-3 * q.force_N / (1.0 - q.deformation).max(0.05);
+      change.slip = (1.0 - q.slip) * ln_ratio;
+      if (q.balance.size() > 0) {
+        change.balance =
+            (q.balance - q.belt_torque - at.clean.torque.slow + at.clean.torque.value) * ln_ratio;
+      }
+      return propagate(campaign, at, change);
+    }
+    case kCommandOffset_Pa:
+      change.tracking = ArrayXd::Constant(n, -1.0);
+      return propagate(campaign, at, change);
     case kSecondaryInertia_kgm2:
-      change.balance = -at.ratio * at.slope_s;
+      change.balance = -at.measured.ratio * at.measured.slope_s;
       return propagate(campaign, at, change);
     default:
       break;

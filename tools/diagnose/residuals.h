@@ -63,15 +63,17 @@ struct Campaign {
 // Residuals of one experiment and what their derivatives need.
 struct Residuals {
   std::array<Eigen::ArrayXd, kResidualKinds> value;  // empty where the kind does not exist
-  Eigen::ArrayXd foot;                     // x = slip / slip at the peak, of the foot point
-  Eigen::ArrayXd slope;                    // dT/d(slip) there
-  Eigen::ArrayXd model_Nm;                 // curve at the foot point, at the measured clamp force
-  Eigen::ArrayXd weight;                   // 1 / (noise of the distance)
-  Eigen::ArrayXd balance_weight;           // 1 / (noise of the balance)
-  Eigen::ArrayXd capacity, slip, slope_s;  // as measured; slope_s: of the secondary speed
-  // By prepare_derivatives only, at the clamp force of the foot point:
-  Eigen::ArrayXd clean_Nm, ratio, output_torque;
-  ExperimentData clean;  // torques and pressure at the foot point: no noise in a regressor
+  Eigen::ArrayXd foot;            // x = slip / slip at the peak, of the foot point
+  Eigen::ArrayXd slope;           // dT/d(slip) there
+  Eigen::ArrayXd model_Nm;        // curve at the foot point, at the measured clamp force
+  Eigen::ArrayXd weight;          // 1 / (noise of the distance)
+  Eigen::ArrayXd balance_weight;  // 1 / (noise of the balance)
+  Quantities measured;            // the model at the state, on the data as they are
+  // By prepare_derivatives only, at the foot point: no noise in a regressor.
+  Eigen::ArrayXd clean_Nm, output_torque;
+  ExperimentData clean;           // torques and pressure there
+  Quantities there;               // the model on them
+  std::vector<CurvePlace> place;  // of |foot|
 };
 
 // The model at a state, of the campaign's data or of others in their place; its friction curves.

@@ -100,28 +100,43 @@ Cubics cubics(const std::array<double, kEnds>& y) {
   return out;
 }
 
-std::size_t interval_of(double x) {
-  // Where to begin, per step of x no longer than the shortest interval.
-  constexpr double kPerUnit = 16.0;
-  static const std::vector<std::size_t> kFirst = [] {
-    std::vector<std::size_t> first;
-    for (int i = 0; i <= static_cast<int>(kEnd.back() * kPerUnit); ++i) {
-      std::size_t j = 0;
-      while (j + 2 < kEnds && kEnd[j + 1] < i / kPerUnit) ++j;
-      first.push_back(j);
-    }
-    return first;
-  }();
-  if (!(x < kEnd.back())) return kEnds - 2;
-  std::size_t j = kFirst[static_cast<std::size_t>(x * kPerUnit)];
-  while (j + 2 < kEnds && kEnd[j + 1] < x) ++j;
-  return j;
+CurveShape::Point nominal_formula(double size) {
+  static const double kStiffness = std::tan(std::numbers::pi / (2.0 * kBend));
+  const double angle = kBend * std::atan(kStiffness * size);
+  return {std::sin(angle),
+          std::cos(angle) * kBend * kStiffness / (1.0 + kStiffness * kStiffness * size * size)};
 }
 
-double cubic_at(const Cubics& c, double x) {
-  const std::size_t j = interval_of(x);
-  const double u = std::min(x, kEnd.back()) - kEnd[j];
-  return c[j][0] + u * (c[j][1] + u * (c[j][2] + u * c[j][3]));
+// The nominal curve as cubics between points of a table (error below 1e-7), beside each the
+// interval of the departure that it begins in: both are evaluated millions of times.
+constexpr std::size_t kCellsPerUnit = 64, kCellUnits = 4;
+static_assert(kShapeKnot.back() < kCellUnits);
+struct Cell {
+  std::array<double, 4> nominal;  // of the cell's own abscissa, 0 to 1
+  std::size_t interval;
+};
+using Cells = std::array<Cell, kCellsPerUnit * kCellUnits>;
+const Cells& cells() {
+  static const Cells kCells = [] {
+    Cells out{};
+    std::size_t interval = 0;
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      const double x = static_cast<double>(i) / kCellsPerUnit;
+      const CurveShape::Point a = nominal_formula(x), b = nominal_formula(x + 1.0 / kCellsPerUnit);
+      const double rise = b.value - a.value;
+      const double begins = a.slope / kCellsPerUnit, ends = b.slope / kCellsPerUnit;
+      while (interval + 2 < kEnds && kEnd[interval + 1] < x) ++interval;
+      out[i] = {{a.value, begins, 3.0 * rise - 2.0 * begins - ends, begins + ends - 2.0 * rise},
+                interval};
+    }
+    return out;
+  }();
+  return kCells;
+}
+
+std::size_t interval_from(std::size_t first, double x) {
+  while (first + 2 < kEnds && kEnd[first + 1] < x) ++first;
+  return first;
 }
 
 }  // namespace
@@ -131,45 +146,36 @@ double fall_function(double x) {
   return beyond <= 0.0 ? 0.0 : -beyond * beyond / (0.3 + beyond);
 }
 
-namespace {
-
-CurveShape::Point nominal_formula(double size) {
-  static const double kStiffness = std::tan(std::numbers::pi / (2.0 * kBend));
-  const double angle = kBend * std::atan(kStiffness * size);
-  return {std::sin(angle),
-          std::cos(angle) * kBend * kStiffness / (1.0 + kStiffness * kStiffness * size * size)};
-}
-
-// The same from a table, cubic between its points (error below 1e-7): it is evaluated millions of
-// times.
-CurveShape::Point nominal_curve(double size) {
-  constexpr int kPerUnit = 64, kUnits = 4;
-  static const std::vector<CurveShape::Point> kTable = [] {
-    std::vector<CurveShape::Point> table;
-    for (int i = 0; i <= kPerUnit * kUnits; ++i) {
-      table.push_back(nominal_formula(static_cast<double>(i) / kPerUnit));
+double nominal_inverse(double value) {
+  // Against the root of what the peak is away by it is smooth, also at the peak: cubics.
+  constexpr int kRoots = 64;
+  struct Point {
+    double x, step;  // change of x over one step of the table
+  };
+  static const std::array<Point, kRoots + 1> kTable = [] {
+    const double stiffness = std::tan(std::numbers::pi / (2.0 * kBend));
+    std::array<Point, kRoots + 1> table{};
+    for (std::size_t i = 0; i < table.size(); ++i) {
+      const double root = static_cast<double>(i) / kRoots;
+      const double x = std::tan(std::asin(1.0 - root * root) / kBend) / stiffness;
+      const double per_root =
+          i == 0 ? -std::numbers::sqrt2 * (1.0 + stiffness * stiffness) / (kBend * stiffness)
+                 : -2.0 * root / nominal_formula(x).slope;
+      table[i] = {x, per_root / kRoots};
     }
     return table;
   }();
-  if (!(size < kUnits)) return nominal_formula(size);
-  const double at = size * kPerUnit;
-  const auto i = static_cast<std::size_t>(at);
-  const double u = at - static_cast<double>(i), v = 1.0 - u;
-  const CurveShape::Point &a = kTable[i], &b = kTable[i + 1];
-  constexpr double h = 1.0 / kPerUnit;
-  const double rise = b.value - a.value;
-  return {v * v * (1.0 + 2.0 * u) * a.value + u * u * (1.0 + 2.0 * v) * b.value +
-              u * v * h * (v * a.slope - u * b.slope),
-          6.0 * u * v * rise * kPerUnit + v * (1.0 - 3.0 * u) * a.slope +
-              u * (1.0 - 3.0 * v) * b.slope};
-}
-
-}  // namespace
-
-double nominal_inverse(double value) {
-  static const double kStiffness = std::tan(std::numbers::pi / (2.0 * kBend));
-  if (!(std::abs(value) < 1.0)) return std::numeric_limits<double>::quiet_NaN();
-  return std::tan(std::asin(value) / kBend) / kStiffness;
+  const double size = std::abs(value);
+  if (!(size < 1.0)) return std::numeric_limits<double>::quiet_NaN();
+  const double at = std::sqrt(1.0 - size) * kRoots;
+  const auto i = std::min(static_cast<std::size_t>(at), std::size_t{kRoots - 1});
+  const double u = at - static_cast<double>(i);
+  const Point &a = kTable[i], &b = kTable[i + 1];
+  const double rise = b.x - a.x;
+  const double x =
+      a.x +
+      u * (a.step + u * (3.0 * rise - 2.0 * a.step - b.step + u * (a.step + b.step - 2.0 * rise)));
+  return std::copysign(x, value);
 }
 
 CurveShape::CurveShape(std::span<const double, kShapeKnots> departure, double fall) : fall_(fall) {
@@ -180,16 +186,39 @@ CurveShape::CurveShape(std::span<const double, kShapeKnots> departure, double fa
   cubic_ = cubics(y);
 }
 
-double CurveShape::departure(double x) const { return cubic_at(cubic_, x); }
+CurvePlace place_on_curve(double x) {
+  if (!(x < kEnd.back())) return {kEnds - 2, kEnd.back() - kEnd[kEnds - 2]};
+  const std::size_t j =
+      interval_from(cells()[static_cast<std::size_t>(x * kCellsPerUnit)].interval, x);
+  return {j, x - kEnd[j]};
+}
+
+double CurveShape::departure(const CurvePlace& place) const {
+  const auto& c = cubic_[place.interval];
+  const double u = place.u;
+  return c[0] + u * (c[1] + u * (c[2] + u * c[3]));
+}
 
 CurveShape::Point CurveShape::evaluate(double x) const {
   const double size = std::abs(x);
-  Point out = nominal_curve(size);
-  const std::size_t j = interval_of(size);
-  const double u = std::min(size, kEnd.back()) - kEnd[j];
-  const auto& c = cubic_[j];
-  out.value += c[0] + u * (c[1] + u * (c[2] + u * c[3]));
-  if (size < kEnd.back()) out.slope += c[1] + u * (2.0 * c[2] + 3.0 * u * c[3]);
+  Point out;
+  if (size < kCellUnits) {
+    const double at = size * kCellsPerUnit;
+    const auto i = static_cast<std::size_t>(at);
+    const Cell& cell = cells()[i];
+    const double v = at - static_cast<double>(i);
+    const auto& n = cell.nominal;
+    out.value = n[0] + v * (n[1] + v * (n[2] + v * n[3]));
+    out.slope = (n[1] + v * (2.0 * n[2] + 3.0 * v * n[3])) * kCellsPerUnit;
+    const std::size_t j = interval_from(cell.interval, size);
+    const auto& c = cubic_[j];
+    const double u = std::min(size, kEnd.back()) - kEnd[j];
+    out.value += c[0] + u * (c[1] + u * (c[2] + u * c[3]));
+    if (size < kEnd.back()) out.slope += c[1] + u * (2.0 * c[2] + 3.0 * u * c[3]);
+  } else {
+    out = nominal_formula(size);
+    out.value += departure(place_on_curve(size));
+  }
   if (fall_ != 0.0 && size > 1.0) {
     const double beyond = size - 1.0;
     out.value += fall_ * fall_function(size);
@@ -198,6 +227,12 @@ CurveShape::Point CurveShape::evaluate(double x) const {
   out.value *= std::copysign(1.0, x);
   return out;
 }
+
+namespace {
+bool is_zero(const ArrayXd& values) {
+  return std::all_of(values.begin(), values.end(), [](double v) { return v == 0.0; });
+}
+}  // namespace
 
 Quantities evaluate(const ExperimentData& run, int experiment,
                     const estimator::VariatorParameters& variator, const Eigen::VectorXd& nuisance,
@@ -241,24 +276,28 @@ Quantities evaluate(const ExperimentData& run, int experiment,
   apply(Stage::kDriveline);
   c.belt_torque = c.torque - c.loss_Nm;
   c.deformation = nuisance[kDeformationPerkN] * 1e-3 * c.force_N;
-  ArrayXd ln_ratio_0(n), radius(n);
-  const double ln_low = std::log(variator.ratio_low) + nuisance[kLnRatioLow];
-  const double ln_overdrive = std::log(variator.ratio_overdrive) + nuisance[kLnRatioOverdrive];
+  // Ratio without load, and capacity per clamp force but for what changes the friction.
+  ArrayXd ratio(n), lever_m(n);
+  const double ratio_low = variator.ratio_low * std::exp(nuisance[kLnRatioLow]);
+  const double ratio_overdrive = variator.ratio_overdrive * std::exp(nuisance[kLnRatioOverdrive]);
+  const double gain = 2.0 / std::cos(variator.half_wedge_angle_rad) * std::exp(nuisance[kLnMuMax]);
+  const double lever_low_m = gain * variator.primary_radius_low_m;
+  const double lever_overdrive_m = gain * variator.primary_radius_overdrive_m;
   for (int k = 0; k < n; ++k) {
     const bool low = run.stop[static_cast<std::size_t>(k)] == kLowStop;
-    ln_ratio_0[k] = low ? ln_low : ln_overdrive;
-    radius[k] = low ? variator.primary_radius_low_m : variator.primary_radius_overdrive_m;
+    ratio[k] = low ? ratio_low : ratio_overdrive;
+    lever_m[k] = low ? lever_low_m : lever_overdrive_m;
   }
   apply(Stage::kRatio);
-  const ArrayXd ratio = (1.0 - c.deformation).max(0.05) * (ln_ratio_0 + c.ln_ratio).exp();
+  ratio *= (1.0 - c.deformation).max(0.05);
+  if (!is_zero(c.ln_ratio)) ratio *= c.ln_ratio.exp();  // hardly ever there, and slow
   c.slip = 1.0 - c.omega_s / (c.omega_p * ratio);
   apply(Stage::kFriction);
 
   Quantities q;
   q.slip = std::move(c.slip);
-  q.ratio = ratio;
-  q.capacity = (2.0 / std::cos(variator.half_wedge_angle_rad)) * radius * c.force_N.max(50.0) *
-               (nuisance[kLnMuMax] + c.ln_friction).exp();
+  q.capacity = lever_m * c.force_N.max(50.0);
+  if (!is_zero(c.ln_friction)) q.capacity *= c.ln_friction.exp();
   if (run.torque_s.present) {
     // From the slow copies of all three channels: the inertia's share would else be fitted to the
     // noise of the speed's slope.
@@ -269,6 +308,8 @@ Quantities evaluate(const ExperimentData& run, int experiment,
     q.tracking =
         run.pressure.value - (1.0 + nuisance[kCommandGain]) * c.track - nuisance[kCommandOffset_Pa];
   }
+  q.ratio = std::move(ratio);
+  q.deformation = std::move(c.deformation);
   q.force_N = std::move(c.force_N);
   q.belt_torque = std::move(c.belt_torque);
   q.omega_p = std::move(c.omega_p);

@@ -75,7 +75,7 @@ struct Context {
 
 // What the residuals are made of.
 struct Quantities {
-  Eigen::ArrayXd slip, belt_torque, capacity, force_N, ratio, balance, tracking;
+  Eigen::ArrayXd slip, belt_torque, capacity, force_N, deformation, ratio, balance, tracking;
   Eigen::ArrayXd omega_p, omega_s;  // the true ones
   Eigen::ArrayXd slope_s;           // of omega_s
   std::array<double, kStops> ln_peak_slip{}, fall{};
@@ -86,6 +86,13 @@ struct Effects;  // values of the slots, effects.h
 Quantities evaluate(const ExperimentData& run, int experiment,
                     const estimator::VariatorParameters& variator, const Eigen::VectorXd& nuisance,
                     const Effects& effects);
+
+// Where on the departure's cubics x = slip / slip at the peak, x >= 0, lies.
+struct CurvePlace {
+  std::size_t interval = 0;
+  double u = 0.0;  // from the interval's left end
+};
+CurvePlace place_on_curve(double x);
 
 // g(x), x = slip / slip at the peak, odd; nominal: sin(1.3 atan(B x)), peak 1 at x = 1; departure:
 // cubic through the knots; fall: beyond the peak.
@@ -98,7 +105,7 @@ class CurveShape {
     double slope = 0.0;
   };
   Point evaluate(double x) const;
-  double departure(double x) const;  // of the value, without the fall, x >= 0
+  double departure(const CurvePlace& place) const;  // of the value, without the fall
 
  private:
   std::array<std::array<double, 4>, kShapeKnots + 1> cubic_{};  // per interval, from its left end
