@@ -115,5 +115,38 @@ TEST(Rounding, StaysWhereNoNoiseCarriesTheSamplesFromStepToStep) {
   EXPECT_LT(shafts(1e-4, 0.02).rounding_slip, 0.001 * held);
 }
 
+// A pressure that comes down in steps, each a tenth of a second long.
+TEST(Staircase, KeepsThePlateausAndNotTheSteps) {
+  constexpr double kPlateau_s = 1.3, kHeight_Pa = 5e4;
+  const auto pressure_Pa = [](double t_s) {
+    const double steps = std::floor(t_s / kPlateau_s);
+    const double into_s = t_s - steps * kPlateau_s;
+    return 5e5 - kHeight_Pa * (steps - std::max(0.0, 1.0 - into_s / 0.1));
+  };
+  SignalTable table;
+  for (int i = 0; i < 650; ++i) {
+    const auto add = [&](Role role, double value) {
+      table[role].t_s.push_back(0.01 * i);
+      table[role].value.push_back(value);
+    };
+    add(Role::kPrimarySpeed, 100.0);
+    add(Role::kSecondarySpeed, 222.0);
+    add(Role::kSecondaryPressure, pressure_Pa(0.01 * i));
+    add(Role::kPrimaryTorque, 50.0);
+  }
+  const ExperimentData data = prepare(table, estimator::VariatorParameters{});
+  int kept = 0;
+  for (int k = 0; k < data.size(); ++k) {
+    if (!data.valid[static_cast<std::size_t>(k)]) continue;
+    ++kept;
+    EXPECT_NEAR(data.pressure.value[k], pressure_Pa(data.t_s[k]), 0.1 * kHeight_Pa) << k;
+    EXPECT_NEAR(data.pressure.slow[k], pressure_Pa(data.t_s[k]), 0.4 * kHeight_Pa) << k;
+  }
+  EXPECT_EQ(kept, data.valid_count);
+  EXPECT_GT(kept, data.size() / 3);
+  // The first and the last plateau are cut short by the ends of the data.
+  EXPECT_EQ(data.start_of_segment.size(), 3U);
+}
+
 }  // namespace
 }  // namespace beltgrip::diagnose

@@ -256,29 +256,31 @@ class Run {
     std::vector<int> slots;
     slots.reserve(naming.accepted.size());
     for (const Accepted& each : naming.accepted) slots.push_back(each.slot);
-    Gain gain;
-    if (request_.held_out.empty()) {
-      if (campaign.runs.size() >= 3) gain = left_out_gain(engine, naming.nominal, extended, slots);
-    } else {
-      std::vector<ExperimentData> runs;
-      runs.reserve(request_.held_out.size());
+    Campaign held_out = campaign;
+    if (!request_.held_out.empty()) {
+      held_out.runs.clear();
       for (const SignalTable& table : request_.held_out) {
-        runs.push_back(prepare(table, request_.model.variator));
+        held_out.runs.push_back(prepare(table, request_.model.variator));
       }
-      Campaign held_out = campaign;
-      held_out.runs = std::move(runs);
       held_out.slip_noise_share = estimate_slip_noise_shares(held_out, naming.nominal.state);
-      gain = held_out_gain(held_out, naming.nominal.state, extended);
     }
+    const auto gain_over = [&](const Nominal& nominal) -> Gain {
+      if (!request_.held_out.empty()) return held_out_gain(held_out, nominal.state, extended);
+      if (campaign.runs.size() < 3) return {};
+      return left_out_gain(engine, nominal, extended, slots);
+    };
+    const Gain gain = gain_over(naming.nominal);
     for (const int slot : naming.not_confirmed) {
       out().notes.push_back(campaign.slots[static_cast<std::size_t>(slot)].label() +
                             ": fits, but does not help to predict experiments left out of the "
                             "fit; not named");
     }
     // What does not help on the experiments that the user has set aside is no finding either.
-    const bool refuted =
-        !request_.held_out.empty() && !gain.signals.empty() && !slots.empty() &&
-        (!gain.better() || gain.worse(noise_floors(campaign, naming.nominal.state)));
+    const auto helps = [&](const Gain& over_sharp) {
+      return over_sharp.better() && !over_sharp.worse(noise_floors(campaign, naming.sharp.state));
+    };
+    const bool refuted = !request_.held_out.empty() && !gain.signals.empty() && !slots.empty() &&
+                         !helps(gain_over(naming.sharp));
     if (refuted) {
       out().notes.push_back(
           "what was found does not help to predict the held-out experiments; not named");

@@ -192,9 +192,10 @@ int stop_of(double speed_ratio, double force_N, const estimator::VariatorParamet
                                       : kNoStop;
 }
 
-void trim_and_segment(ExperimentData& data) {
+// Drops the ends of gapless stretches, where the local fits have no neighbours, and short ones.
+void trim(ExperimentData& data) {
   const int n = data.size();
-  const int trim = static_cast<int>(std::lround(kTrim_s / data.dt_s));
+  const int ends = static_cast<int>(std::lround(kTrim_s / data.dt_s));
   std::vector<bool> kept(data.valid.size(), false);
   for (int k = 0; k < n;) {
     if (!data.valid[static_cast<std::size_t>(k)]) {
@@ -206,12 +207,37 @@ void trim_and_segment(ExperimentData& data) {
            data.stop[static_cast<std::size_t>(end)] == data.stop[static_cast<std::size_t>(k)]) {
       ++end;
     }
-    if (end - k > 2 * trim + 10) {
-      data.start_of_segment.push_back(k + trim);
-      for (int i = k + trim; i < end - trim; ++i) kept[static_cast<std::size_t>(i)] = true;
-      data.valid_count += end - k - 2 * trim;
+    if (end - k > 2 * ends + 10) {
+      for (int i = k + ends; i < end - ends; ++i) kept[static_cast<std::size_t>(i)] = true;
     }
     k = end;
+  }
+  data.valid = kept;
+}
+
+// Takes out the samples where the pressure moves too fast. Next to them the signals are whole, as
+// they are not at the end of a stretch: nothing more goes, and between two steps a second is worth
+// keeping.
+void mask_and_segment(const std::vector<bool>& masked, ExperimentData& data) {
+  constexpr int kShortest = 4;
+  const int n = data.size();
+  const auto is_kept = [&](int k) {
+    const auto i = static_cast<std::size_t>(k);
+    return data.valid[i] && !masked[i];
+  };
+  std::vector<bool> kept(data.valid.size(), false);
+  for (int k = 0; k < n;) {
+    int end = k;
+    while (end < n && is_kept(end) &&
+           data.stop[static_cast<std::size_t>(end)] == data.stop[static_cast<std::size_t>(k)]) {
+      ++end;
+    }
+    if (end - k >= kShortest) {
+      data.start_of_segment.push_back(k);
+      data.valid_count += end - k;
+      for (int i = k; i < end; ++i) kept[static_cast<std::size_t>(i)] = true;
+    }
+    k = std::max(end, k + 1);
   }
   data.valid = kept;
 }
@@ -346,6 +372,7 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
       saturated_samples(table[Role::kSecondaryPressure], start_s, n, data.dt_s);
   data.stop.assign(static_cast<std::size_t>(n), kNoStop);
   data.valid.assign(static_cast<std::size_t>(n), false);
+  std::vector<bool> too_fast(static_cast<std::size_t>(n), false);
   const auto usable = [](const GridSignal& signal, int k) {
     return !signal.present || std::isfinite(signal.value[k]);
   };
@@ -367,13 +394,14 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
         variator.secondary_piston_area_m2 * (data.pressure.value[k] - data.pressure.slow[k]);
     data.valid[i] = std::abs(slip) < kSlipMax + kSoftness_1_N * force_N &&
                     std::abs(slip_rate) < kSlipRateMax_1_s && data.pressure.present &&
-                    force_N > kForceMin_N && data.torque.present &&
-                    std::abs(step_N) < kForceStepMax * force_N && usable(data.pressure, k) &&
+                    force_N > kForceMin_N && data.torque.present && usable(data.pressure, k) &&
                     usable(data.torque, k) && usable(data.torque_s, k) && usable(data.command, k) &&
                     usable(data.temperature, k) && usable(data.pressure_p, k) && !saturated[i];
+    too_fast[i] = !(std::abs(step_N) < kForceStepMax * force_N);
     data.saturated_pressure |= saturated[i];
   }
-  trim_and_segment(data);
+  trim(data);
+  mask_and_segment(too_fast, data);
   widen_slow(data.pressure, data.dt_s);
   if (data.saturated_pressure) {
     data.notes.push_back(table.name + ": secondary_pressure rests on its bound; left out there");

@@ -245,13 +245,6 @@ LeftOut leave_one_out(const Engine& engine, const ModelState& state,
   return leave_one_out(engine, engine.campaign(), engine.whitening(), state, slots);
 }
 
-LeftOut leave_one_out(const Engine& engine, const Nominal& nominal) {
-  if (nominal.is_covered) return leave_one_out(engine, nominal.state, {});
-  Campaign covering = engine.campaign();
-  covering.noise = nominal.noise;
-  return leave_one_out(engine, covering, identity_whitening(covering), nominal.state, {});
-}
-
 SignalErrors signal_errors(const Campaign& campaign, int run, const ModelState& state) {
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   SignalErrors out;
@@ -378,11 +371,18 @@ std::map<std::string, SimulatedSignal> simulated_signals(const Campaign& campaig
 
 Gain left_out_gain(const Engine& engine, const Nominal& nominal, const ModelState& extended,
                    const std::vector<int>& slots) {
-  const Campaign& campaign = engine.campaign();
-  const std::vector<ModelState> before = leave_one_out(engine, nominal).states;
-  const std::vector<ModelState> after =
-      slots.empty() ? before : leave_one_out(engine, extended, slots).states;
-  Gain out = judge(campaign, before, after);
+  // Both are fitted by the same measure: the noise that covers the nominal machine's misfit, or the
+  // sensors' own, correlations counted.
+  Campaign campaign = engine.campaign();
+  campaign.noise = nominal.noise;
+  const Whitening whitening =
+      nominal.is_covered ? engine.whitening() : identity_whitening(campaign);
+  const auto left_out = [&](const ModelState& state, const std::vector<int>& with) {
+    return leave_one_out(engine, campaign, whitening, state, with).states;
+  };
+  const std::vector<ModelState> before = left_out(nominal.state, {});
+  const std::vector<ModelState> after = slots.empty() ? before : left_out(extended, slots);
+  Gain out = judge(engine.campaign(), before, after);
   if (!slots.empty()) out.density = sum_over_experiments(engine.left_out_gains());
   return out;
 }

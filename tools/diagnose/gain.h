@@ -57,7 +57,6 @@ struct LeftOut {
   std::vector<double> spread;      // per slot asked for: jackknife one sigma of its size
 };
 LeftOut leave_one_out(const Engine& engine, const ModelState& state, const std::vector<int>& slots);
-LeftOut leave_one_out(const Engine& engine, const Nominal& nominal);
 
 // Every experiment predicted by a machine (nominal, and with the effects) that was fitted to the
 // others.

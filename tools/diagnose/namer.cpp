@@ -250,7 +250,7 @@ void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& s
           return score.slot == better->slot && score.in_curve > kInCurveMax;
         });
     // What does better is no other thing than a friction curve that runs otherwise.
-    if (in_curve && naming.nominal_is_possible) {
+    if (in_curve && Engine::curve_is_possible(naming.sharp.state)) {
       naming.not_confirmed.push_back(better->instead_of);
       drop(engine, naming, better->instead_of);
     } else {
@@ -302,14 +302,15 @@ void drop_unconfirmed(Engine& engine, Naming& naming) {
     if (judged.empty()) return;
     const auto [density, slot] = *std::min_element(judged.begin(), judged.end());
     const Hypothesis whole = engine.refine(set, 3);
-    const Gain gain = left_out_gain(engine, naming.nominal, whole.state, set);
+    const Gain gain = left_out_gain(engine, naming.sharp, whole.state, set);
     // A nominal curve that no friction has predicts as well as it was bent to; that it need not be
     // bent any more counts as much.
-    const bool straightened = !naming.nominal_is_possible && Engine::curve_is_possible(whole.state);
+    const bool straightened =
+        !Engine::curve_is_possible(naming.sharp.state) && Engine::curve_is_possible(whole.state);
     // What shows in one or two experiments only is not beyond the chance of drawing them.
     const bool helps = gain.better() || straightened || density > kLeftOutPlain;
     if (density > kLeftOutMin && helps &&
-        !gain.worse(noise_floors(engine.campaign(), naming.nominal.state))) {
+        !gain.worse(noise_floors(engine.campaign(), naming.sharp.state))) {
       return;
     }
     naming.not_confirmed.push_back(slot);
@@ -469,8 +470,8 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
     engine.accept(engine.refine({}, kSettling));
     engine.update_noise();
   }
+  out.sharp = {engine.state(), engine.campaign().noise, true};
   out.nominal = engine.nominal_from(engine.state());
-  out.nominal_is_possible = Engine::curve_is_possible(engine.state());
   out.nominal_groups = score_groups(engine);
   double first_gain = 0.0;
   // What left-out experiments do not confirm may have stood before what they would.

@@ -49,8 +49,8 @@ struct Naming {
   // Effects that were found, but do not help to predict experiments left out of the fit.
   std::vector<int> not_confirmed;
   Nominal nominal;  // the machine without any effect
-  // The friction curve that fits the sharp data best without an effect is one of friction.
-  bool nominal_is_possible = true;
+  // The same by the noise of the sensors alone, which decides what an effect is worth.
+  Nominal sharp;
   std::vector<UnknownGroup> nominal_groups;  // dependences of its residual
 };
 
