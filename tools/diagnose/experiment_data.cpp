@@ -220,6 +220,7 @@ void trim(ExperimentData& data) {
 // keeping.
 void mask_and_segment(const std::vector<bool>& masked, ExperimentData& data) {
   constexpr int kShortest = 4;
+  constexpr int kLong = 20, kBeside = 2;
   const int n = data.size();
   const auto is_kept = [&](int k) {
     const auto i = static_cast<std::size_t>(k);
@@ -233,9 +234,14 @@ void mask_and_segment(const std::vector<bool>& masked, ExperimentData& data) {
       ++end;
     }
     if (end - k >= kShortest) {
-      data.start_of_segment.push_back(k);
-      data.valid_count += end - k;
-      for (int i = k; i < end; ++i) kept[static_cast<std::size_t>(i)] = true;
+      // What a delay moves into the stretch is the step: where there is enough of it.
+      const bool is_long = end - k >= kLong;
+      const bool after = is_long && k > 0 && masked[static_cast<std::size_t>(k) - 1];
+      const bool before = is_long && end < n && masked[static_cast<std::size_t>(end)];
+      const int first = after ? k + kBeside : k, last = before ? end - kBeside : end;
+      data.start_of_segment.push_back(first);
+      data.valid_count += last - first;
+      for (int i = first; i < last; ++i) kept[static_cast<std::size_t>(i)] = true;
     }
     k = std::max(end, k + 1);
   }
@@ -248,6 +254,8 @@ void add_slow(GridSignal& signal, double dt_s) {
   const LocalFit fit = local_fit(signal.value, signal.slope, dt_s, kSlowSigma_s);
   signal.slow = fit.value;
   signal.slow_slope = fit.slope;
+  signal.sharp = fit.value;
+  signal.sharp_slope = fit.slope;
 }
 
 namespace {
@@ -280,16 +288,17 @@ LocalFit widest_fit(const GridSignal& signal, double dt_s, const LocalFit& narro
 
 void widen_slow(GridSignal& signal, double dt_s) {
   constexpr std::array kWidths_s{kSlowSigma_s, 0.5, 1.0, 2.0};
-  signal.sharp = signal.value;
   const double sigma = sigma_of_samples(signal.value);
   if (sigma == 0.0) return;
   const LocalFit slow =
       widest_fit(signal, dt_s, {signal.slow, signal.slow_slope}, spread(sigma, kSlowSigma_s, dt_s),
                  sigma, std::span(kWidths_s).subspan(1));
-  signal.sharp =
-      widest_fit(signal, dt_s, {signal.value, signal.slope}, sigma, sigma, kWidths_s).value;
+  const LocalFit sharp =
+      widest_fit(signal, dt_s, {signal.value, signal.slope}, sigma, sigma, kWidths_s);
   signal.slow = slow.value;
   signal.slow_slope = slow.slope;
+  signal.sharp = sharp.value;
+  signal.sharp_slope = sharp.slope;
 }
 
 namespace {
@@ -306,14 +315,14 @@ Place shifted_place(Eigen::Index k, double by, Eigen::Index n) {
 }  // namespace
 
 ArrayXd shifted(const GridSignal& signal, double dt_s, double shift_s) {
-  const ArrayXd& x = signal.slow;
+  const ArrayXd& x = signal.sharp;
   const auto n = x.size();
   ArrayXd out(n);
   for (Eigen::Index k = 0; k < n; ++k) {
     const auto [i, u] = shifted_place(k, shift_s / dt_s, n);
     // Hermite: values and slopes of the fit at both ends.
     const double a = x[i], b = x[i + 1];
-    const double da = signal.slow_slope[i] * dt_s, db = signal.slow_slope[i + 1] * dt_s;
+    const double da = signal.sharp_slope[i] * dt_s, db = signal.sharp_slope[i + 1] * dt_s;
     const double v = 1.0 - u;
     const double y =
         v * v * (1.0 + 2.0 * u) * a + u * u * (1.0 + 2.0 * v) * b + u * v * (v * da - u * db);

@@ -19,11 +19,12 @@ inline constexpr int kStops = 2;
 // A channel on the grid; NaN where the channel has no data.
 struct GridSignal {
   Eigen::ArrayXd value;
-  Eigen::ArrayXd slope;       // per second, of the same fit
-  Eigen::ArrayXd slow;        // smoother copy: what a shift, lag or play changes is taken from it,
-  Eigen::ArrayXd slow_slope;  // else such an effect would win by averaging the channel's noise
-  Eigen::ArrayXd sharp;       // the pressure's: without noise, yet where it turns not rounded
-  double period_s = 0.0;      // median time between the channel's samples
+  Eigen::ArrayXd slope;        // per second, of the same fit
+  Eigen::ArrayXd slow;         // smoother copy: what a shift, lag or play changes is taken from it,
+  Eigen::ArrayXd slow_slope;   // else such an effect would win by averaging the channel's noise
+  Eigen::ArrayXd sharp;        // what a shift, lag or play is computed from: the slow copy; of the
+  Eigen::ArrayXd sharp_slope;  // pressure one that is not rounded where it turns or steps
+  double period_s = 0.0;       // median time between the channel's samples
   bool present = false;
 };
 
@@ -55,7 +56,7 @@ void add_slow(GridSignal& signal, double dt_s);
 // same from the samples on.
 void widen_slow(GridSignal& signal, double dt_s);
 
-// slow(t + shift), cubic; held at the ends. Seconds. slow_slope, linear.
+// sharp(t + shift), cubic; held at the ends. Seconds. slow_slope, linear.
 Eigen::ArrayXd shifted(const GridSignal& signal, double dt_s, double shift_s);
 Eigen::ArrayXd shifted_slope(const GridSignal& signal, double dt_s, double shift_s);
 

@@ -53,15 +53,15 @@ ArrayXd play_change(const ArrayXd& in, double half_width, double first) {
 
 void apply_hydraulic_lag(Context& c, const Slot& slot, double time_constant_s) {
   if (slot.role == "command") {
-    c.track += lag_change(c.run.command.slow, c.run.dt_s, time_constant_s);
+    c.track += lag_change(c.run.command.sharp, c.run.dt_s, time_constant_s);
   } else {
-    c.pressure += lag_change(c.run.pressure.slow, c.run.dt_s, time_constant_s);
+    c.pressure += lag_change(c.run.pressure.sharp, c.run.dt_s, time_constant_s);
   }
 }
 
 void apply_hydraulic_delay(Context& c, const Slot& slot, double delay_s) {
   const GridSignal& input = slot.role == "command" ? c.run.command : c.run.pressure;
-  const ArrayXd change = shifted(input, c.run.dt_s, -delay_s) - input.slow;
+  const ArrayXd change = shifted(input, c.run.dt_s, -delay_s) - input.sharp;
   (slot.role == "command" ? c.track : c.pressure) += change;
 }
 

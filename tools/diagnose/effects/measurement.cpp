@@ -4,7 +4,7 @@ namespace beltgrip::diagnose {
 
 namespace {
 Eigen::ArrayXd shift_change(const GridSignal& signal, double dt_s, double shift_s) {
-  return shifted(signal, dt_s, shift_s) - signal.slow;
+  return shifted(signal, dt_s, shift_s) - signal.sharp;
 }
 }  // namespace
 
