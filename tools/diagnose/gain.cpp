@@ -16,6 +16,7 @@ using Eigen::VectorXd;
 
 constexpr int kDraws = 2000;
 constexpr double kBelow = 0.7, kAbout = 0.5;  // slip over slip at the peak
+constexpr double kAlone = 25.0;   // times the variance of a size, without one experiment
 constexpr double kStepMax = 0.5;  // in tolerances: what one experiment may move the fit by
 
 double rms(const SignalErrors::Sum& sum) {
@@ -208,9 +209,13 @@ LeftOut leave_one_out(const Engine& engine, const Campaign& campaign, const Whit
   for (const Summary& each : summaries) {
     if (each.samples > 0) used.push_back(each);
   }
-  const Scatter scatter = fit_linear(used, columns, prior, default_scatter(), 10).scatter;
+  const Fit all = fit_linear(used, columns, prior, default_scatter(), 10);
+  const Scatter& scatter = all.scatter;
   LeftOut out;
-  std::vector<VectorXd> sizes;  // of the slots, scaled
+  struct Without {
+    VectorXd size, variance;  // of the slots, scaled
+  };
+  std::vector<Without> sizes;
   for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
     std::vector<Summary> others;
     for (std::size_t i = 0; i < summaries.size(); ++i) {
@@ -218,19 +223,29 @@ LeftOut leave_one_out(const Engine& engine, const Campaign& campaign, const Whit
     }
     ModelState without = state;
     if (!others.empty()) {
-      const VectorXd step = fit_linear(others, columns, prior, scatter, 0).step;
-      if (summaries[e].samples > 0) sizes.push_back(step.tail(static_cast<Index>(slots.size())));
+      const Fit fit = fit_linear(others, columns, prior, scatter, 0);
+      const VectorXd& step = fit.step;
+      const auto count = static_cast<Index>(slots.size());
+      if (summaries[e].samples > 0) {
+        sizes.push_back({step.tail(count), fit.covariance.diagonal().tail(count)});
+      }
       const double largest = step.cwiseAbs().maxCoeff();
       engine.move(parameters, step, std::min(1.0, kStepMax / std::max(largest, 1e-12)), without);
     }
     out.states.push_back(std::move(without));
   }
-  const auto n = static_cast<double>(sizes.size());
   for (std::size_t i = 0; i < slots.size(); ++i) {
     const auto j = static_cast<Index>(i);
+    const double variance = all.covariance.diagonal().tail(static_cast<Index>(slots.size()))[j];
+    // Without the one experiment that shows it, nothing is left that could agree or not.
+    std::vector<double> seen;
+    for (const Without& each : sizes) {
+      if (each.variance[j] < kAlone * variance) seen.push_back(each.size[j]);
+    }
+    const auto n = static_cast<double>(seen.size());
     double mean = 0.0, squares = 0.0;
-    for (const VectorXd& each : sizes) mean += each[j] / n;
-    for (const VectorXd& each : sizes) squares += (each[j] - mean) * (each[j] - mean);
+    for (const double each : seen) mean += each / n;
+    for (const double each : seen) squares += (each - mean) * (each - mean);
     out.spread.push_back(n > 1.0 ? std::sqrt((n - 1.0) / n * squares) *
                                        engine.scale(kNuisanceCount + slots[i])
                                  : 0.0);

@@ -35,6 +35,8 @@ constexpr double kClassOdds = 20.0;  // worse by more: told apart
 // A further cause must matter beside those found: below this share of their evidence it is the
 // difference between the found effect's equation and the machine.
 constexpr double kShareOfFirst = 0.02;
+// Of the gain: a name that explains as much is no such difference, be the first as large as it may.
+constexpr double kOwnGain = 100.0, kOwnShare = 5e-4;
 constexpr double kHeld = 0.5;
 constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
 constexpr double kDisagreement = 0.05;   // p of a size that experiments do not agree on
@@ -318,6 +320,16 @@ void drop_unconfirmed(Engine& engine, Naming& naming) {
   }
 }
 
+double worth_beside(double first_gain) {
+  return std::min(kShareOfFirst * first_gain, kOwnGain + kOwnShare * first_gain);
+}
+
+// Experiments that differ by more than those of one machine: something in them is not yet told.
+bool scattered(const Scatter& scatter) {
+  constexpr double kUnusual = 3.0;  // times the usual sigma
+  return (scatter.variance / default_scatter().variance > kUnusual * kUnusual).any();
+}
+
 // Adds to the accepted effects as long as any is there. first_gain: the largest so far.
 void add_effects(Engine& engine, Naming& out, double& first_gain, const std::function<bool()>& stop,
                  int jobs) {
@@ -331,8 +343,10 @@ void add_effects(Engine& engine, Naming& out, double& first_gain, const std::fun
     // So far from the data, or with a curve that no friction has, the linear says little of where
     // an effect would lead.
     const bool possible = Engine::curve_is_possible(engine.state());
-    const bool far = !possible || std::any_of(scores.begin(), scores.end(),
-                                              [](const Score& score) { return score.gain > kFar; });
+    // The same where experiments differ by more than replicates do.
+    const bool far = !possible || (!set.empty() && scattered(base.fit.scatter)) ||
+                     std::any_of(scores.begin(), scores.end(),
+                                 [](const Score& score) { return score.gain > kFar; });
     Hypothesis best;
     bool found = false;
     // From the linear estimate, and where that leaves the range of the linear, from the present.
@@ -352,7 +366,7 @@ void add_effects(Engine& engine, Naming& out, double& first_gain, const std::fun
       }
       if (!credible(engine, h)) return;
       if (parts_experiments(base.fit.scatter, h.fit.scatter)) return;
-      if (gain < out.threshold || (first_gain > 0.0 && gain < kShareOfFirst * first_gain)) return;
+      if (gain < std::max(out.threshold, worth_beside(first_gain))) return;
       if (!found || h.log_evidence > best.log_evidence) {
         best = std::move(h);
         found = true;
@@ -366,7 +380,14 @@ void add_effects(Engine& engine, Naming& out, double& first_gain, const std::fun
         if (!stop()) fits[i] = fitted(plus(set, candidates[i]), from_afar && i < kFromAfar);
       });
       for (std::optional<Hypothesis>& fit : fits) {
-        if (fit) consider(std::move(*fit));
+        if (!fit) continue;
+        // What the new one makes superfluous goes out.
+        std::vector<int> left;
+        for (std::size_t j = 0; j < fit->slots.size(); ++j) {
+          if (fit->chi2[j] > out.threshold) left.push_back(fit->slots[j]);
+        }
+        const bool swaps = fit->chi2.back() > out.threshold && left.size() < fit->slots.size();
+        consider(swaps ? engine.refine_from(fit->state, left, kSettling) : std::move(*fit));
       }
     };
     consider_all(far);
@@ -391,7 +412,7 @@ void add_effects(Engine& engine, Naming& out, double& first_gain, const std::fun
       std::sort(pairs.rbegin(), pairs.rend());
       const double single = 2.0 * (best.log_likelihood - base.log_likelihood);
       for (std::size_t i = 0; i < pairs.size() && i < 3 && !stop(); ++i) {
-        if (pairs[i].first < single + out.threshold + kShareOfFirst * single) break;
+        if (pairs[i].first < single + out.threshold + worth_beside(single)) break;
         consider(fitted(pairs[i].second, false));
       }
     }
