@@ -368,6 +368,64 @@ TEST_F(Diagnose, FrictionThatNoBeltHasAndTorquesThatFightAreSaidAndNotNamed) {
   EXPECT_NE(notes(torque).find("opposite sign"), std::string::npos) << notes(torque);
 }
 
+// One torque in another unit, turned round or standing still; friction that is far too low.
+TEST_F(Diagnose, WhatNoVariatorDoesIsSaidAndNotNamed) {
+  const auto tables = record(rig(4)).csv;
+  const auto with = [&](std::size_t from, std::size_t column, const auto& value) {
+    std::vector<std::string> out = tables;
+    for (std::size_t i = from; i < out.size(); ++i) {
+      out[i] = changed(out[i], [&](auto& cells) {
+        cells[column] = std::to_string(value(number(cells[column])));
+        return true;
+      });
+    }
+    return of(out);
+  };
+  const auto expect = [](const json& result, const char* note) {
+    EXPECT_EQ(result.at("verdict"), "unexplained") << result.dump(1);
+    EXPECT_EQ(result.at("findings").size(), 0U) << result.dump(1);
+    EXPECT_NE(notes(result).find(note), std::string::npos) << notes(result);
+  };
+  constexpr std::size_t kPressure = 3, kTorqueIn = 4, kTorqueOut = 5;
+  expect(with(0, kTorqueOut, [](double v) { return 1e-3 * v; }), "unit or scale of a torque");
+  expect(with(3, kTorqueOut, [](double v) { return -v; }), "run4.csv: primary and secondary");
+  expect(with(0, kTorqueIn, [](double) { return 50.0; }), "stands still");
+  expect(with(0, kPressure, [](double v) { return 10.0 * v; }), "far beyond the slip of belts");
+}
+
+// The others tell what they do all the same.
+TEST_F(Diagnose, AChannelThatSomeExperimentsLackHidesNothing) {
+  auto recording = record(rig(8, {{"torque_loss", {{"per_kN_Nm", 0.9}}, ""}}));
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::string& table = recording.csv[i];
+    table.replace(table.find("oil_temperature["), 15, "unused_channelX");
+  }
+  const json result = of(recording.csv);
+  ASSERT_EQ(result.at("findings").size(), 1U) << result.dump(1);
+  EXPECT_EQ(result.at("findings")[0].at("effect"), "torque_loss");
+  EXPECT_NE(notes(result).find("no oil_temperature"), std::string::npos) << notes(result);
+}
+
+// Written anew with fewer digits and another time: still no replicate.
+TEST_F(Diagnose, ACopyWithOtherDigitsIsNoReplicate) {
+  const auto table = record(rig(1)).csv[0];
+  const auto copy = changed(table, [](auto& cells) {
+    cells[0] = std::to_string(number(cells[0]) + 100.0);
+    for (const std::size_t column : {3U, 4U}) {
+      cells[column] = std::to_string(number(cells[column]) * (1.0 + 1e-7));
+    }
+    return true;
+  });
+  EXPECT_EQ(of({table, copy, table}).at("experiments"), 1);
+}
+
+TEST_F(Diagnose, WithTwoExperimentsALargeEffectIsSaidAndNotNamed) {
+  const json result = of(record(rig(2, {{"torque_loss", {{"per_kN_Nm", 0.9}}, ""}})).csv);
+  EXPECT_EQ(result.at("findings").size(), 0U) << result.dump(1);
+  EXPECT_NE(result.at("verdict"), "nothing_wrong");
+  EXPECT_NE(notes(result).find("fewer than three experiments"), std::string::npos);
+}
+
 TEST_F(Diagnose, OneExperimentNamesNothingAndAsksForRepeats) {
   const json result = of({record(rig(1)).csv[0]});
   expect_silence(result);

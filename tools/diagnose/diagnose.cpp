@@ -10,6 +10,7 @@
 #include "tools/diagnose/gain.h"
 #include "tools/diagnose/namer.h"
 #include "tools/diagnose/parallel.h"
+#include "tools/diagnose/plausibility.h"
 #include "tools/diagnose/residual_tests.h"
 
 namespace beltgrip::diagnose {
@@ -17,10 +18,6 @@ namespace {
 
 constexpr int kSamplesMin = 100;            // 10 s of usable data
 constexpr std::size_t kExperimentsMin = 3;  // from where on their scatter is known
-constexpr double kSameRatio = 1.03;         // of two experiments at one end stop, most
-constexpr double kSoftestPerkN = 0.01;      // deformation of pulleys per clamp force, most
-constexpr double kMuMost = 0.4;             // friction of any belt, and more
-constexpr double kPressureMost_Pa = 200e5;  // three times what variators have
 constexpr double kDetectable = 5.0;         // sigmas: found with 90 % and more
 constexpr double kRealistic = 3.0;          // in usual sizes: an effect is hardly ever larger
 
@@ -39,13 +36,6 @@ std::string text_of(double value) {
   return buffer;
 }
 
-bool same_data(const SignalTable& a, const SignalTable& b) {
-  return std::equal(a.channels.begin(), a.channels.end(), b.channels.begin(),
-                    [](const Channel& one, const Channel& other) {
-                      return one.t_s == other.t_s && one.value == other.value;
-                    });
-}
-
 class Run {
  public:
   explicit Run(Request request) : request_(std::move(request)) {}
@@ -53,7 +43,7 @@ class Run {
   Answer run() {
     answer_.extended = request_.model;
     std::vector<ExperimentData> runs;
-    drop_copies();
+    drop_copies(request_.experiments, doubts_);
     runs.resize(request_.experiments.size());
     in_parallel(request_.jobs, runs.size(), [&](std::size_t i) {
       runs[i] = prepare(request_.experiments[i], request_.model.variator);
@@ -66,15 +56,17 @@ class Run {
         out().notes.push_back(run.name + ": " + why_unusable(run));
       }
     }
-    check_same_machine(runs);
-    check_torques(runs);
+    drop_uneven_channels(runs, doubts_);
+    check_same_machine(runs, request_.model.variator, doubts_);
+    check_torques(runs, doubts_);
     if (out().samples < kSamplesMin) {
       out().notes.push_back("too little data: " + text_of(0.1 * out().samples) +
                             " s usable, at least 10 s are needed; nothing can be said");
       nothing_identifiable("too little data");
+      tell_doubts();
       return std::move(answer_);
     }
-    check_friction(runs);
+    check_friction(runs, request_.model.variator, doubts_);
     progress(0.1, "fit");
     Engine engine(make_campaign(std::move(runs), request_.model));
     Naming naming = name_effects(engine, stop(), request_.jobs);
@@ -116,6 +108,10 @@ class Run {
     return "not used: never 1.6 s without gaps, shifts, saturation or run-away at an end stop";
   }
 
+  void tell_doubts() {
+    out().notes.insert(out().notes.end(), doubts_.notes.begin(), doubts_.notes.end());
+  }
+
   void nothing_identifiable(const std::string& reason) {
     std::string last;
     for (const EffectRow& row : effect_rows()) {
@@ -123,112 +119,6 @@ class Run {
       last = row.id;
       out().not_identifiable.push_back({std::string(row.id), {}, reason});
     }
-  }
-
-  // Two machines cannot be one model: end-stop ratios that differ by more than any belt slips.
-  // Looked at where the clamp force is highest, and drive and overrun each for itself: a belt slips
-  // one way or the other by a percent even there.
-  void check_same_machine(const std::vector<ExperimentData>& runs) {
-    for (const int stop : {kOverdriveStop, kLowStop}) {
-      for (const double direction : {1.0, -1.0}) check_same_ratio(runs, stop, direction);
-    }
-  }
-
-  void check_same_ratio(const std::vector<ExperimentData>& runs, int stop, double direction) {
-    struct Seen {
-      double ratio = 0.0, force_kN = 0.0;
-      const ExperimentData* run = nullptr;
-    };
-    std::vector<Seen> seen;
-    for (const ExperimentData& run : runs) {
-      double highest_Pa = -std::numeric_limits<double>::infinity();
-      Seen here;
-      for (int k = 0; k < run.size(); ++k) {
-        if (!run.valid[static_cast<std::size_t>(k)] ||
-            run.stop[static_cast<std::size_t>(k)] != stop ||
-            run.torque.value[k] * direction < 0.0 || run.pressure.value[k] < highest_Pa) {
-          continue;
-        }
-        highest_Pa = run.pressure.value[k];
-        here = {run.omega_s.value[k] / run.omega_p.value[k],
-                1e-3 * estimator::secondary_clamp_force_N(request_.model.variator, highest_Pa,
-                                                          run.omega_s.value[k]),
-                &run};
-      }
-      if (here.run != nullptr) seen.push_back(here);
-    }
-    for (const Seen& a : seen) {
-      for (const Seen& b : seen) {
-        const double softness = kSoftestPerkN * std::max(0.0, a.force_kN - b.force_kN);
-        if (b.ratio <= a.ratio * (kSameRatio + softness)) continue;
-        out().notes.push_back(a.run->name + " and " + b.run->name + ": end-stop ratios " +
-                              text_of(a.ratio) + " and " + text_of(b.ratio) +
-                              " cannot be of one machine");
-        impossible_ = Unexplained{"ratio", {"experiment"}, 1.0};
-        return;
-      }
-    }
-  }
-
-  // The same data under two names would count as two experiments that agree in everything.
-  void drop_copies() {
-    std::vector<SignalTable>& tables = request_.experiments;
-    for (std::size_t i = 0; i < tables.size(); ++i) {
-      for (std::size_t j = i + 1; j < tables.size();) {
-        if (!same_data(tables[i], tables[j])) {
-          ++j;
-          continue;
-        }
-        out().notes.push_back(tables[j].name + ": the same data as " + tables[i].name +
-                              "; counted once");
-        tables.erase(tables.begin() + static_cast<std::ptrdiff_t>(j));
-      }
-    }
-  }
-
-  // What goes in at one shaft comes out at the other.
-  void check_torques(const std::vector<ExperimentData>& runs) {
-    double same = 0.0, opposite = 0.0;
-    for (const ExperimentData& run : runs) {
-      if (!run.torque_s.present) continue;
-      for (int k = 0; k < run.size(); ++k) {
-        if (!run.valid[static_cast<std::size_t>(k)]) continue;
-        const double product = run.torque.value[k] * run.torque_s.value[k];
-        (product < 0.0 ? opposite : same) += std::abs(product);
-      }
-    }
-    if (!(opposite > same)) return;
-    out().notes.emplace_back(
-        "primary and secondary torque are of opposite sign: that of one is wrong");
-    impossible_ = Unexplained{"torque", {"secondary_torque"}, 1.0};
-  }
-
-  // By what was measured alone: the fitted mu_max may lie far beyond what the data reached.
-  void check_friction(const std::vector<ExperimentData>& runs) {
-    const estimator::VariatorParameters& variator = request_.model.variator;
-    std::vector<double> mu;
-    double highest_Pa = 0.0;
-    for (const ExperimentData& run : runs) {
-      for (int k = 0; k < run.size(); ++k) {
-        if (!run.valid[static_cast<std::size_t>(k)]) continue;
-        const bool low = run.stop[static_cast<std::size_t>(k)] == kLowStop;
-        const double radius_m =
-            low ? variator.primary_radius_low_m : variator.primary_radius_overdrive_m;
-        const double force_N = estimator::secondary_clamp_force_N(variator, run.pressure.value[k],
-                                                                  run.omega_s.value[k]);
-        mu.push_back(std::abs(run.torque.value[k]) * std::cos(variator.half_wedge_angle_rad) /
-                     (2.0 * radius_m * std::max(force_N, 1.0)));
-        highest_Pa = std::max(highest_Pa, run.pressure.value[k]);
-      }
-    }
-    const auto top = mu.begin() + static_cast<std::ptrdiff_t>(mu.size() * 99 / 100);
-    std::nth_element(mu.begin(), top, mu.end());
-    if (*top < kMuMost && highest_Pa < kPressureMost_Pa) return;
-    out().notes.push_back("friction comes to " + text_of(*top) + " and the pressure to " +
-                          text_of(highest_Pa / 1e5) +
-                          " bar, which no belt drive has: unit or scale of the pressure or the "
-                          "torque, or secondary_piston_area_m2 of [variator]?");
-    impossible_ = Unexplained{"friction", {"secondary_pressure", "torque"}, 1.0};
   }
 
   void fill(Engine& engine, const Naming& naming) {
@@ -239,16 +129,21 @@ class Run {
       out().notes.emplace_back("stopped before the end: what is not named here may be there");
     }
     fill_machine(engine, naming);
+    check_fitted_friction(out().machine, doubts_);
+    tell_doubts();
     fill_baseline(engine, naming);
     out().simulation = simulated_signals(campaign, naming.nominal.state);
     fill_not_identifiable(engine, naming);
-    if (impossible_) {
+    if (doubts_.impossible) {
       nothing_identifiable("the data cannot be of one belt as configured");
       out().verdict = Verdict::kUnexplained;
-      out().unexplained = impossible_;
+      out().unexplained = doubts_.impossible;
       return;
     }
-    if (campaign.runs.size() < kExperimentsMin) {
+    const auto used = static_cast<std::size_t>(
+        std::count_if(campaign.runs.begin(), campaign.runs.end(),
+                      [](const ExperimentData& run) { return run.valid_count > 0; }));
+    if (used < kExperimentsMin) {
       out().notes.push_back(
           "fewer than three experiments: how they scatter is not known, and what "
           "changes from one to the next (wear, temperature) cannot be seen");
@@ -285,21 +180,30 @@ class Run {
       out().notes.push_back(
           "what was found does not help to predict the held-out experiments; not named");
     }
+    const bool unconfirmed =
+        used < kExperimentsMin && request_.held_out.empty() && !naming.accepted.empty();
+    for (const Accepted& each : naming.accepted) {
+      if (!unconfirmed) break;
+      out().notes.push_back(campaign.slots[static_cast<std::size_t>(each.slot)].label() +
+                            ": fits, but nothing confirms it with fewer than three experiments; "
+                            "not named");
+    }
+    const bool named = !refuted && !unconfirmed;
     out().held_out = gain.signals;
     out().mu_max = gain.mu_max;
     for (const auto& [name, errors] : gain.forward) out().simulation[name].left_out = errors;
-    fill_findings(engine, refuted ? std::vector<Accepted>() : naming.accepted, naming, gain);
+    fill_findings(engine, named ? naming.accepted : std::vector<Accepted>(), naming, gain);
     if (naming.unknown) {
       out().unexplained =
           Unexplained{naming.unknown->acts_on, {naming.unknown->depends_on}, naming.unknown->share};
     }
-    out().verdict = naming.unknown            ? Verdict::kUnexplained
-                    : !out().findings.empty() ? Verdict::kExplained
-                    : out().complete          ? Verdict::kNothingWrong
-                                              : Verdict::kNone;
+    out().verdict = naming.unknown                   ? Verdict::kUnexplained
+                    : !out().findings.empty()        ? Verdict::kExplained
+                    : out().complete && !unconfirmed ? Verdict::kNothingWrong
+                                                     : Verdict::kNone;
     propose(engine, naming);
     answer_.extended = request_.model;
-    const ModelState& stored = refuted ? naming.nominal.state : extended;
+    const ModelState& stored = !named ? naming.nominal.state : extended;
     store_machine(stored.nuisance, answer_.extended);
     for (const Ripple& ripple : naming.ripples) {
       if (ripple.found) {
@@ -493,7 +397,7 @@ class Run {
 
   Request request_;
   Answer answer_;
-  std::optional<Unexplained> impossible_;  // no belt does this
+  Doubts doubts_;
 };
 
 }  // namespace
