@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 
 #include "tests/diagnose/generator.h"
@@ -430,6 +431,9 @@ TEST_F(Diagnose, OneExperimentNamesNothingAndAsksForRepeats) {
   const json result = of({record(rig(1)).csv[0]});
   expect_silence(result);
   EXPECT_NE(result.at("next_experiment").dump().find("repeat"), std::string::npos);
+  std::set<std::string> effects;  // each once
+  for (const json& each : result.at("not_identifiable")) effects.insert(each.at("effect"));
+  EXPECT_EQ(effects.size(), result.at("not_identifiable").size());
 }
 
 TEST_F(Diagnose, ConstantSignalsNameNothing) {

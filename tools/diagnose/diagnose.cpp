@@ -353,7 +353,9 @@ class Run {
     };
     for (const EffectRow& row : effect_rows()) {
       const std::string id(row.id);
-      if (visible.contains(id) || named(id) || row.apply == nullptr) continue;
+      const std::vector<NotIdentifiable>& told = out().not_identifiable;
+      const bool again = !told.empty() && told.back().effect == id;  // another parameter of it
+      if (visible.contains(id) || named(id) || again || row.apply == nullptr) continue;
       out().not_identifiable.push_back({id, {}, "no signal in these data shows it"});
     }
     for (const auto& [id, seen] : visible) {
