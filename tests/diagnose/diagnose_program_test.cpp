@@ -115,6 +115,7 @@ TEST_F(Diagnose, NamesTheCauseWritesTheModelAndIsContentWithIt) {
   EXPECT_LT(size.at("ci95")[0].get<double>(), 0.62);
   EXPECT_GT(size.at("ci95")[1].get<double>(), 0.58);
   EXPECT_GT(finding.at("probability").get<double>(), 0.9);
+  EXPECT_EQ(finding.at("stability"), 1.0);  // whichever experiment is left out
   for (const char* key : {"aliases", "separate_by", "gain"}) EXPECT_TRUE(finding.contains(key));
   for (const char* key :
        {"baseline", "unexplained", "not_identifiable", "held_out", "next_experiment"}) {

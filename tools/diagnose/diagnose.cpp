@@ -286,6 +286,7 @@ class Run {
       Finding& finding = found == out().findings.end() ? out().findings.emplace_back() : *found;
       finding.effect = slot.row->id;
       finding.probability = std::max(finding.probability, each.probability);
+      finding.stability = std::min(finding.stability.value_or(1.0), each.stability);
       finding.separate_by = slot.row->separating;
       finding.equation = slot.row->equation;
       finding.acts_on = slot.row->acts_on;

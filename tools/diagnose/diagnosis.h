@@ -24,6 +24,8 @@ struct Finding {
   std::map<std::string, double> fixed;  // what is counted, not estimated: wear's "at"
   std::string role;                     // channel_skew
   double probability = 0.0;
+  // Share of the fits without one experiment in which it is there with 95 %; where fitted at all.
+  std::optional<double> stability;
   std::vector<std::string> aliases;
   std::string separate_by;
   std::map<std::string, BeforeAfter> gain;

@@ -249,6 +249,12 @@ LeftOut leave_one_out(const Engine& engine, const Campaign& campaign, const Whit
     out.spread.push_back(n > 1.0 ? std::sqrt((n - 1.0) / n * squares) *
                                        engine.scale(kNuisanceCount + slots[i])
                                  : 0.0);
+    const double size = state.effects[slots[i]] / engine.scale(kNuisanceCount + slots[i]);
+    const auto there = std::count_if(sizes.begin(), sizes.end(), [&](const Without& each) {
+      return (size + each.size[j]) * std::copysign(1.0, size) > 1.96 * std::sqrt(each.variance[j]);
+    });
+    out.stability.push_back(static_cast<double>(there) /
+                            std::max(1.0, static_cast<double>(sizes.size())));
   }
   return out;
 }

@@ -55,6 +55,7 @@ struct Gain {
 struct LeftOut {
   std::vector<ModelState> states;  // per experiment left out
   std::vector<double> spread;      // per slot asked for: jackknife one sigma of its size
+  std::vector<double> stability;   // the same: share of the fits in which it is there, 95 %
 };
 LeftOut leave_one_out(const Engine& engine, const ModelState& state, const std::vector<int>& slots);
 

@@ -49,6 +49,10 @@ std::string name_of(const Finding& finding) {
 std::string sentence(const Finding& finding) {
   std::string out = name_of(finding) + ": " + finding.equation + ", " + sizes(finding) +
                     "; probability " + probability(finding.probability) + ".";
+  if (finding.stability) {
+    out += " There in " + number(100.0 * *finding.stability) +
+           " % of the fits without one experiment.";
+  }
   if (!finding.aliases.empty()) {
     out += " These data cannot tell it from " + joined(finding.aliases) + ".";
   }

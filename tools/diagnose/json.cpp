@@ -94,6 +94,7 @@ std::string json_text(const Diagnosis& d) {
     json.end_object();
     if (!finding.role.empty()) json.field("role", finding.role);
     json.field("probability", finding.probability);
+    if (finding.stability) json.field("stability", *finding.stability);
     json.key("aliases").begin_array();
     for (const std::string& alias : finding.aliases) json.value(alias);
     json.end_array();
@@ -204,6 +205,10 @@ std::string plain_text(const Diagnosis& d) {
     for (const auto& [name, value] : finding.fixed)
       out += "  " + name + " = " + number(value) + "\n";
     out += "  probability " + number(finding.probability) + "\n";
+    if (finding.stability) {
+      out += "  there in " + number(100.0 * *finding.stability) +
+             " % of the fits without one experiment\n";
+    }
     if (!finding.aliases.empty()) {
       out += "  these data cannot tell it from:";
       for (const std::string& alias : finding.aliases) out += " " + alias;

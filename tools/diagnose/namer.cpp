@@ -270,6 +270,7 @@ void find_intervals(const Engine& engine, Naming& naming) {
     const auto at = std::find(h.slots.begin(), h.slots.end(), each.slot) - h.slots.begin();
     each.sigma = all[static_cast<std::size_t>(at)].sigma;
     each.degrees = all[static_cast<std::size_t>(at)].degrees;
+    each.stability = all[static_cast<std::size_t>(at)].stability;
   }
 }
 

@@ -14,8 +14,9 @@ namespace beltgrip::diagnose {
 
 struct Accepted {
   int slot = 0;
-  double sigma = 0.0;    // one sigma of its size, the larger of what noise and experiments say
-  double degrees = 0.0;  // of freedom of that
+  double sigma = 0.0;      // one sigma of its size, the larger of what noise and experiments say
+  double degrees = 0.0;    // of freedom of that
+  double stability = 0.0;  // share of the fits without one experiment in which it is there, 95 %
   double chi2 = 0.0;
   double probability = 0.0;
   double ln_odds = 0.0;        // against its not being there, nor anything in its place

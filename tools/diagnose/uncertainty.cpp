@@ -39,7 +39,8 @@ std::vector<Uncertainty> uncertainties(const Engine& engine, const Hypothesis& h
     const double variance = sampled * sampled + equation * equation;
     // Satterthwaite: only what is sampled has few degrees of freedom.
     const double share = sampled * sampled / std::max(variance, 1e-300);
-    out.push_back({std::sqrt(variance), degrees / std::max(share * share, 1e-9)});
+    out.push_back(
+        {std::sqrt(variance), degrees / std::max(share * share, 1e-9), left_out.stability[i]});
   }
   return out;
 }

@@ -10,7 +10,8 @@ namespace beltgrip::diagnose {
 
 struct Uncertainty {
   double sigma = 0.0;
-  double degrees = 0.0;  // of freedom, of Student's t
+  double degrees = 0.0;    // of freedom, of Student's t
+  double stability = 0.0;  // share of the fits without one experiment in which it is there, 95 %
 };
 
 // Per slot of the hypothesis, in its order.
