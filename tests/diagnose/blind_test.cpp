@@ -71,6 +71,14 @@ TEST(Blind, NamesWhatIsThereOfAPair) {
   }
 }
 
+// A pressure that is early by 0.15 s is one that acts late: the same equation under two names.
+TEST(Blind, TwoNamesOfOneEquationAreOneClass) {
+  const nlohmann::json entry = run_trial(8'101'000'059U);
+  const nlohmann::json& first = entry.at("findings").at(0);
+  EXPECT_EQ(first.at("effect"), "hydraulic_lag");
+  EXPECT_EQ(first.at("aliases"), nlohmann::json::array({"channel_skew"}));
+}
+
 // What the oracle's ceiling, the table and the names rest on: the truth never reaches the tool.
 TEST(Blind, TheSameNumberIsTheSameTrial) {
   const Envelope a = draw_envelope(7), b = draw_envelope(7);

@@ -23,7 +23,8 @@ constexpr std::size_t kFromAfar = 5;  // of these, from afar
 constexpr double kPlain = 2.0;        // times the threshold: no chance
 constexpr double kFar = 1000.0;       // gain of a candidate: the machine alone is far from the data
 constexpr double kNearMax = 400.0;
-constexpr double kNear = 40.0;  // linear loss within which a refit may still reach the best
+constexpr std::size_t kNearest = 2;  // refitted however far: a shift is far from linear
+constexpr double kNear = 40.0;       // linear loss within which a refit may still reach the best
 constexpr int kEffectsMax = 3;
 constexpr int kStepsMax = 4;
 constexpr int kRounds = 3;
@@ -195,8 +196,9 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
     const Hypothesis without = refine_replacement(engine, engine.replace(others, out.slot), others);
     const double loss = std::max(0.0, whole.log_likelihood - without.log_likelihood) * 2.0;
     std::size_t near = 0;
-    while (near < ranked.size() && near < kRefined &&
-           -ranked[near].first.gain <= std::clamp(0.4 * loss, kNear, kNearMax)) {
+    while (
+        near < ranked.size() && near < kRefined &&
+        (near < kNearest || -ranked[near].first.gain <= std::clamp(0.4 * loss, kNear, kNearMax))) {
       ++near;
     }
     std::vector<std::optional<Hypothesis>> rivals(near);
