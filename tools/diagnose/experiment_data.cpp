@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 #include <span>
+#include <utility>
 
 namespace beltgrip::diagnose {
 namespace {
@@ -215,35 +216,42 @@ void trim(ExperimentData& data) {
   data.valid = kept;
 }
 
-// Takes out the samples where the pressure moves too fast. Next to them the signals are whole, as
-// they are not at the end of a stretch: nothing more goes, and between two steps a second is worth
+// Takes out the samples where the pressure moves too fast, and those beside them: a delay moves the
+// step there. Where the pressure moves in steps all along, next to which the signals are whole, as
+// they are not at the end of a stretch, nothing more goes: between two steps a second is worth
 // keeping.
 void mask_and_segment(const std::vector<bool>& masked, ExperimentData& data) {
-  constexpr int kShortest = 4;
-  constexpr int kLong = 20, kBeside = 2;
+  constexpr int kShortest = 4, kLong = 10, kBeside = 2;
   const int n = data.size();
-  const auto is_kept = [&](int k) {
-    const auto i = static_cast<std::size_t>(k);
-    return data.valid[i] && !masked[i];
+  const auto stretches = [&](int beside) {
+    const auto is_kept = [&](int k) {
+      const auto from = masked.begin() + std::max(0, k - beside);
+      const auto to = masked.begin() + std::min(n, k + beside + 1);
+      return data.valid[static_cast<std::size_t>(k)] && std::find(from, to, true) == to;
+    };
+    std::vector<std::pair<int, int>> out;
+    for (int k = 0; k < n;) {
+      int end = k;
+      while (end < n && is_kept(end) &&
+             data.stop[static_cast<std::size_t>(end)] == data.stop[static_cast<std::size_t>(k)]) {
+        ++end;
+      }
+      if (end - k >= kShortest) out.emplace_back(k, end);
+      k = std::max(end, k + 1);
+    }
+    return out;
   };
+  std::vector<std::pair<int, int>> found = stretches(0);
+  int in_long = 0, in_short = 0;
+  for (const auto& [begin, end] : found) {
+    (end - begin >= kLong ? in_long : in_short) += end - begin;
+  }
+  if (in_long > in_short) found = stretches(kBeside);
   std::vector<bool> kept(data.valid.size(), false);
-  for (int k = 0; k < n;) {
-    int end = k;
-    while (end < n && is_kept(end) &&
-           data.stop[static_cast<std::size_t>(end)] == data.stop[static_cast<std::size_t>(k)]) {
-      ++end;
-    }
-    if (end - k >= kShortest) {
-      // What a delay moves into the stretch is the step: where there is enough of it.
-      const bool is_long = end - k >= kLong;
-      const bool after = is_long && k > 0 && masked[static_cast<std::size_t>(k) - 1];
-      const bool before = is_long && end < n && masked[static_cast<std::size_t>(end)];
-      const int first = after ? k + kBeside : k, last = before ? end - kBeside : end;
-      data.start_of_segment.push_back(first);
-      data.valid_count += last - first;
-      for (int i = first; i < last; ++i) kept[static_cast<std::size_t>(i)] = true;
-    }
-    k = std::max(end, k + 1);
+  for (const auto& [begin, end] : found) {
+    data.start_of_segment.push_back(begin);
+    data.valid_count += end - begin;
+    for (int i = begin; i < end; ++i) kept[static_cast<std::size_t>(i)] = true;
   }
   data.valid = kept;
 }
