@@ -477,6 +477,19 @@ TEST_F(Diagnose, ASaturatedPressureIsLeftOutAndSaid) {
   EXPECT_NE(notes(result).find("rests on its bound"), std::string::npos) << notes(result);
 }
 
+TEST_F(Diagnose, ASaturatedTorqueIsLeftOutAndSaid) {
+  auto recording = record(rig(8));
+  for (std::string& table : recording.csv) {
+    table = changed(table, [](auto& cells) {
+      if (number(cells[4]) > 60.0) cells[4] = "60";
+      return true;
+    });
+  }
+  const json result = of(recording.csv);
+  EXPECT_EQ(result.at("findings").size(), 0U) << result.dump(1);
+  EXPECT_NE(notes(result).find("a torque rests on its bound"), std::string::npos) << notes(result);
+}
+
 TEST_F(Diagnose, AWrongUnitIsAnErrorOrSaid) {
   auto recording = record(rig(4));
   // The dimension is wrong: refused, with file, line and what would be right.

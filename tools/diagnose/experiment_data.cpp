@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <span>
@@ -111,6 +112,24 @@ std::vector<bool> saturated_samples(const Channel& channel, double start_s, int 
     }
   }
   return out;
+}
+
+// A torque is held for long by right, and its rounding repeats values as a bound does. It is
+// clipped where nearly all samples on the bound repeat it while hardly any elsewhere repeat their
+// neighbour.
+bool clipped(const Channel& channel) {
+  constexpr double kOften = 0.7, kHardly = 0.1;
+  if (channel.value.size() < 10) return false;
+  const auto [low, high] = std::minmax_element(channel.value.begin(), channel.value.end());
+  double on_bound = 0.0, repeats_there = 0.0, elsewhere = 0.0, repeats_elsewhere = 0.0;
+  for (std::size_t i = 1; i < channel.value.size(); ++i) {
+    const bool bound = channel.value[i] == *low || channel.value[i] == *high;
+    (bound ? on_bound : elsewhere) += 1.0;
+    if (channel.value[i] == channel.value[i - 1])
+      (bound ? repeats_there : repeats_elsewhere) += 1.0;
+  }
+  return on_bound > 10.0 && elsewhere > 10.0 && repeats_there > kOften * on_bound &&
+         repeats_elsewhere < kHardly * elsewhere;
 }
 
 // One sigma of a rounding that no noise carries from step to step, so that no averaging removes it:
@@ -385,8 +404,16 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
   data.line_p = order_line(speed);
   data.line_s = order_line(table[Role::kSecondarySpeed]);
 
-  const std::vector<bool> saturated =
+  std::vector<bool> saturated =
       saturated_samples(table[Role::kSecondaryPressure], start_s, n, data.dt_s);
+  data.saturated_pressure = std::find(saturated.begin(), saturated.end(), true) != saturated.end();
+  for (const Role role : {Role::kPrimaryTorque, Role::kEngineTorque, Role::kSecondaryTorque}) {
+    if (!clipped(table[role])) continue;
+    data.notes.push_back(table.name + ": a torque rests on its bound; left out there");
+    const std::vector<bool> too = saturated_samples(table[role], start_s, n, data.dt_s);
+    std::transform(saturated.begin(), saturated.end(), too.begin(), saturated.begin(),
+                   std::logical_or<>());
+  }
   data.stop.assign(static_cast<std::size_t>(n), kNoStop);
   data.valid.assign(static_cast<std::size_t>(n), false);
   std::vector<bool> too_fast(static_cast<std::size_t>(n), false);
@@ -415,7 +442,6 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
                     usable(data.torque, k) && usable(data.torque_s, k) && usable(data.command, k) &&
                     usable(data.temperature, k) && usable(data.pressure_p, k) && !saturated[i];
     too_fast[i] = !(std::abs(step_N) < kForceStepMax * force_N);
-    data.saturated_pressure |= saturated[i];
   }
   trim(data);
   mask_and_segment(too_fast, data);
