@@ -395,7 +395,18 @@ double Engine::degrees(double with_scatter, double without_scatter) const {
   return between / std::max(share * share, 1e-6);
 }
 
-std::vector<Score> Engine::screen() const {
+bool Engine::scatters_unusually() const {
+  constexpr double kUnusual = 3.0;  // times the usual
+  return (base_.scatter.variance > kUnusual * kUnusual * default_scatter().variance).any();
+}
+
+std::vector<Score> Engine::screen_with_usual_scatter() const {
+  const std::vector<int> base = with_nuisances(accepted_);
+  return screen(fit_linear(summaries_, columns_of(base), prior(base, state_), default_scatter(), 0),
+                0);
+}
+
+std::vector<Score> Engine::screen(const Fit& from, int scatter_steps) const {
   std::vector<Score> out;
   const std::vector<int> base = with_nuisances(accepted_);
   const std::vector<int> base_columns = columns_of(base);
@@ -412,7 +423,8 @@ std::vector<Score> Engine::screen() const {
     std::vector<int> parameters = base;
     parameters.push_back(kNuisanceCount + slot);
     const std::vector<int> columns = columns_of(parameters);
-    const Fit fit = fit_linear(summaries_, columns, prior(parameters, state_), base_.scatter, 8);
+    const Fit fit =
+        fit_linear(summaries_, columns, prior(parameters, state_), from.scatter, scatter_steps);
     const Information info =
         information_on(summaries_, base_columns, base_prior, columns.back(), fit.scatter);
     Score score;
@@ -429,7 +441,7 @@ std::vector<Score> Engine::screen() const {
     score.sigma = std::sqrt(std::max(fit.covariance(last, last), 0.0)) * unit;
     score.chi2 = chi2_of_student(fit.step[last] / std::sqrt(fit.covariance(last, last)),
                                  degrees(info.with_scatter, info.without_scatter));
-    score.gain = 2.0 * (fit.log_likelihood - base_.log_likelihood);
+    score.gain = 2.0 * (fit.log_likelihood - from.log_likelihood);
     out.push_back(score);
   }
   return out;

@@ -62,7 +62,11 @@ class Engine {
   // Noise model and matrices at the present state; call after fit_machine and accept.
   void update_noise();
   // All slots one at a time on top of the accepted ones.
-  std::vector<Score> screen() const;
+  std::vector<Score> screen() const { return screen(base_, kScatterSteps); }
+  // The same as if experiments scattered as healthy ones do: where they seem to scatter far more,
+  // that may be the effect that is looked for, and with so much scatter nothing of it is seen.
+  std::vector<Score> screen_with_usual_scatter() const;
+  bool scatters_unusually() const;
   // Full non-linear fit of a set of slots (all of them, accepted or not).
   Hypothesis refine(const std::vector<int>& slots, int iterations = 5) const;
   Hypothesis refine_from(const ModelState& start, const std::vector<int>& slots,
@@ -119,6 +123,9 @@ class Engine {
   Optimum minimise(const Campaign& campaign, const std::vector<int>& parameters,
                    const ModelState& start, const Whitening& whitening, const Scatter& scatter,
                    int iterations, int scatter_iterations) const;
+  static constexpr int kScatterSteps = 8;
+  // from: the fit without the slot; scatter_steps 0: by its scatter.
+  std::vector<Score> screen(const Fit& from, int scatter_steps) const;
   std::vector<int> columns_of(const std::vector<int>& parameters) const;
   // The matrices with the sizes of some accepted effects put back to zero.
   std::vector<Summary> summaries_without(const std::vector<int>& slots) const;

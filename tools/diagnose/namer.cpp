@@ -32,7 +32,8 @@ constexpr int kSettling = 20;     // steps of a fit whose effects are settled
 constexpr int kGroupDegrees = 3;  // of a group of score_groups
 constexpr double kPromotedOdds = 3.0;
 constexpr int kPromotions = 2;
-constexpr double kClassOdds = 20.0;  // worse by more: told apart
+constexpr double kThereOdds = 20.0;   // that it is there
+constexpr double kClassOdds = 200.0;  // worse by more: told apart; the class is to miss one in 100
 // A further cause must matter beside those found: below this share of their evidence it is the
 // difference between the found effect's equation and the machine.
 constexpr double kShareOfFirst = 0.02;
@@ -153,6 +154,22 @@ std::optional<UnknownGroup> better_group(const Engine& engine, const Hypothesis&
     if (!is_own(engine, best.slots, group)) return group;
   }
   return std::nullopt;
+}
+
+// The group explains something still when the best hypothesis is there, whose gain is more than the
+// linear where the constants of the machine had made up for it.
+bool outlasts(const Engine& engine, const Hypothesis& best, const UnknownGroup& group,
+              double threshold) {
+  Engine beside = engine;
+  beside.accept(best);
+  beside.update_noise();
+  beside.accept(beside.refine(best.slots, kSettling));
+  beside.update_noise();
+  const std::vector<UnknownGroup> left = score_groups(beside);
+  return std::any_of(left.begin(), left.end(), [&](const UnknownGroup& each) {
+    return each.acts_on == group.acts_on && each.depends_on == group.depends_on &&
+           each.gain > threshold && each.chi2 > threshold;
+  });
 }
 
 // The better of both starts: the linear one may lead far along what the data hardly hold.
@@ -282,7 +299,7 @@ void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& 
     const auto doubtful =
         std::find_if(naming.accepted.begin(), naming.accepted.end(), [&](const Accepted& each) {
           const double size = naming.hypothesis.state.effects[each.slot];
-          return each.ln_odds < std::log(kClassOdds) || !credible(engine, each.slot, size) ||
+          return each.ln_odds < std::log(kThereOdds) || !credible(engine, each.slot, size) ||
                  student_p(size / each.sigma, each.degrees) > kDisagreement;
         });
     if (doubtful == naming.accepted.end()) return;
@@ -314,8 +331,11 @@ void drop_unconfirmed(Engine& engine, Naming& naming) {
         !Engine::curve_is_possible(naming.sharp.state) && Engine::curve_is_possible(whole.state);
     // What shows in one or two experiments only is not beyond the chance of drawing them.
     const bool helps = gain.better() || straightened || density > kLeftOutPlain;
+    // One signal may be predicted a little worse where all at once are predicted better, beyond the
+    // chance of drawing the experiments.
+    const bool on_the_whole = gain.density && gain.density->low > 0.0;
     if (density > kLeftOutMin && helps &&
-        !gain.worse(noise_floors(engine.campaign(), naming.sharp.state))) {
+        (on_the_whole || !gain.worse(noise_floors(engine.campaign(), naming.sharp.state)))) {
       return;
     }
     naming.not_confirmed.push_back(slot);
@@ -375,8 +395,18 @@ void add_effects(Engine& engine, Naming& out, double& first_gain, const std::fun
         found = true;
       }
     };
-    const std::vector<int> candidates =
-        shortlist(scores, kRefined, possible ? kInCurveMax : 2.0, out.not_confirmed);
+    const double in_curve_max = possible ? kInCurveMax : 2.0;
+    std::vector<int> candidates = shortlist(scores, kRefined, in_curve_max, out.not_confirmed);
+    const bool scattered = engine.scatters_unusually();
+    if (scattered) {
+      const std::vector<int> usual =
+          shortlist(engine.screen_with_usual_scatter(), static_cast<int>(kFromAfar), in_curve_max,
+                    out.not_confirmed);
+      std::erase_if(candidates, [&](int slot) {
+        return std::find(usual.begin(), usual.end(), slot) != usual.end();
+      });
+      candidates.insert(candidates.begin(), usual.begin(), usual.end());
+    }
     const auto consider_all = [&](bool from_afar) {
       std::vector<std::optional<Hypothesis>> fits(candidates.size());
       in_parallel(jobs, candidates.size(), [&](std::size_t i) {
@@ -393,12 +423,12 @@ void add_effects(Engine& engine, Naming& out, double& first_gain, const std::fun
         consider(swaps ? engine.refine_from(fit->state, left, kSettling) : std::move(*fit));
       }
     };
-    consider_all(far);
+    consider_all(far || scattered);
     // Something is there, but no way leads to it from here.
     const bool plain = std::any_of(scores.begin(), scores.end(), [&](const Score& score) {
       return score.chi2 > kPlain * out.threshold && (!possible || score.in_curve < kInCurveMax);
     });
-    if (!found && !far && plain) consider_all(true);
+    if (!found && !far && !scattered && plain) consider_all(true);
     if (!found) break;
     // To its end, before anything is compared with it.
     best = engine.refine_from(best.state, best.slots, kSettling);
@@ -422,7 +452,8 @@ void add_effects(Engine& engine, Naming& out, double& first_gain, const std::fun
     const double gain = 2.0 * (best.log_likelihood - base.log_likelihood);
     // A smooth dependence on a recorded variable that explains clearly more than any name is no
     // effect of the library: a name would be wrong, and so would those built on it.
-    if (const auto better = better_group(engine, best, gain, out.threshold)) {
+    if (const auto better = better_group(engine, best, gain, out.threshold);
+        better && outlasts(engine, best, *better, out.threshold)) {
       out.unknown = better;
       break;
     }

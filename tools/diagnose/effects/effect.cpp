@@ -49,7 +49,7 @@ constexpr std::array kRows{
     EffectRow{"pressure_offset", "offset_Pa", "Pa", kMeasure, 4e4, -5e5, 5e5, apply_pressure_offset,
               "p_measured = p_true + offset", "clamp force", "nothing",
               "read the pressure with the pump off; ramps at two torque levels in one ratio"},
-    EffectRow{"pressure_gain", "gain", "", kMeasure, 0.03, -0.5, 0.5, apply_pressure_gain,
+    EffectRow{"pressure_gain", "gain", "", kMeasure, 0.03, -0.1, 0.1, apply_pressure_gain,
               "p_measured = (1 + gain) p_true", "clamp force", "secondary_pressure",
               "a reference gauge: the gain of the pressure and mu_max are one number in ramps"},
     EffectRow{"spring_force", "force_N", "N", kForce, 300.0, -3000.0, 3000.0, apply_spring_force,
