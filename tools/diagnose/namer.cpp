@@ -347,12 +347,6 @@ double worth_beside(double first_gain) {
   return std::min(kShareOfFirst * first_gain, kOwnGain + kOwnShare * first_gain);
 }
 
-// Experiments that differ by more than those of one machine: something in them is not yet told.
-bool scattered(const Scatter& scatter) {
-  constexpr double kUnusual = 3.0;  // times the usual sigma
-  return (scatter.variance / default_scatter().variance > kUnusual * kUnusual).any();
-}
-
 // Adds to the accepted effects as long as any is there. first_gain: the largest so far.
 void add_effects(Engine& engine, Naming& out, double& first_gain, const std::function<bool()>& stop,
                  int jobs) {
@@ -367,7 +361,8 @@ void add_effects(Engine& engine, Naming& out, double& first_gain, const std::fun
     // an effect would lead.
     const bool possible = Engine::curve_is_possible(engine.state());
     // The same where experiments differ by more than replicates do.
-    const bool far = !possible || (!set.empty() && scattered(base.fit.scatter)) ||
+    const bool scattered = engine.scatters_unusually();
+    const bool far = !possible || scattered ||
                      std::any_of(scores.begin(), scores.end(),
                                  [](const Score& score) { return score.gain > kFar; });
     Hypothesis best;
@@ -397,7 +392,6 @@ void add_effects(Engine& engine, Naming& out, double& first_gain, const std::fun
     };
     const double in_curve_max = possible ? kInCurveMax : 2.0;
     std::vector<int> candidates = shortlist(scores, kRefined, in_curve_max, out.not_confirmed);
-    const bool scattered = engine.scatters_unusually();
     if (scattered) {
       const std::vector<int> usual =
           shortlist(engine.screen_with_usual_scatter(), static_cast<int>(kFromAfar), in_curve_max,
@@ -423,12 +417,12 @@ void add_effects(Engine& engine, Naming& out, double& first_gain, const std::fun
         consider(swaps ? engine.refine_from(fit->state, left, kSettling) : std::move(*fit));
       }
     };
-    consider_all(far || scattered);
+    consider_all(far);
     // Something is there, but no way leads to it from here.
     const bool plain = std::any_of(scores.begin(), scores.end(), [&](const Score& score) {
       return score.chi2 > kPlain * out.threshold && (!possible || score.in_curve < kInCurveMax);
     });
-    if (!found && !far && !scattered && plain) consider_all(true);
+    if (!found && !far && plain) consider_all(true);
     if (!found) break;
     // To its end, before anything is compared with it.
     best = engine.refine_from(best.state, best.slots, kSettling);

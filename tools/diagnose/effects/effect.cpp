@@ -31,7 +31,7 @@ constexpr std::array kRows{
               apply_inertia_torque, "T_belt = T_measured - (J_configured + J) d(omega_p)/dt",
               "torque", "acceleration of primary_speed",
               "accelerate and brake briskly at constant clamp force and torque"},
-    EffectRow{"torque_delay", "delay_s", "s", kMeasure, 0.05, -0.5, 0.5, apply_torque_delay,
+    EffectRow{"torque_delay", "delay_s", "s", kMeasure, 0.05, -0.2, 0.5, apply_torque_delay,
               "T_measured(t) = T_true(t - delay)", "torque", "rate of torque",
               "torque steps at constant speed and clamp force"},
     EffectRow{"torque_loss", "constant_Nm", "Nm", kDrive, 2.0, -20.0, 20.0, apply_loss_constant,
