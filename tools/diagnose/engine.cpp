@@ -60,6 +60,20 @@ void reweigh(const Campaign& campaign, const ModelState& state, Whitening& white
   }
 }
 
+bool torque_varies(const std::vector<ExperimentData>& runs) {
+  constexpr double kVaried = 0.25;  // of its middle
+  std::vector<double> all;
+  for (const ExperimentData& run : runs) {
+    for (int k = 0; k < run.size(); ++k) {
+      if (run.valid[static_cast<std::size_t>(k)]) all.push_back(run.torque.slow[k]);
+    }
+  }
+  if (all.empty()) return false;
+  std::sort(all.begin(), all.end());
+  const std::size_t tail = all.size() / 100;
+  return all[all.size() - 1 - tail] - all[tail] > kVaried * std::abs(all[all.size() / 2]);
+}
+
 // What the model leaves of the data, rms in units of their noise: of the kind where that is most.
 double leaves(const Campaign& campaign, const ModelState& state) {
   std::array<double, kResidualKinds> squares{}, count{};
@@ -88,6 +102,7 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model)
   out.nuisances = nuisances_of(model);
   out.slots = make_slots(out.runs);
   out.switched_on = slot_values(model, out.slots);
+  out.torque_varies = torque_varies(out.runs);
   if (const auto ripple = model.effects.find("speed_ripple"); ripple != model.effects.end()) {
     out.known_ripples = ripple->second.parameters;
   }

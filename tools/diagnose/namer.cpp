@@ -41,6 +41,8 @@ constexpr double kShareOfFirst = 0.02;
 constexpr double kOwnGain = 100.0, kOwnShare = 5e-4;
 constexpr double kHeld = 0.5;
 constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
+// Where something else is so much more probable that cannot be, for its size, neither is it.
+constexpr double kUnlikely = 0.01;
 constexpr double kDisagreement = 0.05;   // p of a size that experiments do not agree on
 constexpr double kLeftOutMin = 0.0;      // of the log predictive density
 constexpr double kLeftOutPlain = 200.0;  // the same: beyond doubt, however few experiments show it
@@ -109,12 +111,13 @@ bool bends_machine(const Engine& engine, const Hypothesis& h) {
 
 // A size that no machine has is one where the data do not hold the fit; one far below the usual is
 // of no consequence, however sure; a value that is held from one sample to the next is late by half
-// the time between them.
+// the time between them; no tilt shows at one torque.
 bool credible(const Engine& engine, int slot, double size) {
   const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
   const EffectRow& row = *which.row;
   const double share = std::abs(size) / row.typical;
   if (std::abs(size) < kHeld * sample_period_s(engine.campaign(), which)) return false;
+  if (row.id == "radius_tilt" && !engine.campaign().torque_varies) return false;
   return share > kOfConsequence && share < kBelievable && size < row.high &&
          (size > row.low || row.low == 0.0);
 }
@@ -180,6 +183,14 @@ Hypothesis refine_replacement(const Engine& engine, const Engine::Replacement& s
   return linear.log_likelihood > beside.log_likelihood ? linear : beside;
 }
 
+// What the friction curve alone could do as well, however it runs, while it runs as friction does.
+bool is_in_curve(const Naming& naming, int slot) {
+  return Engine::curve_is_possible(naming.sharp.state) &&
+         std::any_of(naming.last_screen.begin(), naming.last_screen.end(), [&](const Score& score) {
+           return score.slot == slot && score.in_curve > kInCurveMax;
+         });
+}
+
 struct Promotion {
   Hypothesis hypothesis;
   int slot, instead_of;
@@ -229,15 +240,16 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
       if (!rival) continue;
       const Hypothesis& other = *rival;
       if (parts_experiments(without.fit.scatter, other.fit.scatter)) continue;
-      evidence[id_of(engine, ranked[i].second)].push_back(other.log_evidence);
-      if (id_of(engine, ranked[i].second) != id_of(engine, out.slot) &&
-          other.log_evidence > whole.log_evidence - std::log(kClassOdds)) {
-        out.aliases.push_back(ranked[i].second);
-      }
       const double bar = promoted ? promoted->hypothesis.log_evidence
                                   : whole.log_evidence + std::log(kPromotedOdds);
       if (other.log_evidence > bar && credible(engine, other)) {
         promoted = Promotion{other, ranked[i].second, out.slot};
+      }
+      if (is_in_curve(naming, ranked[i].second)) continue;  // never a name
+      evidence[id_of(engine, ranked[i].second)].push_back(other.log_evidence);
+      if (id_of(engine, ranked[i].second) != id_of(engine, out.slot) &&
+          other.log_evidence > whole.log_evidence - std::log(kClassOdds)) {
+        out.aliases.push_back(ranked[i].second);
       }
     }
     std::vector<double> all{without.log_evidence};
@@ -266,12 +278,7 @@ void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& s
   for (int i = 0; i < kPromotions; ++i) {
     const std::optional<Promotion> better = compare_classes(engine, naming, stop, jobs);
     if (!better || stop()) return;
-    const bool in_curve =
-        std::any_of(naming.last_screen.begin(), naming.last_screen.end(), [&](const Score& score) {
-          return score.slot == better->slot && score.in_curve > kInCurveMax;
-        });
-    // What does better is no other thing than a friction curve that runs otherwise.
-    if (in_curve && Engine::curve_is_possible(naming.sharp.state)) {
+    if (is_in_curve(naming, better->slot)) {
       naming.not_confirmed.push_back(better->instead_of);
       drop(engine, naming, better->instead_of);
     } else {
@@ -300,6 +307,7 @@ void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& 
         std::find_if(naming.accepted.begin(), naming.accepted.end(), [&](const Accepted& each) {
           const double size = naming.hypothesis.state.effects[each.slot];
           return each.ln_odds < std::log(kThereOdds) || !credible(engine, each.slot, size) ||
+                 each.probability < kUnlikely ||
                  student_p(size / each.sigma, each.degrees) > kDisagreement;
         });
     if (doubtful == naming.accepted.end()) return;

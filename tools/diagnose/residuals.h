@@ -56,6 +56,9 @@ struct Campaign {
     const auto i = static_cast<std::size_t>(run);
     return noise.slip * (i < slip_noise_share.size() ? slip_noise_share[i] : 1.0);
   }
+  // By more than a ramp itself moves it as the belt begins to slip. What follows the torque cannot
+  // be told where it does not.
+  bool torque_varies = false;
   bool has_balance = false;
   bool has_tracking = false;
 };

@@ -53,8 +53,6 @@ constexpr std::array<const char*, 3> kActsOn{"friction", "ratio", "torque"};
 constexpr std::array<double, 3> kUnit{0.05, 2e-3, 2.0};  // share, share, Nm
 constexpr double kAnyConstant = 1e-3;  // precision: of a constant that is not known at all
 constexpr double kVaried = 0.05;       // of its middle; less may be the channel's own noise
-// The same of the torque: less is what the ramp itself does to it as the belt begins to slip.
-constexpr double kTorqueVaried = 0.25;
 constexpr double kOwnShareMin = 0.01;
 constexpr double kLooked = 8.0;  // below this a group is no candidate
 constexpr std::array<double, 3> kMatters{5e-3, 2e-4, 0.2};
@@ -82,8 +80,7 @@ bool scaled_variable(const Campaign& campaign, const Variable& variable,
   std::sort(all.begin(), all.end());
   const double low = all[all.size() / 100], high = all[all.size() - 1 - all.size() / 100];
   const double middle = all[all.size() / 2];
-  const double varied = variable.name == std::string_view("torque") ? kTorqueVaried : kVaried;
-  if (!(high - low > varied * std::abs(middle) + 1e-12)) return false;
+  if (!(high - low > kVaried * std::abs(middle) + 1e-12)) return false;
   for (ArrayXd& x : out) x = (2.0 * (x - low) / (high - low) - 1.0).max(-1.1).min(1.1);
   return true;
 }
@@ -98,6 +95,7 @@ std::vector<UnknownGroup> score_groups(const Engine& engine) {
   std::vector<std::vector<ArrayXd>> index;
   std::vector<const Variable*> used;
   for (const Variable& variable : variables()) {
+    if (variable.name == std::string_view("torque") && !campaign.torque_varies) continue;
     std::vector<ArrayXd> values;
     if (scaled_variable(campaign, variable, values)) {
       index.push_back(std::move(values));

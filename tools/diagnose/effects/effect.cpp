@@ -46,7 +46,7 @@ constexpr std::array kRows{
     EffectRow{"centrifugal_force", "coefficient_N_s2", "N s^2", kForce, 6e-3, -0.05, 0.05,
               apply_centrifugal_force, "F_true = F_model + c omega_s^2", "clamp force",
               "secondary_speed", "repeat one ramp at two speeds, one of them 250 rad/s and more"},
-    EffectRow{"pressure_offset", "offset_Pa", "Pa", kMeasure, 4e4, -5e5, 5e5, apply_pressure_offset,
+    EffectRow{"pressure_offset", "offset_Pa", "Pa", kMeasure, 4e4, -2e5, 2e5, apply_pressure_offset,
               "p_measured = p_true + offset", "clamp force", "nothing",
               "read the pressure with the pump off; ramps at two torque levels in one ratio"},
     EffectRow{"pressure_gain", "gain", "", kMeasure, 0.03, -0.1, 0.1, apply_pressure_gain,
