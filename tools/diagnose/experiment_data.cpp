@@ -115,21 +115,24 @@ std::vector<bool> saturated_samples(const Channel& channel, double start_s, int 
 }
 
 // A torque is held for long by right, and its rounding repeats values as a bound does. It is
-// clipped where nearly all samples on the bound repeat it while hardly any elsewhere repeat their
-// neighbour.
+// clipped where nearly all samples on one bound repeat it, while hardly any elsewhere repeat their
+// neighbour; held on both, it goes from one level to another.
 bool clipped(const Channel& channel) {
-  constexpr double kOften = 0.7, kHardly = 0.1;
+  constexpr double kOften = 0.7, kHardly = 0.1, kFew = 10.0;
   if (channel.value.size() < 10) return false;
   const auto [low, high] = std::minmax_element(channel.value.begin(), channel.value.end());
-  double on_bound = 0.0, repeats_there = 0.0, elsewhere = 0.0, repeats_elsewhere = 0.0;
+  struct Place {
+    double samples = 0.0, repeats = 0.0;
+    bool is_held() const { return samples > kFew && repeats > kOften * samples; }
+  } on_low, on_high, elsewhere;
   for (std::size_t i = 1; i < channel.value.size(); ++i) {
-    const bool bound = channel.value[i] == *low || channel.value[i] == *high;
-    (bound ? on_bound : elsewhere) += 1.0;
-    if (channel.value[i] == channel.value[i - 1])
-      (bound ? repeats_there : repeats_elsewhere) += 1.0;
+    const double here = channel.value[i];
+    Place& place = here == *low ? on_low : here == *high ? on_high : elsewhere;
+    place.samples += 1.0;
+    if (here == channel.value[i - 1]) place.repeats += 1.0;
   }
-  return on_bound > 10.0 && elsewhere > 10.0 && repeats_there > kOften * on_bound &&
-         repeats_elsewhere < kHardly * elsewhere;
+  return on_low.is_held() != on_high.is_held() && elsewhere.samples > kFew &&
+         elsewhere.repeats < kHardly * elsewhere.samples;
 }
 
 // One sigma of a rounding that no noise carries from step to step, so that no averaging removes it:
