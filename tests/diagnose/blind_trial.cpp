@@ -150,10 +150,11 @@ Envelope draw_envelope(std::uint64_t number) {
     trial.plan.resize(7);
   }
   const auto effect = [&] {
+    // One draw a line: compilers differ in the order of a call's arguments.
+    const double size = random.log_uniform(0.25, 2.5);
     const auto& all = plantables();
-    return draw_effect(random,
-                       all[static_cast<std::size_t>(random.below(static_cast<int>(all.size())))],
-                       random.log_uniform(0.25, 2.5));
+    const int which_one = random.below(static_cast<int>(all.size()));
+    return draw_effect(random, all[static_cast<std::size_t>(which_one)], size);
   };
   if (out.kind == Kind::kSingle || out.kind == Kind::kPair) trial.planted.push_back(effect());
   while (out.kind == Kind::kPair && trial.planted.size() < 2) {
@@ -161,10 +162,10 @@ Envelope draw_envelope(std::uint64_t number) {
     if (second.effect != trial.planted[0].effect) trial.planted.push_back(second);
   }
   if (out.kind == Kind::kUnknown) {
+    const double size = random.log_uniform(0.5, 2.5);
     const auto& all = outside_causes();
-    trial.planted.push_back(draw_outside(
-        random, all[static_cast<std::size_t>(random.below(static_cast<int>(all.size())))],
-        random.log_uniform(0.5, 2.5)));
+    const int which_one = random.below(static_cast<int>(all.size()));
+    trial.planted.push_back(draw_outside(random, all[static_cast<std::size_t>(which_one)], size));
   }
   return out;
 }
