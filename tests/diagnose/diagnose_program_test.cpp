@@ -142,11 +142,12 @@ TEST_F(Diagnose, NamesTheCauseWritesTheModelAndIsContentWithIt) {
     const json& forward = first.at("simulation").at(name);
     EXPECT_GT(forward.at("rmse"), forward.at("noise_floor")) << name;
     const json& gain = forward.at("held_out");
-    // How the belt sits from one experiment to the next, a share of the speed that no model
-    // removes, is as large as most of what the drag does to the speed.
-    const double most = name == std::string("secondary_speed") ? 0.7 : 0.5;
-    EXPECT_LT(gain.at("rmse_after").get<double>(), most * gain.at("rmse_before").get<double>())
-        << name << gain;
+    // Of the speed is left how the belt sits from one experiment to the next, which no model
+    // removes: up to 2e-4 of some 300 rad/s.
+    const double most = name == std::string_view("secondary_speed")
+                            ? 0.06
+                            : 0.5 * gain.at("rmse_before").get<double>();
+    EXPECT_LT(gain.at("rmse_after").get<double>(), most) << name << gain;
     EXPECT_GT(gain.at("ci95")[0], 0.0) << name << gain;
   }
 
