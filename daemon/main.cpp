@@ -12,17 +12,20 @@
 #include <exception>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 
-#include "daemon/core/config.h"
-#include "daemon/core/config_fingerprint.h"
-#include "daemon/core/event.h"
-#include "daemon/core/history_link.h"
-#include "daemon/core/loop.h"
-#include "daemon/core/observation.h"
-#include "daemon/core/pipeline.h"
-#include "daemon/core/reload.h"
+#include "can_dbc/text/printable.h"
+#include "daemon/core/config/config.h"
+#include "daemon/core/config/config_fingerprint.h"
+#include "daemon/core/loop/loop.h"
+#include "daemon/core/loop/pipeline.h"
+#include "daemon/core/loop/reload.h"
+#include "daemon/core/observe/event.h"
+#include "daemon/core/observe/history_link.h"
+#include "daemon/core/observe/observation.h"
+#include "daemon/io/bus_claim.h"
 #include "daemon/io/flight_recorder.h"
 #include "daemon/io/history_keeper.h"
 #include "daemon/io/housekeeper.h"
@@ -54,7 +57,9 @@ MonoTime steady_ns() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
 }
 
-void complain(const std::string& line) { std::fprintf(stderr, "%s\n", line.c_str()); }
+void complain(const std::string& line) {
+  std::fprintf(stderr, "%s\n", can::printable(line).c_str());
+}
 
 // A descriptor that is readable once one of these signals has come; they reach no thread otherwise.
 int signal_descriptor(std::initializer_list<int> numbers) {
@@ -209,6 +214,22 @@ int run(const Arguments& arguments) {
     return kUnavailable;
   }
 
+  // The embedded bus has nobody but this process on it.
+  std::optional<BusClaim> claim;
+  if (bus.inproc == nullptr) claim.emplace(config.interface, config.identifiers);
+  if (claim && !claim->refused().empty()) {
+    complain(arguments.config + ": " + claim->refused());
+    return kUnavailable;
+  }
+  const Listened listened = claim ? listen_before_talk(*bus.port, config.identifiers) : Listened{};
+  if (listened.closed) return kDone;  // before its first frame
+  if (listened.heard) {
+    complain(arguments.config + ": another node sends " + identifier_text(*listened.heard) +
+             " on " + config.interface +
+             ": a second beltgripd? Stop it, or give one of them other [bus] identifiers");
+    return kUnavailable;
+  }
+
   Pipeline pipeline(config);
   EventRing events;
   EventSink event_sink(events);
@@ -224,6 +245,7 @@ int run(const Arguments& arguments) {
   }
   LogSink log(arguments.log_level);
   log.info("version " BELTGRIP_VERSION ", " + arguments.config + ", bus " + config.interface);
+  if (const std::string assumed = assumed_text(config); !assumed.empty()) log.info(assumed);
   if (bus.inproc == nullptr) log.info(link_health(config.interface));
   if (config.further_bus) log.info(link_health(config.further_bus->interface));
   std::function<void()> on_stop;
@@ -254,7 +276,7 @@ int run(const Arguments& arguments) {
     if (recorder == nullptr) return;
     for (const auto& [warning, line] : recorder->take_messages()) say(warning, line);
   };
-  Reloader reloader(arguments.config, config, reload_slot, say);
+  Reloader reloader(arguments.config, config, reload_slot, claim ? &*claim : nullptr, say);
   Requests requests(request_fd, reloader, log, service);
   bool observed = false;
   MonoTime pulse_at = 0;
@@ -334,8 +356,11 @@ int main(int argc, char** argv) {
                "print every key with default, unit and range, and exit");
   try {
     app.parse(argc, argv);
+  } catch (const CLI::Success& success) {  // --help, --version
+    return app.exit(success);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kUsage;
+    complain(std::string(error.what()) + " (see beltgripd --help)");
+    return kUsage;
   }
   if (arguments.print_default_config) {
     std::fputs(default_config_text().c_str(), stdout);

@@ -13,7 +13,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "can_dbc/message_index.h"
+#include "can_dbc/dbc/message_index.h"
 
 namespace beltgrip::daemon {
 

@@ -19,7 +19,7 @@
 #include <span>
 #include <string>
 
-#include "daemon/core/port.h"
+#include "daemon/core/base/port.h"
 #include "daemon/io/stamp.h"
 
 namespace beltgrip::daemon {

@@ -15,7 +15,7 @@
 #include <system_error>
 #include <utility>
 
-#include "can_dbc/can_log.h"
+#include "can_dbc/log/can_log.h"
 
 namespace beltgrip::daemon {
 
@@ -242,7 +242,7 @@ void FlightRecorder::open_file(MonoTime t) {
     return;
   }
   say(false, "recording to " + file_->path());
-  std::string header = "# beltgrip-record 1";
+  std::string header = "# beltgrip-record 3";
   for (const std::string& each : interfaces_) header += ' ' + each;
   file_->write(header + '\n');
 }
@@ -272,12 +272,20 @@ void FlightRecorder::write_line(MonoTime t, const std::string& text) {
 }
 
 void FlightRecorder::write_learned(MonoTime t) {
+  std::string memory = "memory";
+  for (const double each : learned_.memory.numbers()) memory += ' ' + number_text(each);
+  write_line(t, memory);
   std::string text = "learned ";
   text += learned_.doubtful ? "1 " : "0 ";
   text += learned_.unwritten ? '1' : '0';
   for (const estimator::FusedFriction& group : learned_.groups) {
     text += ' ';
-    text += group.known ? number_text(group.mu_max) : "-";
+    if (!group.known) {
+      text += '-';
+      continue;
+    }
+    text += number_text(group.mu_max) + '/' + number_text(group.ci95_low) + '/' +
+            number_text(group.repeatability_percent);
   }
   write_line(t, text);
 }

@@ -8,7 +8,7 @@
 // whatever else the pipeline was told (record_tap.h). With them `beltgrip replay` decides what the
 // daemon decided; a record that begins with the daemon gives the same frames, byte by byte.
 //
-//   # beltgrip-record 1 INTERFACE [INTERFACE]    of bus 0, of bus 1
+//   # beltgrip-record 3 INTERFACE [INTERFACE]    of bus 0, of bus 1
 //   # (T) start              the first sample
 //   (T) can0 110#...         received; "T" at its end: sent by this daemon, and confirmed
 //   # (T) after              the frames that follow had come too late for the sample before T
@@ -16,8 +16,12 @@
 //   # (T) bus BUS STATE      0 active, 1 warning, 2 passive, 3 off, 4 down, 5 absent
 //   # (T) lost N             so many frames, before the next one
 //   # (T) failed BUS ID HOW  what the sample at T could not send: 1 full, 2 down, 3 failed
-//   # (T) learned D U A B C D    doubtful, unwritten, mu_max of the history's groups or -
+//   # (T) memory N...        numbers of estimator/belt/belt_memory.h, before what was learned
+//   # (T) learned D U A B C D    doubtful, unwritten, the history's groups: - or mu_max, its lower
+//                                end and the scatter in percent, with slashes between
 //   # (T) end NOW            the daemon stopped
+//
+// Version 1 had mu_max alone in a group, version 2 no memory.
 #pragma once
 
 #include <atomic>
@@ -29,7 +33,7 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/core/record_tap.h"
+#include "daemon/core/loop/record_tap.h"
 
 namespace beltgrip::daemon {
 

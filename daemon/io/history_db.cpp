@@ -17,7 +17,7 @@
 #include <optional>
 #include <string_view>
 
-#include "daemon/core/event.h"
+#include "daemon/core/publish/names.h"
 
 namespace beltgrip::daemon {
 
@@ -125,6 +125,74 @@ std::optional<Enum> enum_of(std::string_view name, int count, auto&& name_of) {
   return std::nullopt;
 }
 
+bool is_name(const std::string& text) {
+  constexpr std::size_t kLongest = 64;
+  return text.size() <= kLongest &&
+         std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c < '\x7F'; });
+}
+
+// What a column may hold: no number, or one in its range. Wide: what a broken sensor has said is
+// history too; what no program has written is none.
+struct Range {
+  double Stored::*own;  // one of these is set
+  double ExperimentResult::*result;
+  double estimator::PeakEstimate::*peak;
+  double least, most;
+  double& of(Stored& stored) const {
+    return own != nullptr      ? stored.*own
+           : result != nullptr ? stored.result.*result
+                               : stored.result.peak.*peak;
+  }
+  bool holds(double value) const { return std::isnan(value) || (value >= least && value <= most); }
+};
+using Result = ExperimentResult;
+using Peak = estimator::PeakEstimate;
+constexpr std::array kRanges{
+    Range{&Stored::time_s, nullptr, nullptr, -4e10, 4e10},
+    Range{&Stored::duration_s, nullptr, nullptr, 0.0, 1e7},
+    Range{nullptr, nullptr, &Peak::mu_max, 0.0, 1.0},
+    Range{nullptr, nullptr, &Peak::mu_max_std, 0.0, 1.0},
+    Range{nullptr, nullptr, &Peak::ci95_low, -1.0, 1.0},
+    Range{nullptr, nullptr, &Peak::ci95_high, -1.0, 10.0},
+    Range{nullptr, nullptr, &Peak::sigma_peak_percent, 0.0, 1e3},
+    Range{nullptr, &Result::sensor_std, nullptr, 0.0, 1.0},
+    Range{nullptr, &Result::sigma_stop_percent, nullptr, 0.0, 1e6},
+    Range{nullptr, &Result::omega_p_rad_s, nullptr, -1e4, 1e4},
+    Range{nullptr, &Result::omega_s_rad_s, nullptr, -1e4, 1e4},
+    Range{nullptr, &Result::torque_Nm, nullptr, -1e4, 1e4},
+    Range{nullptr, &Result::clamp_force_N, nullptr, -1e6, 1e6},
+    Range{nullptr, &Result::oil_degC, nullptr, -60.0, 300.0},
+};
+constexpr std::int64_t kSamplesMost = 1'000'000'000;
+
+// Wider than what an experiment is believed: earlier versions believed more.
+constexpr double kMuLeast = 0.03, kMuMost = 0.25;
+
+// A value is one that belts have, with an interval around it.
+bool is_value(const Peak& peak) {
+  return peak.mu_max >= kMuLeast && peak.mu_max <= kMuMost && peak.mu_max_std > 0.0 &&
+         !(peak.ci95_low > peak.ci95_high);
+}
+
+// Whether a program of this project can have written it.
+bool is_sane(Stored stored, PeakKind kind) {
+  const bool in_range = std::all_of(kRanges.begin(), kRanges.end(), [&](const Range& range) {
+    return range.holds(range.of(stored));
+  });
+  const bool counted = stored.samples >= 0 && stored.samples <= kSamplesMost && stored.notes >= 0 &&
+                       stored.notes <= std::numeric_limits<std::uint32_t>::max();
+  return in_range && counted && std::isfinite(stored.time_s) && is_name(stored.fingerprint) &&
+         (kind != PeakKind::kValue || is_value(stored.result.peak));
+}
+
+// What is not in its range is not known.
+void keep_to_ranges(Stored& stored) {
+  for (const Range& range : kRanges) {
+    double& value = range.of(stored);
+    if (!range.holds(value)) value = std::numeric_limits<double>::quiet_NaN();
+  }
+}
+
 Stored stored_of(const HistoryRow& row) {
   Stored stored;
   stored.id = row.id;
@@ -139,16 +207,23 @@ Stored stored_of(const HistoryRow& row) {
   stored.kind = kind_name(row.result.peak.kind);
   stored.direction = direction_name(row.result.direction);
   stored.ratio = end_stop_name(row.result.end_stop);
+  keep_to_ranges(stored);
+  if (row.result.peak.kind == PeakKind::kValue && !is_value(stored.result.peak)) {
+    stored.kind = kind_name(PeakKind::kNone);
+  }
   return stored;
 }
 
 std::optional<HistoryRow> row_of(const Stored& stored) {
   const auto outcome = enum_of<Outcome>(stored.outcome, 4, outcome_name);
-  const auto reason = enum_of<StopReason>(stored.stop_reason, 17, stop_reason_name);
+  const auto reason = enum_of<StopReason>(
+      stored.stop_reason, static_cast<int>(estimator::kStopReasonCount), stop_reason_name);
   const auto kind = enum_of<PeakKind>(stored.kind, 3, kind_name);
   const auto direction = enum_of<Direction>(stored.direction, 2, direction_name);
   const auto end_stop = enum_of<EndStop>(stored.ratio, 2, end_stop_name);
-  if (!outcome || !reason || !kind || !direction || !end_stop) return std::nullopt;
+  if (!outcome || !reason || !kind || !direction || !end_stop || !is_sane(stored, *kind)) {
+    return std::nullopt;
+  }
   HistoryRow row;
   row.id = stored.id;
   row.time_s = stored.time_s;
@@ -215,6 +290,24 @@ HistoryTrouble trouble_of(int status) {
   return HistoryTrouble::kNotWritten;
 }
 
+// Of a statement that only reads. A plain error: a format that SQLite does not know.
+HistoryTrouble trouble_of_reading(int status) {
+  return status == SQLITE_ERROR ? HistoryTrouble::kCorrupt : trouble_of(status);
+}
+
+// What integrity_check reports: a page that it could not read is not damaged for that.
+HistoryTrouble trouble_of_report(std::string_view report) {
+  constexpr std::string_view kUnread = "unable to get the page. error code=";
+  int status = SQLITE_CORRUPT;
+  if (const std::size_t at = report.find(kUnread); at != std::string_view::npos) {
+    const std::string_view code = report.substr(at + kUnread.size());
+    std::from_chars(code.data(), code.data() + code.size(), status);
+  } else if (report.find("failed to get page") != std::string_view::npos) {
+    status = SQLITE_IOERR;
+  }
+  return trouble_of(status);
+}
+
 bool create(sqlite3* db) {
   const std::string version = "PRAGMA user_version = " + std::to_string(kHistoryVersion);
   const std::string application = "PRAGMA application_id = " + std::to_string(kApplicationId);
@@ -227,15 +320,15 @@ bool create(sqlite3* db) {
 
 // What the file is, without changing it. fresh: nothing is in it yet.
 HistoryTrouble inspect(sqlite3* db, bool& fresh, std::string& text) {
+  const auto failed = [&](int status) {
+    text = sqlite3_errmsg(db);
+    return trouble_of_reading(status);
+  };
   std::int64_t version = 0, application = 0, tables = 0;
   int status = query(db, "PRAGMA user_version", version);
   if (status == SQLITE_ROW) status = query(db, "PRAGMA application_id", application);
   if (status == SQLITE_ROW) status = query(db, "SELECT count(*) FROM sqlite_schema", tables);
-  if (status != SQLITE_ROW) {
-    text = sqlite3_errmsg(db);
-    // A plain error here: a format that SQLite does not know.
-    return status == SQLITE_ERROR ? HistoryTrouble::kCorrupt : trouble_of(status);
-  }
+  if (status != SQLITE_ROW) return failed(status);
   fresh = version == 0 && application == 0 && tables == 0;
   if (fresh) return HistoryTrouble::kNone;
   if (application != kApplicationId) {
@@ -250,20 +343,22 @@ HistoryTrouble inspect(sqlite3* db, bool& fresh, std::string& text) {
   std::int64_t known = 0;
   const std::string schema =
       "SELECT count(*) FROM sqlite_schema WHERE sql = '" + std::string(kSchema) + "'";
-  if (query(db, schema.c_str(), known) != SQLITE_ROW || known != 1) {
+  status = query(db, schema.c_str(), known);
+  if (status != SQLITE_ROW) return failed(status);
+  if (known != 1) {
     text = "its table is not that of version " + std::to_string(kHistoryVersion);
     return HistoryTrouble::kCorrupt;
   }
   Statement check(db, "PRAGMA integrity_check(1)");
   status = check.step();
-  const auto* found = status == SQLITE_ROW
-                          ? reinterpret_cast<const char*>(sqlite3_column_text(check.get(), 0))
-                          : nullptr;
-  if (version != kHistoryVersion || found == nullptr || std::strcmp(found, "ok") != 0) {
-    text = found == nullptr ? sqlite3_errmsg(db) : found;
+  if (status != SQLITE_ROW) return failed(status);
+  const auto* found = reinterpret_cast<const char*>(sqlite3_column_text(check.get(), 0));
+  if (found == nullptr) return failed(SQLITE_NOMEM);
+  if (version != kHistoryVersion || std::strcmp(found, "ok") != 0) {
+    text = found;
     // SQLite's own report has several lines; an error is one.
     std::replace(text.begin(), text.end(), '\n', ' ');
-    return HistoryTrouble::kCorrupt;
+    return trouble_of_report(text);
   }
   return HistoryTrouble::kNone;
 }
@@ -272,6 +367,13 @@ bool has_content(const std::string& path) {
   struct stat status {};
   return stat(path.c_str(), &status) == 0 && status.st_size > 0;
 }
+
+// Something else than a file has the name: SQLite would wait at a FIFO for ever.
+bool is_no_file(const std::string& path) {
+  struct stat status {};
+  return stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);
+}
+HistoryDb::Opened no_file() { return {nullptr, HistoryTrouble::kMissing, "it is no regular file"}; }
 
 // SQLite says only that it could not; an operator wants to know why. mode: what it needs of path.
 std::string why_not_opened(sqlite3* db, const std::string& path, int mode) {
@@ -296,24 +398,6 @@ std::string escaped(const std::string& path) {
 
 }  // namespace
 
-const char* direction_name(Direction direction) {
-  return direction == Direction::kDrive ? "Drive" : "Overrun";
-}
-const char* end_stop_name(EndStop end_stop) {
-  return end_stop == EndStop::kLow ? "Low" : "Overdrive";
-}
-const char* kind_name(PeakKind kind) {
-  switch (kind) {
-    case PeakKind::kValue:
-      return "Value";
-    case PeakKind::kLowerBound:
-      return "LowerBound";
-    case PeakKind::kNone:
-      break;
-  }
-  return "None";
-}
-
 estimator::BeltExperiment belt_experiment(const HistoryRow& row) {
   estimator::BeltExperiment each;
   const ExperimentResult& result = row.result;
@@ -329,11 +413,16 @@ estimator::BeltExperiment belt_experiment(const HistoryRow& row) {
   each.omega_p_rad_s = result.omega_p_rad_s;
   each.torque_Nm = result.torque_Nm;
   each.oil_degC = result.oil_degC;
+  each.slipped = (row.notes & note_bit(estimator::Note::kSlipped)) != 0;
+  if (result.clamp_force_N > 0.0) {
+    each.carried_Nm_per_N = std::abs(result.torque_Nm) / result.clamp_force_N;
+  }
   return each;
 }
 
 HistoryDb::Opened HistoryDb::open(const std::string& path) {
   Opened opened;
+  if (is_no_file(path)) return no_file();
   sqlite3* db = nullptr;
   int status = sqlite3_open_v2(
       path.c_str(), &db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, nullptr);
@@ -383,6 +472,7 @@ HistoryDb::Opened HistoryDb::open(const std::string& path) {
 
 HistoryDb::Opened HistoryDb::open_to_read(const std::string& path) {
   Opened opened;
+  if (is_no_file(path)) return no_file();
   sqlite3* db = nullptr;
   // Without anything in the write-ahead log the file is complete by itself, and SQLite needs no
   // files beside it, which it may not be allowed to make.
@@ -444,7 +534,14 @@ HistoryContent HistoryDb::read() {
     last = stored.id;
     if (whole) content.rows.push_back(*good);
   }
-  if (status != SQLITE_DONE) ++content.damaged;
+  if (status == SQLITE_DONE) return content;
+  const HistoryTrouble trouble = trouble_of_reading(status);
+  if (trouble == HistoryTrouble::kCorrupt) {
+    ++content.damaged;
+  } else {
+    content.trouble = trouble;
+    content.text = sqlite3_errmsg(db_);
+  }
   return content;
 }
 

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core/experiment.h"
-#include "estimator/belt_history.h"
+#include "daemon/core/experiment/experiment.h"
+#include "estimator/belt/belt_history.h"
 
 struct sqlite3;
 
@@ -29,23 +29,21 @@ struct HistoryRow {
 };
 estimator::BeltExperiment belt_experiment(const HistoryRow& row);
 
-// Names as the file has them.
-const char* direction_name(estimator::Direction direction);
-const char* end_stop_name(estimator::EndStop end_stop);
-const char* kind_name(estimator::PeakKind kind);
-
 enum class HistoryTrouble {
   kNone,
   kMissing,     // no such file, or it cannot be opened
   kCorrupt,     // no SQLite file, damaged, or not a history
   kNewer,       // schema of a later version
   kReadOnly,    // can be read but not written
-  kNotWritten,  // disk full, I/O error
+  kNotWritten,  // disk full, I/O error, no memory, another has it: may pass
 };
 
 struct HistoryContent {
   std::vector<HistoryRow> rows;  // whose checksum is right, by id
   std::int64_t damaged = 0;      // rows whose checksum is wrong, and gaps in the sequence
+  // Reading ended early, though nothing says that the file is damaged.
+  HistoryTrouble trouble = HistoryTrouble::kNone;
+  std::string text;  // what SQLite says then
 };
 
 class HistoryDb {

@@ -1,5 +1,6 @@
 #include "daemon/io/history_keeper.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <system_error>
@@ -39,16 +40,21 @@ void HistoryKeeper::open_file() {
     set_aside(opened.text);
     return;
   }
-  if (opened.db != nullptr && experiments_.empty()) {
+  if (opened.db != nullptr && !adopted_) {
     const HistoryContent content = opened.db->read();
-    if (content.damaged > 0) {
+    if (content.trouble != HistoryTrouble::kNone) {
+      opened.db.reset();
+      opened.trouble = content.trouble;
+      opened.text = content.text;
+    } else if (content.damaged > 0) {
       opened.db.reset();
       set_aside(std::to_string(content.damaged) + " rows are damaged");
       return;
+    } else {
+      const std::size_t own = adopt(content);
+      say_(false, path_ + ": " + std::to_string(content.rows.size()) + " experiments, " +
+                      std::to_string(own) + " of them under this configuration");
     }
-    adopt(content);
-    say_(false, path_ + ": " + std::to_string(content.rows.size()) + " experiments, " +
-                    std::to_string(experiments_.size()) + " of them under this configuration");
   }
   switch (opened.trouble) {
     case HistoryTrouble::kNone:
@@ -92,29 +98,61 @@ void HistoryKeeper::set_aside(const std::string& why) {
   old.db.reset();
   HistoryDb::Opened fresh = HistoryDb::open(path_);
   db_ = fresh.trouble == HistoryTrouble::kNone ? std::move(fresh.db) : nullptr;
-  std::size_t copied = 0;
+  if (!adopted_) adopt(content);
+  std::vector<HistoryRow> unwritten;
   std::string reason;
   for (HistoryRow row : content.rows) {
-    if (db_ != nullptr && db_->append(row, reason)) {
-      ++copied;
-    } else {
-      waiting_.push_back(row);
-    }
+    if (db_ == nullptr || !db_->append(row, reason)) unwritten.push_back(row);
   }
-  if (experiments_.empty()) adopt(content);
+  // They are older than what waits.
+  waiting_.insert(waiting_.begin(), unwritten.begin(), unwritten.end());
+  const std::size_t copied = content.rows.size() - unwritten.size();
   say_(true, path_ + ": found a damaged history (" + why + "); it is kept as " + aside + ", " +
                  std::to_string(copied) + " of its experiments are in a new one");
 }
 
-void HistoryKeeper::adopt(const HistoryContent& content) {
+// What the file has of this fingerprint, and how much that is; after it what waits for the file: it
+// was measured later, and is judged by what was there before.
+std::size_t HistoryKeeper::adopt(const HistoryContent& content) {
+  experiments_.clear();
+  notes_ = 0;
+  adopted_ = true;
   for (const HistoryRow& row : content.rows) {
     if (row.fingerprint != fingerprint_) continue;
     experiments_.push_back(belt_experiment(row));
-    notes_ = row.notes;
+    note(row);
   }
-  if (experiments_.size() > kExperimentsMax) {
+  const std::size_t found = experiments_.size();
+  if (found > kExperimentsMax) {
     experiments_.erase(experiments_.begin(), experiments_.end() - kExperimentsMax);
   }
+  for (HistoryRow& row : waiting_) {
+    // An attempt that was reported as failed may have reached the disk after all.
+    const bool there =
+        std::any_of(content.rows.begin(), content.rows.end(), [&](const HistoryRow& each) {
+          return each.time_s == row.time_s && each.fingerprint == row.fingerprint;
+        });
+    if (row.fingerprint == fingerprint_ && !there) judge(row);
+  }
+  return found;
+}
+
+// The newest result: counts, and what those before it say of it is noted.
+void HistoryKeeper::judge(HistoryRow& row) {
+  experiments_.push_back(belt_experiment(row));
+  if (experiments_.size() > kExperimentsMax) experiments_.erase(experiments_.begin());
+  if (row.result.outcome == Outcome::kAborted) return;
+  row.notes |= estimator::notes_on_last(experiments_, row.time_s);
+  if (row.result.peak.contradictory || row.result.peak.impossible) {
+    row.notes |= note_bit(estimator::Note::kContradictory);
+  }
+  note(row);
+}
+
+// Only a measured value settles a doubt.
+void HistoryKeeper::note(const HistoryRow& row) {
+  const bool settles = row.result.outcome == Outcome::kCompleted;
+  notes_ = row.notes | (settles ? 0U : notes_ & estimator::kDoubts);
 }
 
 void HistoryKeeper::write_waiting() {
@@ -140,13 +178,8 @@ estimator::LearnedFriction HistoryKeeper::take(const ExperimentResult& result) {
   row.time_s = now_s_();
   row.fingerprint = fingerprint_;
   row.result = result;
-  experiments_.push_back(belt_experiment(row));
-  if (experiments_.size() > kExperimentsMax) experiments_.erase(experiments_.begin());
-  if (result.outcome != Outcome::kAborted) {
-    notes_ = estimator::notes_on_last(experiments_, row.time_s);
-    if (result.peak.contradictory) notes_ |= note_bit(estimator::Note::kContradictory);
-    row.notes = notes_;
-  }
+  if (result.slipped) row.notes |= note_bit(estimator::Note::kSlipped);
+  judge(row);
   if (!lost_) {
     if (waiting_.size() == kUnwrittenMax) waiting_.pop_front();
     waiting_.push_back(row);
@@ -158,12 +191,31 @@ estimator::LearnedFriction HistoryKeeper::take(const ExperimentResult& result) {
 estimator::LearnedFriction HistoryKeeper::change_fingerprint(const std::string& fingerprint) {
   if (fingerprint == fingerprint_) return learned();
   fingerprint_ = fingerprint;
-  experiments_.clear();
-  notes_ = 0;
   HistoryContent content;
-  if (db_ != nullptr) content = db_->read();
-  content.rows.insert(content.rows.end(), waiting_.begin(), waiting_.end());
+  HistoryTrouble trouble = HistoryTrouble::kNone;
+  if (db_ != nullptr) {
+    content = db_->read();
+    trouble = content.trouble;
+    if (trouble != HistoryTrouble::kNone) {
+      complain("the history cannot be read (" + content.text +
+               "); results are kept in memory, next attempt in a minute");
+    }
+  } else if (!lost_) {
+    // What cannot be written may still be read.
+    const HistoryDb::Opened opened = HistoryDb::open_to_read(path_);
+    trouble = opened.trouble;
+    if (trouble == HistoryTrouble::kNone) {
+      content = opened.db->read();
+      trouble = content.trouble;
+    }
+  }
+  if (trouble != HistoryTrouble::kNone) {
+    content.rows.clear();
+    db_.reset();
+  }
   adopt(content);
+  // Else at the next attempt.
+  adopted_ = trouble == HistoryTrouble::kNone;
   return learned();
 }
 
@@ -173,9 +225,10 @@ std::optional<estimator::LearnedFriction> HistoryKeeper::retry() {
   // A clock that was set back must not put the attempt off.
   if (std::abs(now_s - retried_s_) < kRetry_s) return std::nullopt;
   retried_s_ = now_s;
+  const bool adopted = adopted_;
   open_file();
   write_waiting();
-  if (db_ == nullptr) return std::nullopt;
+  if (db_ == nullptr && adopted_ == adopted) return std::nullopt;
   return learned();
 }
 

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core/port.h"
+#include "daemon/core/base/port.h"
 
 namespace beltgrip::daemon {
 

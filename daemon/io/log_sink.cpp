@@ -9,6 +9,8 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "can_dbc/text/printable.h"
+
 namespace beltgrip::daemon {
 
 namespace {
@@ -56,9 +58,9 @@ void LogSink::set_level(int level) {
 void LogSink::more() { set_level(static_cast<int>(logger_->log.level()) - 1); }
 void LogSink::less() { set_level(static_cast<int>(logger_->log.level()) + 1); }
 
-void LogSink::debug(const std::string& line) { logger_->log.debug(line); }
-void LogSink::info(const std::string& line) { logger_->log.info(line); }
-void LogSink::warning(const std::string& line) { logger_->log.warn(line); }
+void LogSink::debug(const std::string& line) { logger_->log.debug(can::printable(line)); }
+void LogSink::info(const std::string& line) { logger_->log.info(can::printable(line)); }
+void LogSink::warning(const std::string& line) { logger_->log.warn(can::printable(line)); }
 void LogSink::flush() { logger_->log.flush(); }
 
 void LogSink::event(const Event& event) {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core/event.h"
+#include "daemon/core/observe/event.h"
 
 namespace beltgrip::daemon {
 

@@ -3,8 +3,9 @@
 #include <charconv>
 #include <utility>
 
-#include "daemon/core/config_fingerprint.h"
-#include "daemon/core/own_frames.h"
+#include "daemon/core/config/config_fingerprint.h"
+#include "daemon/core/config/config_reload.h"
+#include "daemon/core/publish/own_frames.h"
 #include "daemon/io/rt_setup.h"
 
 namespace beltgrip::daemon {
@@ -65,11 +66,12 @@ std::vector<WantedFrames> wanted_frames(const Config& config) {
   return wanted;
 }
 
-Reloader::Reloader(std::string path, const Config& running, ReloadSlot& slot, Say say)
-    : path_(std::move(path)), running_(running), slot_(slot), say_(std::move(say)) {}
+Reloader::Reloader(std::string path, const Config& running, ReloadSlot& slot, BusClaim* claim,
+                   Say say)
+    : path_(std::move(path)), running_(running), slot_(slot), claim_(claim), say_(std::move(say)) {}
 
 bool Reloader::request() {
-  const ConfigResult loaded = load_config(path_);
+  const ConfigResult loaded = reload_config(path_);
   std::string wrong;
   if (!loaded.config) {
     wrong = loaded.errors.front().text;
@@ -77,27 +79,45 @@ bool Reloader::request() {
     if (more > 0) wrong += " (and " + std::to_string(more) + " more)";
   } else if (wrong = needs_restart(running_, *loaded.config); !wrong.empty()) {
     wrong = path_ + ": " + wrong;
+  } else if (claim_ != nullptr && !claim_->add(loaded.config->identifiers)) {
+    wrong = path_ + ": " + claim_->refused();
   }
   if (!loaded.config || !wrong.empty()) {
     say_(true, "reload refused, the old configuration stays: " + wrong);
     return false;
   }
   const Config& config = *loaded.config;
-  const bool same_belt = config_fingerprint(config) == config_fingerprint(running_);
   std::unique_ptr<Reload> reload(
-      new Reload{config, wanted_frames(config), same_belt, Pipeline(config)});
+      new Reload{config, wanted_frames(config), false, Pipeline(config)});
+  if (const std::string assumed = assumed_text(config); !assumed.empty()) say_(false, assumed);
   // What the real-time thread is about to touch.
   if (std::string memory; !lock_memory(memory)) say_(false, "reload: " + memory);
-  slot_.offer(std::move(reload));
+  if (waiting_ && slot_.offer(nullptr) == nullptr) {
+    next_ = std::move(reload);  // what waited was taken meanwhile
+  } else {
+    offer(std::move(reload));
+  }
   waiting_ = true;
   return true;
+}
+
+// Nothing is on its way to the real-time thread or back: running_ is what it replaces.
+void Reloader::offer(std::unique_ptr<Reload> reload) {
+  reload->keeps_results = config_fingerprint(reload->config) == config_fingerprint(running_);
+  slot_.offer(std::move(reload));
 }
 
 bool Reloader::turn() {
   const std::unique_ptr<Reload> taken = slot_.collect();
   if (taken == nullptr) return false;
   running_ = taken->config;
-  waiting_ = false;
+  waiting_ = next_ != nullptr;
+  // The identifiers of one that waits are claimed too.
+  if (waiting_) {
+    offer(std::move(next_));
+  } else if (claim_ != nullptr) {
+    claim_->keep(running_.identifiers);
+  }
   say_(false, "reload: " + path_ + " is in force");
   return true;
 }

@@ -5,7 +5,8 @@
 #include <array>
 #include <charconv>
 
-#include "daemon/core/event.h"
+#include "daemon/core/observe/event.h"
+#include "daemon/core/publish/names.h"
 
 namespace beltgrip::daemon {
 

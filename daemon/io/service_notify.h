@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "daemon/core/observation.h"
+#include "daemon/core/observe/observation.h"
 
 namespace beltgrip::daemon {
 

@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "daemon/core/port.h"
+#include "daemon/core/base/port.h"
 #include "daemon/io/can_socket.h"
 
 namespace beltgrip::daemon {

@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-#include "daemon/core/mono_time.h"
+#include "daemon/core/base/mono_time.h"
 
 namespace beltgrip::daemon {
 

@@ -11,8 +11,9 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "daemon/core/arming.h"
-#include "daemon/core/event.h"
+#include "daemon/core/experiment/arming.h"
+#include "daemon/core/observe/event.h"
+#include "daemon/core/publish/names.h"
 
 namespace beltgrip::daemon {
 
@@ -20,7 +21,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;  // NaN and infinity become null
 
-constexpr std::array<const char*, 4> kPhases{"Quiet", "Excited", "Peak", "MacroSlip"};
 constexpr std::array<const char*, 6> kQualities{"valid", "learning", "frozen",
                                                 "stale", "missing",  "unbound"};
 // By can::Dimension.
@@ -67,6 +67,7 @@ Json result(MonoTime now, const ExperimentResult& last) {
   const bool bound = peak.kind == estimator::PeakKind::kLowerBound;
   return {{"outcome", outcome_name(last.outcome)},
           {"stop_reason", stop_reason_name(last.stop_reason)},
+          {"reason", cause_text(last.stop_reason, last.cause)},
           {"age_s", seconds(now - last.end)},
           {"mu_max", value ? Json(peak.mu_max) : Json()},
           {"mu_max_std", value ? Json(peak.mu_max_std) : Json()},
@@ -108,7 +109,7 @@ std::string status_json(const Config& config, MonoTime now, const Observation& o
       {"control", config.control == Control::kCommand ? "command" : "observe"},
       {"age_s", seconds(now - observation.t)},
       {"state", state_name(report.state)},
-      {"phase", kPhases[static_cast<std::size_t>(curve.phase)]},
+      {"phase", phase_name(curve.phase)},
       {"in_experiment", report.in_experiment},
       {"macro_slip_stop", report.macro_slip_stop},
       {"request_force_N", report.request_force_N},

@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "daemon/core/config.h"
-#include "daemon/core/observation.h"
+#include "daemon/core/config/config.h"
+#include "daemon/core/observe/observation.h"
 
 namespace beltgrip::daemon {
 

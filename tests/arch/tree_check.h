@@ -19,8 +19,8 @@ std::vector<SourceFile> read_tree(const std::string& root);
 // One line for each violation: "path:line: what (why)".
 std::vector<std::string> check_tree(const std::vector<SourceFile>& files);
 
-// Packages of tools/packages.txt that `readme` does not name in backticks.
-std::vector<std::string> packages_not_in(std::string_view package_list, std::string_view readme);
+// Documents (.md, .txt) that a text names in backticks, each once.
+std::vector<std::string> documents_named_in(const std::string& text);
 
 // C++ text with comments and the insides of string and character literals replaced by spaces;
 // line breaks stay. Include lines keep their file name.

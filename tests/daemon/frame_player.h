@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/core/loop.h"
-#include "daemon/core/port.h"
+#include "daemon/core/base/port.h"
+#include "daemon/core/loop/loop.h"
 
 namespace beltgrip::test {
 

@@ -59,7 +59,7 @@ trigger = "always"
 namespace {
 
 constexpr double kRpm = std::numbers::pi / 30.0;
-constexpr double kArea_m2 = 0.0113, kSpring_N = 500.0, kRadius_m = 0.0784, kRatio = 2.25;
+constexpr double kRatio = 2.25;
 constexpr double kPrimary_rad_s = 105.0;
 const double kCos = std::cos(11.0 * std::numbers::pi / 180.0);
 
@@ -109,10 +109,36 @@ std::string two_bus_toml() {
                      "diagnostics = \"poll\"\n[bus.diag]\ninterface = \"can1\"\n");
 }
 
-daemon::Config vehicle_config(const std::string& toml) {
+std::string stated(std::string toml) {
+  const auto state = [&](const std::string& section, const std::string& key,
+                         const std::string& value) {
+    const std::string header = "[" + section + "]\n";
+    if (toml.find(header) == std::string::npos) toml += header;
+    const std::size_t begin = toml.find(header) + header.size();
+    const std::size_t end = std::min(toml.find("\n[", begin), toml.size());
+    const std::string body = "\n" + toml.substr(begin, end - begin);
+    if (body.find("\n" + key + " =") == std::string::npos) {
+      toml.insert(begin, key + " = " + value + "\n");
+    }
+  };
+  state("sensors", "primary_speed", "{ bias_rad_s = 0, gain = 0 }");
+  state("sensors", "secondary_speed", "{ bias_rad_s = 0, gain = 0 }");
+  state("sensors", "secondary_pressure", "{ bias_Pa = 0, gain = 0 }");
+  state("sensors", "engine_torque", "{ bias_Nm = 0, gain = 0 }");
+  state("variator", "primary_radius_overdrive_m", "0.0784");
+  state("variator", "primary_radius_low_m", "0.0324");
+  state("variator", "secondary_piston_area_m2", "0.0113");
+  state("variator", "secondary_spring_force_N", "500");
+  state("variator", "secondary_centrifugal_N_s2", "0");
+  state("variator", "primary_inertia_kg_m2", "0");
+  return toml;
+}
+
+daemon::Config vehicle_config(const std::string& toml, const std::string& dbc) {
   TemporaryDirectory directory;
-  directory.write("vehicle.dbc", kVehicleDbc);
-  const daemon::ConfigResult result = daemon::load_config(directory.write("beltgripd.toml", toml));
+  directory.write("vehicle.dbc", dbc);
+  const daemon::ConfigResult result =
+      daemon::load_config(directory.write("beltgripd.toml", stated(toml)));
   for (const auto& error : result.errors) ADD_FAILURE() << error.text;
   for (const auto& warning : result.warnings) ADD_FAILURE() << warning;
   return result.config.value();
@@ -143,7 +169,7 @@ can::CanFrame flags_frame(bool experiment_active) {
 std::vector<can::StampedFrame> drive_frames(const Drive& drive) {
   constexpr double kStep_s = 0.001;
   constexpr double kTorque_Nm = 50.0;
-  std::mt19937_64 random(7);
+  std::mt19937_64 random(drive.seed);
   std::normal_distribution<double> normal;
   const auto noisy = [&](double value, double deviation) {
     return drive.noise ? value + deviation * normal(random) : value;
@@ -157,26 +183,37 @@ std::vector<can::StampedFrame> drive_frames(const Drive& drive) {
   const double sign = drive.overrun ? -1.0 : 1.0;
   const auto steps = static_cast<int>(drive.duration_s / kStep_s);
   for (int step = 0; step < steps; ++step) {
-    force_N = std::max(force_N - drive.ramp_N_per_s * kStep_s, 1000.0);
-    const double needed = kTorque_Nm * kCos / (2.0 * kRadius_m * force_N);
+    // Without pressure, spring and turning oil still clamp.
+    const double omega_s = kPrimary_rad_s * kRatio * (1.0 - sign * slip);
+    const double oil_N = drive.centrifugal_N_s2 * omega_s * omega_s;
+    const double least_N = std::max(1000.0, drive.spring_force_N + oil_N);
+    force_N = std::max(force_N - drive.ramp_N_per_s * kStep_s, least_N);
+    const double radius_m = drive.primary_radius_m;
+    const double needed = kTorque_Nm * kCos / (2.0 * radius_m * force_N);
     // Below the peak the belt carries the torque with the slip that this takes; beyond it slips
     // faster and faster, and the friction falls a little.
     double mu = needed;
-    if (needed < kTrueMuMax && slip <= 0.02) {
-      slip = 0.02 * std::atanh(needed / kTrueMuMax * std::tanh(2.2)) / 2.2;
+    if (needed < drive.mu_max && slip <= 0.02) {
+      slip = 0.02 * std::atanh(needed / drive.mu_max * std::tanh(2.2)) / 2.2;
     } else {
       slip = std::min(slip + 0.05 * kStep_s, 0.15);
-      mu = kTrueMuMax - 0.15 * std::max(slip - 0.02, 0.0);
+      mu = drive.mu_max - 0.15 * std::max(slip - 0.02, 0.0);
     }
-    const double torque = mu * 2.0 * kRadius_m * force_N / kCos;
+    const double torque = mu * 2.0 * radius_m * force_N / kCos;
     const std::int64_t t = drive.start_ns + std::int64_t{step} * 1'000'000;
     if (step % 10 == 0) {
       const double ratio = kRatio * (1.0 - sign * slip);
       add(t, speeds_frame(noisy(kPrimary_rad_s, 0.02), noisy(kPrimary_rad_s * ratio, 0.04)));
     }
-    if (step % 10 == 3) add(t + 200'000, torque_frame(noisy(sign * torque, 0.1)));
+    if (step % 10 == 3)
+      add(t + 200'000, torque_frame(noisy(
+                           sign * torque * (1.0 + drive.torque_gain) + drive.torque_bias_Nm, 0.1)));
     if (step % 20 == 5) {
-      add(t + 400'000, pressure_frame(noisy((force_N - kSpring_N) / kArea_m2, 500.0)));
+      add(t + 400'000, pressure_frame(noisy((1.0 + drive.pressure_gain) *
+                                                    (force_N - drive.spring_force_N - oil_N) /
+                                                    drive.piston_area_m2 +
+                                                drive.pressure_bias_Pa,
+                                            500.0)));
     }
     if (step % 50 == 7) {
       const auto now = static_cast<std::uint32_t>(step);

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "can_dbc/can_frame.h"
-#include "daemon/core/config.h"
+#include "can_dbc/frame/can_frame.h"
+#include "daemon/core/config/config.h"
 
 namespace beltgrip::test {
 
@@ -39,8 +39,13 @@ std::string signalled_toml();
 // And with the pressure asked for by diagnostics on can1.
 std::string two_bus_toml();
 
-// The configuration, loaded from files as the daemon does; fails the test on any error.
-daemon::Config vehicle_config(const std::string& toml = kVehicleToml);
+// With every key of [sensors] and [variator] that a result rests on, where it is not there: nothing
+// is assumed.
+std::string stated(std::string toml);
+
+// The configuration, stated(), loaded from files as the daemon does; fails the test on any error.
+daemon::Config vehicle_config(const std::string& toml = kVehicleToml,
+                              const std::string& dbc = kVehicleDbc);
 
 constexpr double kTrueMuMax = 0.105;
 
@@ -52,6 +57,12 @@ struct Drive {
   bool overrun = false;  // the vehicle drives the engine
   std::int64_t start_ns = 1'000'000'000;
   std::uint32_t active_from_ms = 0, active_to_ms = 0;  // flag experiment_active
+  std::uint64_t seed = 7;
+  // The car itself, and what its sensors add.
+  double piston_area_m2 = 0.0113, spring_force_N = 500.0, centrifugal_N_s2 = 0.0;
+  double primary_radius_m = 0.0784;
+  double mu_max = kTrueMuMax;
+  double torque_bias_Nm = 0.0, torque_gain = 0.0, pressure_bias_Pa = 0.0, pressure_gain = 0.0;
 };
 
 // All frames of a drive, in order of time.

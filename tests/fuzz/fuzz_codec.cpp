@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "can_dbc/signal_codec.h"
-#include "tests/can_dbc/naive_codec.h"
+#include "can_dbc/dbc/signal_codec.h"
+#include "tests/can_dbc/dbc/naive_codec.h"
 
 namespace {
 

@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <string>
 
-#include "daemon/core/config.h"
-#include "daemon/core/config_options.h"
+#include "daemon/core/config/config.h"
+#include "daemon/core/config/config_options.h"
 
 namespace {
 

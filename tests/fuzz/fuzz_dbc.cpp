@@ -7,10 +7,10 @@
 #include <cstdlib>
 #include <string>
 
-#include "can_dbc/dbc_parser.h"
-#include "can_dbc/message_codec.h"
-#include "can_dbc/message_index.h"
-#include "can_dbc/text_encoding.h"
+#include "can_dbc/dbc/message_codec.h"
+#include "can_dbc/dbc/message_index.h"
+#include "can_dbc/dbc/parser.h"
+#include "can_dbc/text/encoding.h"
 
 namespace {
 

@@ -12,8 +12,8 @@
 #include <filesystem>
 #include <string>
 
-#include "daemon/core/config.h"
-#include "daemon/core/pipeline.h"
+#include "daemon/core/config/config.h"
+#include "daemon/core/loop/pipeline.h"
 
 namespace {
 

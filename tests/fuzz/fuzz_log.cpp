@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "can_dbc/can_log.h"
+#include "can_dbc/log/can_log.h"
 
 namespace {
 

@@ -7,9 +7,9 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "daemon/core/config.h"
-#include "daemon/core/input_monitor.h"
-#include "daemon/core/tx_gate.h"
+#include "daemon/core/config/config.h"
+#include "daemon/core/guard/tx_gate.h"
+#include "daemon/core/input/input_monitor.h"
 
 namespace {
 

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "daemon/core/loop.h"
+#include "daemon/core/loop/loop.h"
 #include "tests/loop/detectable.h"
 #include "tests/support/invariants.h"
 #include "tools/sim/resources.h"
@@ -41,8 +41,7 @@ double largest(const std::vector<double>& bins, double begin_s, double end_s) {
 
 constexpr std::uint32_t kClamp = 0x6A2;
 
-// One sample (G4), and what rounding may add.
-constexpr double kReaction_s = 0.005 + 1e-6;
+constexpr double kRounding_s = 1e-6;
 
 void mix(std::uint64_t& hash, std::uint64_t value) { hash = (hash ^ value) * 1099511628211U; }
 
@@ -54,11 +53,12 @@ bool has_fault(const sim::VehicleScenario& scenario, sim::FaultKind kind) {
 // Passes reports on to the invariants and keeps what a test asks for.
 class Recorder final : public daemon::SampleSink {
  public:
-  Recorder(const sim::VehiclePort& port, const daemon::Pipeline& pipeline,
+  Recorder(const sim::VehiclePort& port, daemon::Pipeline& pipeline, double sample_s,
            const Detectable& detectable, const double& inactive_s, Invariants& invariants,
            LoopRun& run)
       : port_(port),
         pipeline_(pipeline),
+        sample_s_(sample_s),
         // A loop that is not run, or stamps that lie, cannot be held to the clock of the frames.
         on_time_(!has_fault(port.vehicle().scenario(), sim::FaultKind::kLoopLate) &&
                  !has_fault(port.vehicle().scenario(), sim::FaultKind::kStampBack)),
@@ -70,14 +70,49 @@ class Recorder final : public daemon::SampleSink {
     if (port_.daemon_is_dead()) return;
     invariants_.on_report(report);
     check_counters();
-    if (report.new_result) run_.results.push_back(report.result);
+    if (report.new_result) {
+      run_.results.push_back(report.result);
+      learn(report);
+    }
     check_reaction(static_cast<double>(report.t) * 1e-9, report.request_force_N > 0.0);
     if (report.state == daemon::State::kSettling) run_.inhibits |= report.inhibits;
     run_.faults |= report.faults;
+    if (report.frozen && run_.frozen.empty()) {
+      run_.frozen = std::string(daemon::role_name(*report.frozen)) + " at " +
+                    std::to_string(static_cast<double>(report.t) * 1e-9) + " s";
+    }
     run_.last_state = report.state;
   }
 
  private:
+  // As the daemon's history, which keeps every result.
+  void learn(const daemon::SampleReport& report) {
+    constexpr double kEpoch_s = 1.7e9;
+    const daemon::ExperimentResult& result = report.result;
+    if (result.outcome == daemon::Outcome::kAborted) return;
+    estimator::BeltExperiment row;
+    row.time_s = kEpoch_s + static_cast<double>(report.t) * 1e-9;
+    row.kind = result.peak.kind;
+    row.mu_max = result.peak.mu_max;
+    row.mu_max_std = result.peak.mu_max_std;
+    row.ci95_low = result.peak.ci95_low;
+    row.ci95_high = result.peak.ci95_high;
+    row.sensor_std = result.sensor_std;
+    row.direction = result.direction;
+    row.end_stop = result.end_stop;
+    row.omega_p_rad_s = result.omega_p_rad_s;
+    row.torque_Nm = result.torque_Nm;
+    row.oil_degC = result.oil_degC;
+    row.slipped = result.slipped;
+    if (result.clamp_force_N > 0.0) {
+      row.carried_Nm_per_N = std::abs(result.torque_Nm) / result.clamp_force_N;
+    }
+    rows_.push_back(row);
+    const estimator::LearnedFriction learned = estimator::learn(rows_, row.time_s);
+    pipeline_.learn(learned);
+    invariants_.on_learned(learned);
+  }
+
   void check_counters() {
     const daemon::PipelineCounters& now = pipeline_.counters();
     if (now.frames < counters_.frames || now.frames_decoded < counters_.frames_decoded ||
@@ -93,7 +128,8 @@ class Recorder final : public daemon::SampleSink {
     if ((asks || asked_) && on_time_) {
       if (const auto reason = detectable_.at(t_s)) {
         if (asks && !asked_) run_.broken["I1"] = "a request begins in spite of: " + reason->what;
-        if (asks && t_s - reason->since_s > kReaction_s) {
+        // One sample (G4).
+        if (asks && t_s - reason->since_s > sample_s_ + kRounding_s) {
           run_.broken["G4"] = "a request stands " + std::to_string(t_s - reason->since_s) +
                               " s after: " + reason->what;
         }
@@ -104,7 +140,9 @@ class Recorder final : public daemon::SampleSink {
   }
 
   const sim::VehiclePort& port_;
-  const daemon::Pipeline& pipeline_;
+  daemon::Pipeline& pipeline_;
+  std::vector<estimator::BeltExperiment> rows_;
+  double sample_s_;
   daemon::PipelineCounters counters_;
   bool on_time_;
   const Detectable& detectable_;
@@ -171,7 +209,8 @@ LoopRun run_closed(const sim::VehicleScenario& scenario, const daemon::Config& c
   observers.on_unsent = [&invariants] { invariants.on_unsent(); };
   sim::VehiclePort port(scenario, seed, observers);
   daemon::Pipeline pipeline(config);
-  Recorder recorder(port, pipeline, detectable, inactive_s, invariants, run);
+  Recorder recorder(port, pipeline, 1.0 / config.estimator.sample_rate_hz, detectable, inactive_s,
+                    invariants, run);
   daemon::run_loop(port, pipeline, config.estimator.sample_rate_hz,
                    estimator::StopReason::kShutdown, &recorder);
   port.run_alone();

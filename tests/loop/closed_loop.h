@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core/config.h"
-#include "daemon/core/experiment.h"
+#include "daemon/core/config/config.h"
+#include "daemon/core/experiment/experiment.h"
 #include "tools/sim/vehicle_simulation.h"
 
 namespace beltgrip::test {
@@ -34,6 +34,7 @@ struct LoopRun {
   std::vector<Reaction> reactions;
   std::uint32_t inhibits = 0;  // all that were ever set once a trigger was near
   std::uint32_t faults = 0;    // all that were ever set
+  std::string frozen;          // what was first found to stand still, and when
   daemon::State last_state = daemon::State::kInhibited;
   std::uint64_t sent_hash = 1469598103934665603U;  // of every byte on the bus and its instant
   int stalls = 0;

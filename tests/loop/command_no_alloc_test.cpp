@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "daemon/core/pipeline.h"
+#include "daemon/core/loop/pipeline.h"
 #include "tests/loop/closed_loop.h"
 #include "tests/loop/recorded_drive.h"
 #include "tests/support/alloc_guard.h"

@@ -14,6 +14,7 @@ namespace {
 constexpr double kNever = 1e9;
 constexpr double kStale_s = 0.05, kStalePeriods = 2.5;
 constexpr double kConfirmation_s = 0.020;
+constexpr double kForeign_s = 10.0;
 constexpr double kRounding = 1e-6;
 constexpr std::uint32_t kBusOff = 0x40, kRestarted = 0x100;
 constexpr std::uint32_t kFirstOwn = 0x6A0, kLastOwn = 0x6A3, kClamp = 0x6A2;
@@ -128,7 +129,11 @@ void Detectable::on_received(const daemon::RxFrame& received) {
     return;
   }
   if (frame.id.value >= kFirstOwn && frame.id.value <= kLastOwn) {
-    if (!received.own_echo) foreign_s_ = std::min(foreign_s_, t_s);
+    if (!received.own_echo) {
+      // Forgotten after a while without another.
+      if (t_s >= foreign_until_s_) foreign_s_ = t_s;
+      foreign_until_s_ = t_s + kForeign_s;
+    }
     if (received.own_echo && frame.id.value == kClamp) unconfirmed_s_ = kNever;
     return;
   }
@@ -159,7 +164,7 @@ std::optional<Detectable::Reason> Detectable::at(double t_s) const {
   const auto offer = [&](double since_s, const std::string& what) {
     if (since_s <= t_s && (!first || since_s < first->since_s)) first = Reason{since_s, what};
   };
-  offer(foreign_s_, "foreign sender");
+  if (t_s < foreign_until_s_) offer(foreign_s_, "foreign sender");
   offer(off_s_, "bus off");
   offer(unconfirmed_s_ + kConfirmation_s, "no confirmation");
   for (const Message& message : messages_) {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "can_dbc/signal_codec.h"
-#include "daemon/core/config.h"
-#include "daemon/core/port.h"
+#include "can_dbc/dbc/signal_codec.h"
+#include "daemon/core/base/port.h"
+#include "daemon/core/config/config.h"
 
 namespace beltgrip::test {
 
@@ -61,6 +61,7 @@ class Detectable {
   std::vector<Signal> signals_;
   std::vector<Message> messages_;
   double foreign_s_ = 1e9;
+  double foreign_until_s_ = 0.0;
   double off_s_ = 1e9;
   double unconfirmed_s_ = 1e9;
 };

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "daemon/core/own_frames.h"
+#include "daemon/core/publish/own_frames.h"
 
 namespace beltgrip::test {
 namespace {
@@ -39,6 +39,12 @@ class Player {
     report_.t = 100 * daemon::kSecond;
     report_.sample.omega_p_rad_s = 140.0;
     report_.sample.omega_s_rad_s = 315.0;
+    announce();
+  }
+  // The inactive frames before a request.
+  void announce(int frames = 5) {
+    inactive_left_ = frames;
+    play(frames, 0.0);
   }
 
   void play(int samples, double force_N, double fall_N = 0.0, const Change& change = {}) {
@@ -87,9 +93,21 @@ TEST(Invariants, AQuietRequestBreaksNone) {
   Player player;
   player.play(400, 3000.0, 1.0);
   player.play(600, 0.0);
+  player.announce();
   player.play(100, 2500.0, 1.0);
   player.play(20, 0.0);
   EXPECT_EQ(player.all(), "");
+}
+
+TEST(Invariants, ARequestNeedsFiveInactiveFramesBeforeIt) {
+  for (const int frames : {0, 4}) {
+    Player player;
+    player.play(400, 3000.0, 1.0);
+    player.play(600, 0.0);
+    if (frames > 0) player.announce(frames);
+    player.play(1, 2500.0);
+    EXPECT_TRUE(player.found("I5")) << frames;
+  }
 }
 
 TEST(Invariants, EachIsFoundAlone) {
@@ -210,6 +228,61 @@ TEST(Invariants, FramesOfResultAndStateSayWhatTheReportSays) {
     s.frames.push_back(count.frame_of(values));
   });
   EXPECT_TRUE(count.found("I13"));
+}
+
+TEST(Invariants, MinClampForceBelowWhatTheLastValueNeedsIsFound) {
+  for (const auto& [force_N, broken] : {std::pair{2000.0, true}, {2400.0, true}, {2444.0, false}}) {
+    Player player;
+    const double asked_N = force_N;
+    player.once([&](Player::Sample& s) {
+      s.report.new_result = true;
+      s.report.result.outcome = daemon::Outcome::kCompleted;
+      s.report.result.peak.kind = estimator::PeakKind::kValue;
+      s.report.result.peak.mu_max = 0.1;
+      s.report.curve.usable = s.report.sample.usable = true;
+      s.report.curve.torque_p_Nm = 30.0;
+      daemon::EstimateValues values;
+      values.kind = estimator::PeakKind::kValue;
+      values.mu_max = 0.1;
+      values.experiment_count = 1;
+      values.min_clamp_force_N = asked_N;  // 1.3 * 30 cos(11 deg) / (2 * 0.0784 * 0.1) = 2442 N
+      s.frames.push_back(player.frame_of(values));
+    });
+    EXPECT_EQ(player.found("I15"), broken) << force_N;
+  }
+}
+
+// A value, then an experiment in which the belt slips at less and gives none.
+TEST(Invariants, MinClampForceThatForgetsASlipIsFound) {
+  for (const auto& [force_N, broken] : {std::pair{2444.0, true}, {3200.0, true}, {3260.0, false}}) {
+    Player player;
+    const double asked_N = force_N;
+    const auto say = [&](Player::Sample& s, bool value, double min_clamp_N) {
+      s.report.new_result = true;
+      s.report.result.outcome =
+          value ? daemon::Outcome::kCompleted : daemon::Outcome::kInconclusive;
+      s.report.result.stop_reason = estimator::StopReason::kSlope;
+      s.report.result.peak.kind =
+          value ? estimator::PeakKind::kValue : estimator::PeakKind::kLowerBound;
+      s.report.result.peak.mu_max = value ? 0.1 : 0.06;
+      s.report.curve.usable = s.report.sample.usable = true;
+      s.report.curve.torque_p_Nm = 30.0;
+      daemon::EstimateValues values;
+      values.kind = estimator::PeakKind::kValue;
+      values.mu_max = 0.1;
+      values.experiment_count = 1;
+      values.min_clamp_force_N = min_clamp_N;
+      s.frames.push_back(player.frame_of(values));
+    };
+    player.once([&](Player::Sample& s) { say(s, true, 2444.0); });
+    player.once([&](Player::Sample& s) {
+      s.report.state = daemon::State::kRamping;
+      s.report.curve.usable = s.report.sample.usable = true;
+      s.report.curve.mu_star = 0.075;  // three quarters: 3257 N
+    });
+    player.once([&](Player::Sample& s) { say(s, false, asked_N); });
+    EXPECT_EQ(player.found("I15"), broken) << force_N;
+  }
 }
 
 TEST(Invariants, InObserveNoClampFrame) {

@@ -1,6 +1,6 @@
 #include "tests/loop/recorded_drive.h"
 
-#include "daemon/core/loop.h"
+#include "daemon/core/loop/loop.h"
 #include "tools/sim/vehicle_port.h"
 
 namespace beltgrip::test {

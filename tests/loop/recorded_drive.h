@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "daemon/core/config.h"
-#include "daemon/core/experiment.h"
-#include "daemon/core/port.h"
+#include "daemon/core/base/port.h"
+#include "daemon/core/config/config.h"
+#include "daemon/core/experiment/experiment.h"
 #include "tools/sim/vehicle_parameters.h"
 
 namespace beltgrip::test {

@@ -1,5 +1,6 @@
 #include "tests/support/invariants.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -60,6 +61,7 @@ void Invariants::on_unsent() {
 void Invariants::on_report(const daemon::SampleReport& now) noexcept {
   check_report(now);
   check_request(now);
+  follow_friction(now);
   check_frames(now);
   check_events(now);
   frames_.clear();
@@ -141,6 +143,13 @@ void Invariants::check_clamp(const can::CanFrame& frame, const daemon::SampleRep
     broken("I5", "another force in the frame");
   }
   if (!active && inactive_due_ > 0) --inactive_due_;
+  // What a controller needs that has only just come up.
+  if (now.t - last_clamp_ > 100 * kMs) inactive_before_ = 0;
+  if (active && inactive_before_ < 5 && !(before_.request_force_N > 0.0) &&
+      (now.faults & kGaps) == 0) {
+    broken("I5", "fewer than five inactive frames before a request");
+  }
+  inactive_before_ = active ? 0 : inactive_before_ + 1;
   if (active && asked_ && before_.request_force_N > 0.0 && now.t - last_clamp_ > 16 * kMs &&
       (now.faults & kGaps) == 0) {
     broken("I5", "a clamp frame is late");
@@ -221,6 +230,68 @@ void Invariants::check_estimate(const can::CanFrame& frame, const daemon::Sample
   results_ = count;
 }
 
+void Invariants::follow_friction(const daemon::SampleReport& now) {
+  const daemon::ExperimentResult& result = now.result;
+  if (now.state == State::kRamping && before_.state != State::kRamping) carried_ = 0.0;
+  if (now.state == State::kRamping && now.sample.usable && now.curve.usable) {
+    carried_ = std::max(carried_, std::abs(now.curve.mu_star));
+  }
+  if (!now.new_result) return;
+  const std::pair where{result.direction, result.end_stop};
+  if (result.outcome == daemon::Outcome::kCompleted) {
+    const double half = (result.peak.noise_high - result.peak.noise_low) / 2.0;
+    values_[where] = {result.peak.mu_max, result.peak.ci95_low, half / 1.96 / result.peak.mu_max,
+                      1.0};
+    return;
+  }
+  using estimator::StopReason;
+  const auto value = values_.find(where);
+  const bool slipped = result.stop_reason == StopReason::kSlope ||
+                       result.stop_reason == StopReason::kSlip ||
+                       result.stop_reason == StopReason::kSlipRate;
+  // Under assumed constants what is read is not what is published.
+  if (result.outcome != daemon::Outcome::kInconclusive || !slipped || value == values_.end() ||
+      config_.friction_is_assumed) {
+    return;
+  }
+  const double share = carried_ / value->second.mu_max;
+  if (share > 0.0 && share < 0.95) value->second.share = share;
+}
+
+// 0: nothing has been measured.
+double Invariants::friction_allowed(const daemon::SampleReport& now) const {
+  const auto found = values_.find({now.curve.direction, now.curve.end_stop});
+  if (found == values_.end()) return 0.0;
+  const Friction& last = found->second;
+  const bool low = config_.friction_is_assumed;
+  double allowed = low ? last.low : last.mu_max;
+  const estimator::FusedFriction& all = learned_.of(now.curve.direction, now.curve.end_stop);
+  const double noise = 1.96 * std::hypot(last.relative_noise, all.repeatability_percent / 100.0);
+  if (all.known && std::abs(std::log(last.mu_max / all.mu_max)) < 1.001 * noise) {
+    allowed = std::max(allowed, low ? all.ci95_low : all.mu_max);
+  }
+  return allowed * last.share;
+}
+
+void Invariants::check_min_clamp(const can::CanFrame& frame, const daemon::SampleReport& now) {
+  if (!now.curve.usable || !now.sample.usable) return;
+  const double allowed = friction_allowed(now);
+  constexpr unsigned kNotAvailable = 8191;
+  constexpr double kStep_N = 4.0, kMost_N = 32760.0;  // more cannot be said
+  const unsigned raw = (frame.data[6] >> 3U | static_cast<unsigned>(frame.data[7]) << 5U) & 0x1FFFU;
+  if (allowed <= 0.0 || raw == kNotAvailable) return;
+  const estimator::VariatorParameters& variator = config_.variator;
+  const double radius_m = now.curve.end_stop == estimator::EndStop::kLow
+                              ? variator.primary_radius_low_m
+                              : variator.primary_radius_overdrive_m;
+  const double needed_N = variator.safety_factor * std::abs(now.curve.torque_p_Nm) *
+                          std::cos(variator.half_wedge_angle_rad) / (2.0 * radius_m * allowed);
+  if (raw * kStep_N < std::min(needed_N, kMost_N) - 0.01) {
+    broken("I15",
+           "MinClampForce " + text(raw * kStep_N) + ", what was measured needs " + text(needed_N));
+  }
+}
+
 void Invariants::check_status(const can::CanFrame& frame, const daemon::SampleReport& now) {
   const unsigned state = frame.data[1] >> 4;
   const unsigned outcome = frame.data[2] & 3U, reason = frame.data[2] >> 2 & 31U;
@@ -252,6 +323,7 @@ void Invariants::check_frames(const daemon::SampleReport& now) {
     counters_[id] = counter;
     if (id == kClamp) check_clamp(frame, now);
     if (id == 0x6A0) check_estimate(frame, now);
+    if (id == 0x6A0) check_min_clamp(frame, now);
     if (id == 0x6A3) check_status(frame, now);
     if (id == 0x6A0) {
       const unsigned kind = frame.data[1] >> 4 & 3U;

@@ -1,6 +1,9 @@
 // The promises that hold in every sample, whatever happens, as one checker for closed loops, replay
 // and fuzzing: what the pipeline reports against the frames that really left. Layout and protection
-// of the frames are written out here anew. Numbers I1 to I14 as in the catalogue of promises.
+// of the frames are written out here anew. Numbers I1 to I14 as in the catalogue of promises. I15:
+// MinClampForce never rests on more friction than the last value of its direction and end stop, or
+// than the belt carried there as it slipped since without giving a value; of what the history says
+// only where that differs by no more than noise.
 #pragma once
 
 #include <cstdint>
@@ -10,9 +13,9 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core/config.h"
-#include "daemon/core/event.h"
-#include "daemon/core/loop.h"
+#include "daemon/core/config/config.h"
+#include "daemon/core/loop/loop.h"
+#include "daemon/core/observe/event.h"
 
 namespace beltgrip::test {
 
@@ -27,6 +30,8 @@ class Invariants final : public daemon::SampleSink {
   // One that the bus did not take: what was said does not show in the frames.
   void on_unsent();
   void on_report(const daemon::SampleReport& report) noexcept override;
+  // What the pipeline has been told after a report.
+  void on_learned(const estimator::LearnedFriction& learned) { learned_ = learned; }
   // What was broken, at most one line of each kind.
   const std::map<std::string, std::string>& problems() const { return problems_; }
 
@@ -38,6 +43,9 @@ class Invariants final : public daemon::SampleSink {
   void check_clamp(const can::CanFrame& frame, const daemon::SampleReport& now);
   void check_events(const daemon::SampleReport& now);
   void check_estimate(const can::CanFrame& frame, const daemon::SampleReport& now);
+  void follow_friction(const daemon::SampleReport& now);
+  double friction_allowed(const daemon::SampleReport& now) const;
+  void check_min_clamp(const can::CanFrame& frame, const daemon::SampleReport& now);
   void check_status(const can::CanFrame& frame, const daemon::SampleReport& now);
 
   daemon::Config config_;
@@ -48,14 +56,24 @@ class Invariants final : public daemon::SampleSink {
   daemon::MonoTime request_begun_ = 0;
   daemon::MonoTime request_ended_ = 0;
   bool asked_ = false;
-  bool unsent_ = false;   // since the last report
-  int inactive_due_ = 0;  // frames still owed after a request
+  bool unsent_ = false;      // since the last report
+  int inactive_due_ = 0;     // frames still owed after a request
+  int inactive_before_ = 0;  // frames in a row, each within 100 ms of the one before
   daemon::MonoTime last_clamp_ = 0;
   daemon::EventRing ring_;
   daemon::EventSink events_{ring_};
   daemon::LineBudget budget_;
   std::deque<daemon::MonoTime> lines_;   // of the log, within the last second
   std::optional<unsigned> results_ = 0;  // that changed what is published; none: not seen
+  struct Friction {
+    double mu_max = 0.0;  // of the last value
+    double low = 0.0;     // its lower end
+    double relative_noise = 0.0;
+    double share = 1.0;  // of it that the belt carried as it slipped since
+  };
+  std::map<std::pair<estimator::Direction, estimator::EndStop>, Friction> values_;
+  estimator::LearnedFriction learned_;
+  double carried_ = 0.0;  // largest mu* of the experiment under way
   std::map<std::string, std::string> problems_;
 };
 

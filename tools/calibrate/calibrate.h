@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core/config.h"
-#include "tools/diagnose/signal_table.h"
+#include "daemon/core/config/config.h"
+#include "tools/diagnose/data/signal_table.h"
 
 namespace beltgrip::calibrate {
 

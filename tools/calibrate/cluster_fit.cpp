@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/sensor_error.h"
-#include "estimator/student.h"
+#include "estimator/physics/sensor_error.h"
+#include "estimator/statistics/distributions.h"
 
 namespace beltgrip::calibrate {
 

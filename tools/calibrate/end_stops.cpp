@@ -5,8 +5,9 @@
 #include <cmath>
 #include <cstdio>
 
-#include "estimator/clamp_force.h"
-#include "estimator/slip.h"
+#include "estimator/physics/clamp_force.h"
+#include "estimator/physics/slip.h"
+#include "estimator/statistics/order.h"
 #include "tools/calibrate/calibrate.h"
 #include "tools/calibrate/cluster_fit.h"
 #include "tools/calibrate/series.h"
@@ -27,6 +28,7 @@ constexpr double kTractionMax = 0.06;  // mu*: well below any peak
 constexpr double kSpeedMin_rad_s = 30.0;
 constexpr double kVisitGap_s = 3.0;
 constexpr double kScatterMax = 2.5e-3;  // ln: a stop holds the ratio
+constexpr double kWhite = 1.5;          // scatter over the noise between neighbours; 1: only noise
 constexpr double kModelStd = 2e-4;      // ln: what the straight lines in F and mu* leave out
 constexpr double kDelayFloor_s = 1e-3;  // and for the delay
 constexpr double kStdMax = 0.003;       // 0.3 % of slip: more is not worth writing
@@ -163,6 +165,21 @@ std::string text(const char* pattern, auto... values) {
   return line.data();
 }
 
+// Of the residuals, from each cell to the next of the same visit: a ratio at its stop that is read
+// coarsely scatters by as much; one that wanders scatters more.
+double neighbour_noise(const std::vector<Cell>& cells, const std::vector<double>& residual) {
+  double squares = 0.0;
+  int count = 0;
+  for (std::size_t i = 1; i < cells.size(); ++i) {
+    const bool next =
+        cells[i].log == cells[i - 1].log && cells[i].t_s - cells[i - 1].t_s < 1.5 * kCell_s;
+    if (!next) continue;
+    squares += 0.5 * std::pow(residual[i] - residual[i - 1], 2.0);
+    ++count;
+  }
+  return count > 0 ? std::sqrt(squares / count) : 0.0;
+}
+
 struct StopFindings {
   Finding ratio, delay;
 };
@@ -205,9 +222,8 @@ StopFindings one_stop(std::span<const diagnose::SignalTable> logs, const daemon:
     std::vector<double> sizes;
     sizes.reserve(fitted.residual.size());
     for (const double each : fitted.residual) sizes.push_back(std::abs(each));
-    std::nth_element(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2),
-                     sizes.end());
-    const double limit = std::max(4.0 * 1.4826 * sizes[sizes.size() / 2], 2e-4);
+    const double limit =
+        std::max(4.0 * estimator::kSigmaPerMedian * estimator::median(sizes), 2e-4);
     std::vector<Cell> kept;
     for (std::size_t i = 0; i < cells.size(); ++i) {
       if (std::abs(fitted.residual[i]) <= limit) kept.push_back(cells[i]);
@@ -218,11 +234,16 @@ StopFindings one_stop(std::span<const diagnose::SignalTable> logs, const daemon:
     return refuse(text("%d visits to the stop, needs %d", fitted.clusters, kVisitsMin));
   }
   // Cells that are spread evenly come from a ratio that is controlled.
-  if (2 * cells.size() < candidates || fitted.residual_std > kScatterMax) {
+  if (2 * cells.size() < candidates) {
     return refuse(
         text("the ratio does not come to rest at one value: %zu of %zu half seconds lie "
              "together",
              cells.size(), candidates));
+  }
+  const double noise = neighbour_noise(cells, fitted.residual);
+  if (fitted.residual_std > kScatterMax && fitted.residual_std > kWhite * noise) {
+    return refuse(text("the ratio wanders by %.2f %%, of which noise is %.2f %%: no stop holds it",
+                       100.0 * fitted.residual_std, 100.0 * noise));
   }
   const auto [least, most] =
       std::minmax_element(cells.begin(), cells.end(),

@@ -23,7 +23,7 @@ constexpr double kStep_Nm = 15.0;
 constexpr double kStepTime_s = 0.3;
 constexpr int kEventsMin = 6;
 constexpr double kRelativeStdMax = 0.2;
-constexpr double kDelayFirst_s = -0.05, kDelayLast_s = 0.25;
+constexpr double kDelayFirst_s = -0.05, kDelayLast_s = 0.2;
 constexpr double kDelayStdMax_s = 0.01;
 constexpr double kSpeedMin_rad_s = 60.0;
 constexpr double kLocked_rad_s = 5.0;  // between engine and pulley: the clutch is closed
@@ -51,11 +51,13 @@ bool grid(const Series& series, double from_s, double step_s, int count,
   return true;
 }
 
-bool usable(const Series& primary, const Series& engine, const Series& torque, double from_s,
-            double to_s) {
+bool usable(const Series& primary, const Series& engine, const Series& torque, const Series& brake,
+            double from_s, double to_s) {
   for (double t = from_s; t <= to_s; t += 5.0 * kGrid_s) {
     const auto p = primary.at(t);
     if (!p || *p < kSpeedMin_rad_s || !torque.at(t)) return false;
+    // A load that comes and goes as fast as the torque passes for an inertia.
+    if (!brake.empty() && brake.at(t).value_or(0.0) > 0.0) return false;
     if (engine.empty()) continue;
     const auto e = engine.at(t);
     if (!e || std::abs(*e - *p) > kLocked_rad_s) return false;
@@ -67,7 +69,8 @@ std::vector<Event> events(std::span<const diagnose::SignalTable> logs) {
   std::vector<Event> found;
   for (const diagnose::SignalTable& log : logs) {
     const Series primary(log[Role::kPrimarySpeed]), secondary(log[Role::kSecondarySpeed]),
-        torque(log[Role::kEngineTorque]), engine(log[Role::kEngineSpeed]);
+        torque(log[Role::kEngineTorque]), engine(log[Role::kEngineSpeed]),
+        brake(log[Role::kBrakePressed]);
     if (primary.empty() || secondary.empty() || torque.empty()) continue;
     double next = torque.begin_s() + kBefore_s;
     for (double t = next; t + kAfter_s + kDelayLast_s < torque.end_s(); t += 2.0 * kGrid_s) {
@@ -75,7 +78,7 @@ std::vector<Event> events(std::span<const diagnose::SignalTable> logs) {
       const auto before = torque.at(t - 0.5 * kStepTime_s);
       const auto after = torque.at(t + 0.5 * kStepTime_s);
       if (!before || !after || std::abs(*after - *before) < kStep_Nm) continue;
-      if (!usable(primary, engine, torque, t - kBefore_s, t + kAfter_s)) continue;
+      if (!usable(primary, engine, torque, brake, t - kBefore_s, t + kAfter_s)) continue;
       Event event;
       const int count = static_cast<int>(std::lround((kBefore_s + kAfter_s) / kGrid_s));
       const double reach_s = kBefore_s + kAfter_s + kDelayLast_s - kDelayFirst_s;
@@ -237,9 +240,13 @@ std::vector<Finding> inertia(std::span<const diagnose::SignalTable> logs,
   delay.value = best_s + std::clamp(shift, -0.5, 0.5) * kGrid_s;
   best = fit_all(all, *delay.value);
   if (!best.fit.solved) return refuse("the steps do not determine an inertia");
-  const std::string basis = text(
-      "%d steps of the torque at ratios %.2f to %.2f, scatter %.1f Nm, vehicle %.2f kg m2",
-      best.fit.clusters, best.ratio_low, best.ratio_high, best.fit.residual_std, best.fit.value[1]);
+  const bool brake_known = std::any_of(
+      logs.begin(), logs.end(), [](const auto& log) { return !log[Role::kBrakePressed].empty(); });
+  const std::string basis =
+      text("%d steps of the torque at ratios %.2f to %.2f, scatter %.1f Nm, vehicle %.2f kg m2",
+           best.fit.clusters, best.ratio_low, best.ratio_high, best.fit.residual_std,
+           best.fit.value[1]) +
+      (brake_known ? "" : ", brakes unknown: the role brake_pressed leaves their steps out");
   // The events one half against the other: what the delay is worth.
   std::array<double, 2> halves{};
   for (std::size_t half = 0; half < 2; ++half) {

@@ -6,8 +6,8 @@
 #include <limits>
 #include <numbers>
 
-#include "estimator/sensor_error.h"
-#include "estimator/student.h"
+#include "estimator/physics/sensor_error.h"
+#include "estimator/statistics/distributions.h"
 #include "tools/calibrate/calibrate.h"
 #include "tools/calibrate/series.h"
 

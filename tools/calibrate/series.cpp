@@ -11,14 +11,7 @@ constexpr double kGap_periods = 3.0;
 }
 
 Series::Series(const diagnose::Channel& channel) : channel_(channel) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < channel.t_s.size(); ++i) {
-    steps.push_back(channel.t_s[i] - channel.t_s[i - 1]);
-  }
-  if (steps.empty()) return;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  period_s_ = *middle;
+  if (channel.t_s.size() > 1) period_s_ = diagnose::median_period_s(channel);
 }
 
 std::size_t Series::first_from(double t_s) const {

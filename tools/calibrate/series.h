@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "tools/diagnose/signal_table.h"
+#include "tools/diagnose/data/signal_table.h"
 
 namespace beltgrip::calibrate {
 

@@ -1,8 +1,5 @@
 #include "tools/cli/bus.h"
 
-#include <signal.h>
-#include <sys/signalfd.h>
-
 #include <array>
 #include <optional>
 #include <string_view>
@@ -47,15 +44,6 @@ bool send(daemon::Port& port, const std::string& name, const can::CanFrame& fram
 }
 
 }  // namespace
-
-int stop_descriptor() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  return signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK);
-}
 
 std::unique_ptr<daemon::Port> open_bus(const std::string& name,
                                        const std::vector<can::CanId>& identifiers, int stop_fd) {

@@ -8,16 +8,13 @@
 #include <string>
 #include <vector>
 
-#include "can_dbc/can_frame.h"
-#include "daemon/core/port.h"
+#include "can_dbc/frame/can_frame.h"
+#include "daemon/core/base/port.h"
 
 namespace beltgrip::cli {
 
-// From now on SIGINT and SIGTERM end the port's waiting instead of the program. The descriptor for
-// open_bus.
-int stop_descriptor();
-
-// A SocketCAN interface or inproc:NAME. Throws Failure 69. Receives these identifiers only.
+// A SocketCAN interface or inproc:NAME. Throws Failure 69. Receives these identifiers only. Where
+// `stop_fd` (stop_signals.h) is readable, the port's waiting ends.
 std::unique_ptr<daemon::Port> open_bus(const std::string& name,
                                        const std::vector<can::CanId>& identifiers, int stop_fd);
 

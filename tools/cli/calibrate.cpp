@@ -1,19 +1,24 @@
 // beltgrip calibrate: constants of the configuration from recorded drives, each with its
 // uncertainty, or the reason why these drives do not tell it.
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "tools/calibrate/calibrate.h"
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"
-#include "tools/cli/json_writer.h"
 #include "tools/cli/log_table.h"
 #include "tools/cli/output_file.h"
+#include "tools/cli/stop_signals.h"
+#include "tools/text/json_writer.h"
+#include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
 
@@ -26,6 +31,7 @@ struct Options {
   std::string config;
   std::string json;
   std::string out;
+  bool force = false;
 };
 
 std::string format(const char* pattern, auto... values) {
@@ -90,17 +96,31 @@ std::string json_text(const std::vector<Finding>& findings) {
   return json.end_array().end_object().take() + '\n';
 }
 
-// The role as it is, less what it reads at zero, and later by `delay_s`; in SI, so that nothing has
-// to be converted.
+// Without what the arithmetic left behind the last digits.
+double to_twelve_digits(double value) {
+  const double scale =
+      std::pow(10.0, 11.0 - std::floor(std::log10(std::max(std::abs(value), 1e-9))));
+  return std::round(value * scale) / scale;
+}
+
+double delay_of(const daemon::RoleBinding& role, double delay_s) {
+  return std::round(10.0 * (role.delay_ms + 1e3 * delay_s)) / 10.0;
+}
+
+// The role as the user has it, in his unit and scale, less what it reads at zero, and later by
+// `delay_s`.
 std::string role_line(const daemon::Config& config, daemon::Role wanted, double zero,
                       double delay_s) {
   for (const daemon::RoleBinding& role : config.roles) {
     if (role.role != wanted) continue;
-    const can::Dimension dimension = daemon::role_dimension(wanted);
-    const char* unit = dimension == can::Dimension::kPressure ? "Pa"
-                       : dimension == can::Dimension::kTorque ? "Nm"
-                                                              : "rad/s";
-    const double shift = role.shift - zero;
+    const auto scaling = [](double scale, double offset) {
+      return (scale != 1.0 ? ", scale = " + exact(scale) : "") +
+             (offset != 0.0 ? ", offset = " + exact(offset) : "");
+    };
+    const auto less_zero = [&](double offset) {
+      const double unit_factor = role.factor / role.scale;
+      return zero == 0.0 ? offset : to_twelve_digits(offset - zero / unit_factor);
+    };
     std::string line = std::string(daemon::role_name(wanted)) + " = { ";
     if (role.uds) {
       const can::SignalDef& signal = role.uds->signal;
@@ -110,16 +130,15 @@ std::string role_line(const daemon::Config& config, daemon::Role wanted, double 
               format("length = %u, byte_order = \"%s\", signed = %s", signal.length,
                      signal.byte_order == can::ByteOrder::kBig ? "big" : "little",
                      signal.type == can::ValueType::kSigned ? "true" : "false") +
-              ", scale = " + exact(role.factor * signal.scale) +
-              ", offset = " + exact(role.factor * signal.offset + shift) + " }, unit = \"" + unit +
-              "\"";
+              scaling(signal.scale, less_zero(signal.offset)) + " }";
     } else {
-      line += "signal = \"" + role.message_name + "." + role.signal_name + "\", unit = \"" + unit +
-              "\", scale = " + exact(role.factor) + ", offset = " + exact(shift);
+      line += "signal = \"" + role.message_name + "." + role.signal_name + "\"";
     }
+    line += ", unit = \"" + role.unit + "\"";
+    if (!role.uds) line += scaling(role.scale, less_zero(role.offset));
     if (role.bus != 0 && config.further_bus) line += ", bus = \"" + config.further_bus->name + "\"";
     if (role.period_ms) line += ", period_ms = " + exact(*role.period_ms);
-    const double delay_ms = std::round(10.0 * (role.delay_ms + 1e3 * delay_s)) / 10.0;
+    const double delay_ms = delay_of(role, delay_s);
     if (delay_ms != 0.0) line += ", delay_ms = " + exact(delay_ms);
     return line + " }";
   }
@@ -140,7 +159,13 @@ std::string toml(const std::vector<Finding>& findings, const daemon::Config& con
       signals += role_line(config, daemon::Role::kSecondaryPressure, *each.value, 0.0);
       signals.append("  # read ").append(number).append(" Pa at zero, +- ").append(deviation);
       signals.append("\n");
-      sensors += "secondary_pressure = { bias_Pa = " + exact(each.std) + " }\n";
+      const bool gain_stated =
+          std::none_of(config.assumed.begin(), config.assumed.end(), [](const std::string& key) {
+            return key.starts_with("sensors.secondary_pressure.gain");
+          });
+      sensors += "secondary_pressure = { bias_Pa = " + exact(each.std);
+      if (gain_stated) sensors += ", gain = " + exact(config.sensors.secondary_pressure.gain);
+      sensors += " }\n";
     } else if (each.key.starts_with("variator.")) {
       variator.append(each.key.substr(9)).append(" = ").append(number).append("  # +- ");
       variator.append(deviation).append("; ").append(each.text).append("\n");
@@ -155,26 +180,57 @@ std::string toml(const std::vector<Finding>& findings, const daemon::Config& con
   }
   std::string out = "# Written by beltgrip calibrate from";
   for (const std::string& log : options.logs) out += " " + log;
-  out += ".\n# Take these lines over into the sections of " + options.config + ".\n" + remarks;
+  const auto name = [](const std::string& path) {
+    return std::filesystem::path(path).filename().string();
+  };
+  out += ".\n# In a third file, the keys here take the place of those there: include = [\"" +
+         name(options.config) + "\", \"" +
+         (options.out == "-" ? "calibrated.toml" : name(options.out)) + "\"]\n" + remarks;
   if (!signals.empty()) out += "\n[signals]\n" + signals;
   if (!sensors.empty()) out += "\n[sensors]\n" + sensors;
   if (!variator.empty()) out += "\n[variator]\n" + variator;
   return out;
 }
 
+// What is written must load: each finding alone, over the configuration that it is for.
+void keep_what_loads(std::vector<Finding>& findings, const daemon::Config& config,
+                     const Options& options) {
+  for (Finding& each : findings) {
+    if (!each.value) continue;
+    const std::string lines = toml({each}, config, options);
+    const std::string why = why_refused(lines, std::filesystem::absolute(options.config).string());
+    if (why.empty()) continue;
+    each.text = "found " + rounded(*each.value, each.std) + " " + each.unit +
+                ", which no configuration takes (" + why + "); " + each.text;
+    each.value.reset();
+  }
+}
+
 void run(const Options& options) {
+  if (options.json == "-" && options.out == "-") {
+    throw Failure{kUsage, "calibrate: only one of --json and --out can be standard output"};
+  }
+  end_streams_when_stopped(options.logs);
   const daemon::Config config = load_configuration(options.config, "");
+  Inputs inputs(options.logs);
+  inputs.add(config.files);
+  std::optional<OutputFile> json, out;
+  if (!options.json.empty()) json.emplace(options.json, inputs);
+  if (!options.out.empty()) out.emplace(options.out, inputs, unless_forced(options.force));
   std::vector<diagnose::SignalTable> logs;
   for (const std::string& path : options.logs) {
-    logs.push_back(read_log(path, config));
+    logs.push_back(read_log(path, config, true));
     for (const std::string& note : logs.back().notes) {
-      std::fprintf(stderr, "beltgrip: warning: %s\n", note.c_str());
+      warn(note);
     }
   }
-  const std::vector<Finding> findings = calibrate::calibrate(logs, config);
-  if (!options.json.empty()) write_file(options.json, json_text(findings));
-  if (!options.out.empty()) write_file(options.out, toml(findings, config, options));
-  if (options.json != "-" && options.out != "-") std::fputs(table(findings).c_str(), stdout);
+  std::vector<Finding> findings = calibrate::calibrate(logs, config);
+  keep_what_loads(findings, config, options);
+  if (json) json->write(json_text(findings));
+  if (out) out->write(toml(findings, config, options));
+  if (json) json->close();
+  if (out) out->close();
+  if (options.json != "-" && options.out != "-") print(stdout, table(findings));
 }
 
 }  // namespace
@@ -189,6 +245,7 @@ void add_calibrate(CLI::App& app) {
   command->add_option("--config", options->config, "BeltGrip's configuration")->required();
   command->add_option("--json", options->json, "As JSON, '-': standard output");
   command->add_option("--out", options->out, "The keys as TOML, '-': standard output");
+  command->add_flag("--force", options->force, "Replace the file of --out where it exists");
   command->callback([options] { run(*options); });
 }
 

@@ -5,9 +5,11 @@
 #include <memory>
 #include <string>
 
+#include "can_dbc/text/printable.h"
 #include "daemon/io/can_link.h"
 #include "tools/cli/exit_codes.h"
-#include "tools/cli/json_writer.h"
+#include "tools/text/json_writer.h"
+#include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
 
@@ -98,7 +100,7 @@ std::string number_or(const auto& value, const char* unit) {
 
 void print(const CanLink& link) {
   const auto line = [](const char* name, const std::string& text) {
-    std::printf("%-16s %s\n", name, text.c_str());
+    std::printf("%-16s %s\n", name, can::printable(text).c_str());
   };
   line("interface", link.interface + (link.up ? ", up" : ", down") + ", driver " +
                         (link.driver.empty() ? "unknown" : link.driver));

@@ -13,6 +13,7 @@ void add_history(CLI::App& app);
 void add_init(CLI::App& app);
 void add_monitor(CLI::App& app);
 void add_replay(CLI::App& app);
+void add_report(CLI::App& app);
 void add_run_demo(CLI::App& app);
 void add_simulate(CLI::App& app);
 

@@ -2,19 +2,20 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <memory>
 
 #include "tools/cli/exit_codes.h"
 #include "tools/cli/output_file.h"
+#include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
 
 daemon::Config load_configuration(const std::string& path, const std::string& method) {
   daemon::ConfigResult result = daemon::load_config(path);
   for (const std::string& warning : result.warnings) {
-    std::fprintf(stderr, "beltgrip: warning: %s\n", warning.c_str());
+    warn(warning);
   }
   if (!result.config) {
     Failure failure{result.exit_code(), ""};
@@ -30,17 +31,52 @@ daemon::Config load_configuration(const std::string& path, const std::string& me
   return std::move(*result.config);
 }
 
+namespace {
+
+// Removed with what is in it.
+struct TemporaryFolder {
+  std::string path = (std::filesystem::temp_directory_path() / "beltgrip.XXXXXX").string();
+  TemporaryFolder() {
+    if (mkdtemp(path.data()) == nullptr) {
+      throw Failure{kCannotCreate, path + ": no temporary directory can be made"};
+    }
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+};
+
+// A basic string of TOML.
+std::string quoted(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += c;
+  }
+  return out + '"';
+}
+
+}  // namespace
+
 daemon::Config load_configuration_text(std::string_view toml, std::string_view dbc,
                                        const std::string& method) {
-  std::string folder = (std::filesystem::temp_directory_path() / "beltgrip.XXXXXX").string();
-  if (mkdtemp(folder.data()) == nullptr) {
-    throw Failure{kCannotCreate, folder + ": no temporary directory can be made"};
-  }
-  const std::unique_ptr<const char, void (*)(const char*)> remove(
-      folder.c_str(), [](const char* path) { std::filesystem::remove_all(path); });
-  write_file(folder + "/vehicle.dbc", dbc);
-  write_file(folder + "/beltgrip.toml", toml);
-  return load_configuration(folder + "/beltgrip.toml", method);
+  const TemporaryFolder folder;
+  write_file(folder.path + "/vehicle.dbc", {}, dbc);
+  write_file(folder.path + "/beltgrip.toml", {}, toml);
+  return load_configuration(folder.path + "/beltgrip.toml", method);
+}
+
+std::string why_refused(std::string_view lines, const std::string& path) {
+  const TemporaryFolder folder;
+  write_file(folder.path + "/lines.toml", {}, lines);
+  write_file(folder.path + "/both.toml", {}, "include = [" + quoted(path) + ", \"lines.toml\"]\n");
+  const daemon::ConfigResult result = daemon::load_config(folder.path + "/both.toml");
+  if (result.config) return {};
+  const std::string& text = result.errors.front().text;
+  return text.substr(std::min(text.find(": ") + 2, text.size()));
 }
 
 }  // namespace beltgrip::cli

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "daemon/core/config.h"
+#include "daemon/core/config/config.h"
 
 namespace beltgrip::cli {
 
@@ -13,5 +13,9 @@ daemon::Config load_configuration(const std::string& path, const std::string& me
 // The same for texts that are in no file; the configuration names the DBC "vehicle.dbc".
 daemon::Config load_configuration_text(std::string_view toml, std::string_view dbc,
                                        const std::string& method);
+
+// Why lines that are read after the configuration at `path` (absolute) make it one that does not
+// load; empty: it loads.
+std::string why_refused(std::string_view lines, const std::string& path);
 
 }  // namespace beltgrip::cli

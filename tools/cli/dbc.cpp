@@ -17,14 +17,17 @@
 #include <string>
 #include <vector>
 
-#include "can_dbc/can_log.h"
-#include "can_dbc/dbc_parser.h"
-#include "can_dbc/message_codec.h"
-#include "can_dbc/message_index.h"
+#include "can_dbc/dbc/message_codec.h"
+#include "can_dbc/dbc/message_index.h"
+#include "can_dbc/dbc/parser.h"
+#include "can_dbc/log/can_log.h"
+#include "can_dbc/text/printable.h"
 #include "tools/cli/dbc_json.h"
 #include "tools/cli/exit_codes.h"
-#include "tools/cli/json_writer.h"
 #include "tools/cli/output_file.h"
+#include "tools/cli/stop_signals.h"
+#include "tools/text/json_writer.h"
+#include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
 
@@ -79,8 +82,8 @@ std::string text_of(const Tally& count) {
 void mention_problems(const std::string& path, const std::vector<can::Problem>& problems) {
   const Tally count = tally(problems);
   if (count.warnings + count.errors == 0) return;
-  std::fprintf(stderr, "%s: %s (beltgrip dbc check lists them)\n", path.c_str(),
-               text_of(count).c_str());
+  print(stderr,
+        can::printable(path) + ": " + text_of(count) + " (beltgrip dbc check lists them)\n");
 }
 
 // --- check ---------------------------------------------------------------------------------------
@@ -88,9 +91,10 @@ void mention_problems(const std::string& path, const std::vector<can::Problem>& 
 void check(const std::string& path, bool strict) {
   const can::DbcParseResult result = can::parse_dbc(read_file(path));
   for (const can::Problem& problem : result.problems) {
-    std::printf("%s:%" PRIu32 ":%" PRIu32 ": %s: %s [%s]\n", path.c_str(), problem.line,
-                problem.column, problem.severity == can::Severity::kError ? "error" : "warning",
-                problem.text.c_str(), problem.code.c_str());
+    std::printf("%s:%" PRIu32 ":%" PRIu32 ": %s: %s [%s]\n", can::printable(path).c_str(),
+                problem.line, problem.column,
+                problem.severity == can::Severity::kError ? "error" : "warning",
+                can::printable(problem.text).c_str(), problem.code.c_str());
   }
   const Tally count = tally(result.problems);
   if (result.database.messages.empty()) fail_without_message(path);
@@ -100,9 +104,8 @@ void check(const std::string& path, bool strict) {
   for (const can::MessageDef& message : result.database.messages) signals += message.signals.size();
   const std::string read = counted(result.database.messages.size(), "message") + ", " +
                            counted(signals, "signal") + " read";
-  std::fprintf(stderr, "%s; %s\n",
-               count.warnings == 0 ? (path + ": no problems").c_str() : summary.c_str(),
-               read.c_str());
+  const std::string found = count.warnings == 0 ? path + ": no problems" : summary;
+  print(stderr, can::printable(found) + "; " + read + "\n");
 }
 
 // --- show ----------------------------------------------------------------------------------------
@@ -116,12 +119,6 @@ std::string id_text(can::CanId id) {
 std::string number_text(double value) {
   std::array<char, 32> text;
   return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-}
-
-std::string on_one_line(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
-  return text;
 }
 
 std::string type_text(can::ValueType type) {
@@ -149,33 +146,35 @@ std::string selection_text(const can::MuxRule& rule) {
 
 void print_signal(const can::SignalDef& signal) {
   std::printf("  %s: bit %" PRIu32 ", %" PRIu32 " bits, %s endian, %s, factor %s, offset %s",
-              signal.name.c_str(), signal.start_bit, signal.length,
+              can::printable(signal.name).c_str(), signal.start_bit, signal.length,
               signal.byte_order == can::ByteOrder::kLittle ? "little" : "big",
               type_text(signal.type).c_str(), number_text(signal.scale).c_str(),
               number_text(signal.offset).c_str());
-  if (!signal.unit.empty()) std::printf(" %s", signal.unit.c_str());
+  if (!signal.unit.empty()) std::printf(" %s", can::printable(signal.unit).c_str());
   if (signal.minimum < signal.maximum) {
     std::printf(", from %s to %s", number_text(signal.minimum).c_str(),
                 number_text(signal.maximum).c_str());
   }
   if (signal.is_multiplexer) std::printf(", multiplexer");
-  if (signal.multiplexed_by) std::printf("%s", selection_text(*signal.multiplexed_by).c_str());
+  if (signal.multiplexed_by) print(stdout, can::printable(selection_text(*signal.multiplexed_by)));
   std::printf("\n");
   for (const auto& [key, label] : signal.values) {
     std::printf("      %s = %s\n", can::value_key_text(signal, key).c_str(),
-                on_one_line(label).c_str());
+                can::printable(label).c_str());
   }
-  if (!signal.comment.empty()) std::printf("      \"%s\"\n", on_one_line(signal.comment).c_str());
+  if (!signal.comment.empty())
+    std::printf("      \"%s\"\n", can::printable(signal.comment).c_str());
 }
 
 void print_readably(const can::Database& database) {
   for (const can::MessageDef& message : database.messages) {
-    std::printf("%s %s, %" PRIu32 " bytes%s", id_text(message.id).c_str(), message.name.c_str(),
-                message.length, message.fd ? ", CAN FD" : "");
+    std::printf("%s %s, %" PRIu32 " bytes%s", id_text(message.id).c_str(),
+                can::printable(message.name).c_str(), message.length, message.fd ? ", CAN FD" : "");
     if (message.j1939) std::printf(", J1939");
     if (message.cycle_ms) std::printf(", every %g ms", *message.cycle_ms);
     std::printf("\n");
-    if (!message.comment.empty()) std::printf("  \"%s\"\n", on_one_line(message.comment).c_str());
+    if (!message.comment.empty())
+      std::printf("  \"%s\"\n", can::printable(message.comment).c_str());
     for (const can::SignalDef& signal : message.signals) print_signal(signal);
   }
 }
@@ -183,15 +182,17 @@ void print_readably(const can::Database& database) {
 void show(const std::string& path, const std::string& json_path) {
   const can::DbcParseResult result = can::parse_dbc(read_file(path));
   mention_problems(path, result.problems);
+  const bool nothing = result.database.messages.empty();
+  if (nothing && json_path != "-") fail_without_message(path);  // what is in the file stays
   if (json_path.empty()) {
     print_readably(result.database);
   } else {
-    OutputFile out(json_path);
+    OutputFile out(json_path, {path});
     out.write(database_json(result.database));
     out.write("\n");
     out.close();
   }
-  if (result.database.messages.empty()) fail_without_message(path);
+  if (nothing) fail_without_message(path);
 }
 
 // --- decode --------------------------------------------------------------------------------------
@@ -257,10 +258,10 @@ class Decoder {
     const auto& conflicts = index_.conflicts();
     for (std::size_t i = 0; i < std::min(conflicts.size(), kConflictsShown); ++i) {
       const can::MessageIndex::Conflict& conflict = conflicts[i];
-      std::fprintf(stderr, "%s: message %s has the identifier of %s in %s, which is used\n",
-                   paths[conflict.ignored.database].c_str(),
-                   message_at(conflict.ignored).name.c_str(),
-                   message_at(conflict.used).name.c_str(), paths[conflict.used.database].c_str());
+      print(stderr, paths[conflict.ignored.database] + ": message " +
+                        message_at(conflict.ignored).name + " has the identifier of " +
+                        message_at(conflict.used).name + " in " + paths[conflict.used.database] +
+                        ", which is used\n");
     }
     if (conflicts.size() > kConflictsShown) {
       std::fprintf(stderr, "and %zu more messages with an identifier used before\n",
@@ -417,12 +418,13 @@ void decode_log(Decoder& decoder, const std::string& log_path, OutputFile& out) 
 
   const can::LogStats& stats = log->stats();
   for (const can::BadLine& bad : stats.first_bad) {
-    std::fprintf(stderr, "%s:%" PRIu64 ": %s\n", log_path.c_str(), bad.line, bad.reason.c_str());
+    print(stderr, log_path + ":" + std::to_string(bad.line) + ": " + bad.reason + "\n");
   }
   std::fprintf(stderr,
                "%s: %" PRIu64 " frames, %" PRIu64 " decoded, %" PRIu64
                " that no DBC names, %" PRIu64 " bad lines\n",
-               log_path.c_str(), stats.frames, decoded, stats.frames - decoded, stats.lines_bad);
+               can::printable(log_path).c_str(), stats.frames, decoded, stats.frames - decoded,
+               stats.lines_bad);
   if (stats.frames == 0) {
     throw Failure{kBadInput, log_path + ": no readable frame in it, expected a CAN log"};
   }
@@ -431,19 +433,24 @@ void decode_log(Decoder& decoder, const std::string& log_path, OutputFile& out) 
 // One log after the other; one that cannot be used does not hide the rest.
 void decode(const std::vector<std::string>& dbc_paths, const std::vector<std::string>& log_paths,
             bool with_raw, const std::string& json_path) {
+  end_streams_when_stopped(log_paths);
   Decoder decoder(dbc_paths, with_raw);
-  OutputFile out(json_path);
+  Inputs inputs(dbc_paths);
+  inputs.add(log_paths);
+  OutputFile out(json_path, inputs);
   std::optional<Failure> failure;
+  bool any = false;
   for (const std::string& log_path : log_paths) {
     try {
       decode_log(decoder, log_path, out);
+      any = true;
     } catch (const Failure& found) {
       if (found.exit_code != kNoInput && found.exit_code != kBadInput) throw;
-      if (failure) std::fprintf(stderr, "%s\n", found.text.c_str());
+      if (failure) print(stderr, found.text + "\n");
       if (!failure) failure = found;
     }
   }
-  out.close();
+  if (any || json_path == "-") out.close();
   if (failure) throw *failure;
 }
 

@@ -6,7 +6,7 @@
 #include <map>
 #include <string_view>
 
-#include "tools/cli/json_writer.h"
+#include "tools/text/json_writer.h"
 
 namespace beltgrip::cli {
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "can_dbc/dbc_model.h"
+#include "can_dbc/dbc/model.h"
 
 namespace beltgrip::cli {
 

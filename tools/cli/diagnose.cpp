@@ -4,20 +4,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "daemon/core/config.h"
+#include "daemon/core/config/config.h"
 #include "tools/cli/log_table.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
-#include "tools/diagnose/diagnose.h"
-#include "tools/diagnose/html.h"
-#include "tools/diagnose/json.h"
-#include "tools/diagnose/rerun.h"
+#include "tools/cli/stop_signals.h"
+#include "tools/diagnose/infer/rerun.h"
+#include "tools/diagnose/report/html.h"
+#include "tools/diagnose/report/json.h"
+#include "tools/diagnose/run/diagnose.h"
+#include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
 namespace {
@@ -26,10 +27,8 @@ struct Options {
   std::string config, model, json, report, model_out;
   std::vector<std::string> logs, held_out;
   int jobs = 1;
+  bool force = false;
 };
-
-volatile std::sig_atomic_t stop_requested = 0;
-void request_stop(int) { stop_requested = 1; }
 
 bool is_table(const std::string& path) { return path.ends_with(".csv"); }
 
@@ -38,10 +37,10 @@ daemon::Config load(const Options& options) {
                       std::all_of(options.held_out.begin(), options.held_out.end(), is_table);
   const daemon::ConfigResult result = daemon::load_config(
       options.config, tables ? daemon::ConfigScope::kVariator : daemon::ConfigScope::kSignals);
-  for (const std::string& warning : result.warnings) std::fprintf(stderr, "%s\n", warning.c_str());
+  for (const std::string& warning : result.warnings) warn(warning);
   if (!result.config) {
     for (std::size_t i = 0; i + 1 < result.errors.size(); ++i) {
-      std::fprintf(stderr, "beltgrip: %s\n", result.errors[i].text.c_str());
+      complain(result.errors[i].text);
     }
     throw Failure{result.exit_code(), result.errors.back().text};
   }
@@ -104,8 +103,7 @@ void show_progress(double share, const std::string& what) {
 }
 
 void run(const Options& options) {
-  std::signal(SIGINT, request_stop);
-  std::signal(SIGTERM, request_stop);
+  end_in_good_order();
   const daemon::Config config = load(options);
   diagnose::Request request;
   daemon::ModelFile before = diagnose::nominal_model(config.variator);
@@ -117,17 +115,21 @@ void run(const Options& options) {
     }
   }
   request.model = before;
-  for (const std::string& path : options.logs) request.experiments.push_back(read(path, config));
-  for (const std::string& path : options.held_out) request.held_out.push_back(read(path, config));
-  const auto output = [](const std::string& path) {
-    return path.empty() ? nullptr : std::make_unique<OutputFile>(path);
+  Inputs inputs(options.logs);
+  inputs.add(options.held_out);
+  inputs.add(config.files);
+  inputs.add(options.model);
+  const auto output = [&](const std::string& path, Existing existing = Existing::kReplace) {
+    return path.empty() ? nullptr : std::make_unique<OutputFile>(path, inputs, existing);
   };
   const auto json = output(options.json);
-  const auto model_out = output(options.model_out);
+  const auto model_out = output(options.model_out, unless_forced(options.force));
   const auto report = output(options.report);
+  for (const std::string& path : options.logs) request.experiments.push_back(read(path, config));
+  for (const std::string& path : options.held_out) request.held_out.push_back(read(path, config));
   request.with_plots = report != nullptr;
   request.jobs = options.jobs;
-  request.stop = [] { return stop_requested != 0; };
+  request.stop = [] { return stop_asked(); };
   if (isatty(STDERR_FILENO) != 0) request.progress = show_progress;
   diagnose::Answer answer = diagnose::diagnose(std::move(request));
   if (answer.diagnosis.complete && !answer.diagnosis.findings.empty()) {
@@ -136,7 +138,7 @@ void run(const Options& options) {
     answer.diagnosis.reruns = rerun(all, options.model.empty() ? config : told(config, before),
                                     told(config, answer.extended));
   }
-  if (options.json != "-") std::fputs(diagnose::plain_text(answer.diagnosis).c_str(), stdout);
+  if (options.json != "-") print(stdout, diagnose::plain_text(answer.diagnosis));
   if (json) {
     json->write(diagnose::json_text(answer.diagnosis));
     json->close();
@@ -164,6 +166,7 @@ void add_diagnose(CLI::App& app) {
   command->add_option("--json", options->json, "result as JSON; - for standard output");
   command->add_option("--report", options->report, "result with plots as one HTML file");
   command->add_option("--model-out", options->model_out, "writes the extended model");
+  command->add_flag("--force", options->force, "replace the file of --model-out where it exists");
   command->add_option("--jobs", options->jobs, "threads; the same answer for any number")
       ->check(CLI::Range(1, 256));
   command->callback([options] { run(*options); });

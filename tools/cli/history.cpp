@@ -12,13 +12,15 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core/event.h"
+#include "daemon/core/publish/names.h"
 #include "daemon/io/history_db.h"
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"
-#include "tools/cli/json_writer.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
+#include "tools/text/json_writer.h"
+#include "tools/text/snake_case.h"
+#include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
 
@@ -35,7 +37,8 @@ using estimator::PeakKind;
 
 constexpr const char* kDefaultFolder = "/var/lib/beltgrip";
 constexpr std::array<const char*, estimator::kNoteCount> kNoteNames{
-    "outlier", "trend", "wear", "directions_disagree", "end_stops_disagree", "contradictory"};
+    "outlier",       "trend",  "wear", "directions_disagree", "end_stops_disagree",
+    "contradictory", "slipped"};
 
 struct Options {
   std::string file;
@@ -112,14 +115,16 @@ History read(const Options& options) {
       throw Failure{kBadInput, history.path + ": found no history (" + opened.text +
                                    "), expected the history.db of a daemon"};
     }
-    std::fprintf(stderr, "beltgrip: warning: %s: damaged (%s)\n", history.path.c_str(),
-                 opened.text.c_str());
+    warn(history.path + ": damaged (" + opened.text + ")");
+  }
+  if (content.trouble != HistoryTrouble::kNone) {
+    throw Failure{kBadInput,
+                  history.path + ": found a history that cannot be read (" + content.text + ")"};
   }
   history.damaged = content.damaged;
   history.rows = std::move(content.rows);
   if (history.damaged > 0) {
-    std::fprintf(stderr, "beltgrip: warning: %s: %lld rows damaged or missing\n",
-                 history.path.c_str(), static_cast<long long>(history.damaged));
+    warn(history.path + ": " + std::to_string(history.damaged) + " rows damaged or missing");
   }
   return history;
 }
@@ -164,8 +169,7 @@ std::string notes_text(std::uint32_t notes, const char* separator) {
   return text;
 }
 
-std::string lower(const char* name) { return snake_case(name); }
-std::string lower(std::string_view name) { return snake_case(std::string(name)); }
+std::string lower(std::string_view name) { return snake_case(name); }
 
 // One column of the rows, for JSON and CSV alike: text, or a number that may be missing.
 struct Cell {
@@ -350,9 +354,16 @@ void run(const Options& options) {
   }
   History history = read(options);
   judge(history);
-  if (!options.json.empty()) write_file(options.json, json_lines(history));
-  if (!options.csv.empty()) write_file(options.csv, csv(history));
-  if (options.json != "-" && options.csv != "-") std::fputs(table(history).c_str(), stdout);
+  // SQLite's files beside it belong to it.
+  Inputs inputs{options.config, history.path, history.path + "-wal", history.path + "-shm"};
+  std::optional<OutputFile> json_file, csv_file;
+  if (!options.json.empty()) json_file.emplace(options.json, inputs);
+  if (!options.csv.empty()) csv_file.emplace(options.csv, inputs);
+  if (json_file) json_file->write(json_lines(history));
+  if (csv_file) csv_file->write(csv(history));
+  if (json_file) json_file->close();
+  if (csv_file) csv_file->close();
+  if (options.json != "-" && options.csv != "-") print(stdout, table(history));
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 // beltgrip init: a first configuration from DBC files, with every guess marked as one.
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -6,8 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "can_dbc/dbc_parser.h"
-#include "daemon/core/config.h"
+#include "can_dbc/dbc/parser.h"
+#include "can_dbc/text/printable.h"
+#include "daemon/core/config/config.h"
+#include "daemon/core/config/config_options.h"
 #include "tools/cli/command.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/role_guess.h"
@@ -22,6 +25,7 @@ struct Options {
   std::vector<std::string> dbc;
   std::string interface = "can0";
   std::string out = "-";
+  bool force = false;
 };
 
 can::Database read_database(const std::string& path) {
@@ -47,8 +51,14 @@ std::string path_text(const std::string& dbc, const std::string& out) {
 std::string quoted(const std::string& text) {
   std::string result = "\"";
   for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
     if (c == '"' || c == '\\') result += '\\';
-    result += c;
+    if (byte >= ' ' && byte != 0x7F) {
+      result += c;
+    } else {  // no line end ends a text of TOML
+      constexpr char kHex[] = "0123456789abcdef";
+      result += std::string("\\u00") + kHex[byte >> 4] + kHex[byte & 15];
+    }
   }
   return result + "\"";
 }
@@ -58,7 +68,34 @@ std::string signal_text(const RoleCandidate& candidate) {
 }
 
 std::string unit_remark(const RoleCandidate& candidate) {
-  return candidate.signal->unit.empty() ? "no unit" : candidate.signal->unit;
+  return candidate.signal->unit.empty() ? "no unit" : can::printable(candidate.signal->unit);
+}
+
+// "Open", "Slipping", ...: for a person to choose from.
+std::string labels_text(const can::SignalDef& signal) {
+  constexpr std::size_t kLabelsShown = 8;
+  std::string text;
+  std::size_t shown = 0;
+  for (const auto& [value, label] : signal.values) {
+    if (shown++ == kLabelsShown) return text + ", ...";
+    text +=
+        (text.empty() ? "" : ", ") + std::to_string(value) + " " + can::printable(quoted(label));
+  }
+  return text;
+}
+
+// What says when a flag is 1; empty: where its signal is 1.
+std::string flag_line(const std::string& name, daemon::Role role, const RoleCandidate& best) {
+  const TrueWhen guessed = guess_true_when(role, *best.signal);
+  if (!guessed.needed) return {};
+  const bool has_one = best.signal->values.contains(1);
+  const bool known = !guessed.label.empty() || has_one;
+  const std::string when = !guessed.label.empty() ? quoted(guessed.label)
+                           : has_one              ? "1"
+                                                  : "\"...\"";
+  return (known ? "" : "# ") + name + " = { signal = " + signal_text(best) +
+         ", true_when = " + when + " }   # guessed, of " + labels_text(*best.signal) +
+         (known ? "\n" : ": enter which\n");
 }
 
 void append_role(std::string& text, daemon::Role role, bool required,
@@ -71,9 +108,11 @@ void append_role(std::string& text, daemon::Role role, bool required,
     return;
   }
   const RoleCandidate& best = candidates.front();
-  if (best.has_unit) {
+  if (const std::string line = flag_line(name, role, best); !line.empty()) {
+    text += line;
+  } else if (best.has_unit) {
     text += name + " = " + signal_text(best) + "   # guessed";
-    if (!best.signal->unit.empty()) text += ", " + best.signal->unit;
+    if (!best.signal->unit.empty()) text += ", " + unit_remark(best);
     text += "\n";
   } else {
     text += "# " + name + " = { signal = " + signal_text(best) +
@@ -84,7 +123,44 @@ void append_role(std::string& text, daemon::Role role, bool required,
   }
 }
 
+// Every key that is assumed as long as it is left out, with what is assumed and where its number is
+// found. Only to fill in: a number that nobody knows is better left out than guessed.
+void append_assumed(std::string& text, daemon::Role torque) {
+  using daemon::Role;
+  text +=
+      "\n# The variator's own numbers. Each that stays a comment is assumed, within the range "
+      "given:\n"
+      "# mu_max is then as wide as that. Enter what is known, and uncomment the section's name.\n"
+      "# [variator]\n";
+  for (const daemon::Option& option : daemon::option_table()) {
+    for (const estimator::Assumption& each : estimator::assumptions()) {
+      if (option.section != "variator" || option.key != each.key) continue;
+      const bool is_inertia = each.key == "primary_inertia_kg_m2";
+      if (is_inertia && torque == Role::kPrimaryTorque) continue;
+      text += "# " + std::string(each.key) + " =   # assumed " + daemon::assumption_text(option) +
+              "\n#   found: " + std::string(each.where) + "\n";
+    }
+  }
+  text +=
+      "\n# Accuracy of the sensors, 1 sigma of an error that stays; 0 is exact. As assumed where "
+      "left "
+      "out:\n# [sensors]\n";
+  for (const Role role :
+       {Role::kPrimarySpeed, Role::kSecondarySpeed, Role::kSecondaryPressure, torque}) {
+    const auto sensor = daemon::sensor_of(role);
+    if (!sensor) continue;
+    const estimator::TypicalAccuracy& typical = estimator::typical_accuracy(*sensor);
+    char numbers[96];
+    std::snprintf(numbers, sizeof numbers, " = %g, gain = %g }", typical.accuracy.bias,
+                  typical.accuracy.gain);
+    text += "# " + std::string(daemon::role_name(role)) + " = { " +
+            std::string(daemon::bias_key(daemon::role_dimension(role))) + numbers +
+            "\n#   found: " + std::string(typical.where) + "\n";
+  }
+}
+
 void run(const Options& options) {
+  OutputFile file(options.out, Inputs(options.dbc), unless_forced(options.force));
   std::vector<can::Database> databases;
   databases.reserve(options.dbc.size());
   for (const std::string& path : options.dbc) databases.push_back(read_database(path));
@@ -121,11 +197,11 @@ void run(const Options& options) {
       "asks itself.\n"
       "# On a second interface: [bus.diag] with interface = \"can1\", and bus = \"diag\" in the "
       "role.\n";
+  append_assumed(text, measured ? Role::kPrimaryTorque : Role::kEngineTorque);
   text +=
-      "\n# [variator], [sensors], [estimator], [experiment]: every key has a default; see the\n"
-      "# documented default file. Piston area, spring and end-stop ratios are the vehicle's own.\n";
-  OutputFile file(options.out);
-  file.write(text);
+      "\n# [estimator], [experiment] and the end-stop ratios of [variator] have defaults; see the\n"
+      "# documented default file. beltgrip calibrate finds the ratios.\n";
+  file.write(options.out == "-" ? can::printable_lines(text) : text);
   file.close();
 }
 
@@ -139,6 +215,7 @@ void add_init(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--out", options->out, "File to write, '-': standard output")
       ->capture_default_str();
+  command->add_flag("--force", options->force, "Replace a file that exists");
   command->callback([options] { run(*options); });
 }
 

@@ -3,15 +3,22 @@
 #include <memory>
 #include <optional>
 
-#include "daemon/core/input_monitor.h"
+#include "daemon/core/input/input_monitor.h"
 #include "tools/cli/exit_codes.h"
 #include "tools/cli/replay_run.h"
 
 namespace beltgrip::cli {
 
-diagnose::SignalTable read_log(const std::string& path, const daemon::Config& config) {
+diagnose::SignalTable read_log(const std::string& path, const daemon::Config& config,
+                               bool as_read) {
   const auto timeline = open_timeline({path}, "", config.identifiers, further_interface(config));
   daemon::InputMonitor inputs(config);
+  if (as_read) {
+    for (const daemon::Role role : {daemon::Role::kEngineTorque, daemon::Role::kPrimarySpeed,
+                                    daemon::Role::kSecondarySpeed}) {
+      inputs.take_spikes(role);
+    }
+  }
   daemon::FaultSet faults;
   diagnose::SignalTable table;
   table.name = path;
@@ -47,6 +54,7 @@ diagnose::SignalTable read_log(const std::string& path, const daemon::Config& co
   note(stats.lines_bad, "unreadable lines");
   note(bad, "frames whose length or kind is not the DBC's, ignored");
   note(timeline->counters().clock_steps, "steps of the log's clock, taken out");
+  diagnose::close_gaps(table);
   return table;
 }
 

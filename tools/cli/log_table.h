@@ -4,12 +4,15 @@
 
 #include <string>
 
-#include "daemon/core/config.h"
-#include "tools/diagnose/signal_table.h"
+#include "daemon/core/config/config.h"
+#include "tools/diagnose/data/signal_table.h"
 
 namespace beltgrip::cli {
 
 // Throws Failure: 66 the log is missing, 65 it has no frame that carries a role.
-diagnose::SignalTable read_log(const std::string& path, const daemon::Config& config);
+// as_read: speeds and engine torque with their spikes; the gate that leaves them out delays steps
+// too, and leaves gaps at them.
+diagnose::SignalTable read_log(const std::string& path, const daemon::Config& config,
+                               bool as_read = false);
 
 }  // namespace beltgrip::cli

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 
-#include "daemon/core/config_model.h"
+#include "daemon/core/config/config_model.h"
 #include "tools/cli/exit_codes.h"
 
 namespace beltgrip::cli {

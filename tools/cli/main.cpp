@@ -10,12 +10,14 @@
 #include "tools/cli/dbc.h"
 #include "tools/cli/diagnose.h"
 #include "tools/cli/status.h"
+#include "tools/cli/stop_signals.h"
+#include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
 namespace {
 
 // Named in the interfaces, not built yet: known by name so that the answer is an honest one.
-constexpr const char* kLater[] = {"report"};
+constexpr const char* kLater[] = {"check"};
 
 void add_later(CLI::App& app) {
   for (const char* name : kLater) {
@@ -33,7 +35,7 @@ int fail(const std::string& text, int exit_code) {
   std::fflush(stdout);
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
-    std::fprintf(stderr, "beltgrip: %s\n", text.substr(begin, end - begin).c_str());
+    complain(text.substr(begin, end - begin));
     begin = end + 1;
   }
   return exit_code;
@@ -72,6 +74,7 @@ int run(int argc, char** argv) {
   add_monitor(app);
   add_dbc(app);
   add_diagnose(app);
+  add_report(app);
   add_later(app);
   for (CLI::App* command : app.get_subcommands(nullptr)) {
     if (!command->get_group().empty()) {
@@ -102,10 +105,11 @@ int run(int argc, char** argv) {
 }  // namespace beltgrip::cli
 
 int main(int argc, char** argv) {
+  beltgrip::cli::take_stop_signals();
   try {
     return beltgrip::cli::run(argc, argv);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "beltgrip: internal error: %s\n", error.what());
+    beltgrip::cli::complain(std::string("internal error: ") + error.what());
     return beltgrip::cli::kInternal;
   }
 }

@@ -7,10 +7,11 @@
 #include <optional>
 #include <string>
 
-#include "daemon/core/own_frames.h"
+#include "daemon/core/publish/own_frames.h"
 #include "tools/cli/bus.h"
 #include "tools/cli/command.h"
 #include "tools/cli/own_frame_view.h"
+#include "tools/cli/stop_signals.h"
 #include "tools/cli/verdict.h"
 #include "tools/sim/rig_source.h"
 
@@ -26,6 +27,11 @@ struct Options {
 };
 
 void run(const Options& options) {
+  if (options.bus.starts_with("inproc:")) {
+    throw Failure{kUnavailable, "monitor: found " + options.bus +
+                                    ", a bus that no other process can be on, expected a "
+                                    "SocketCAN interface such as can0"};
+  }
   std::optional<Truth> truth;
   if (!options.truth.empty()) truth = read_truth(options.truth);
   const daemon::FrameIdentifiers own;

@@ -2,9 +2,10 @@
 
 #include <cmath>
 
-#include "daemon/core/own_frames.h"
-#include "tools/cli/json_writer.h"
+#include "daemon/core/publish/own_frames.h"
 #include "tools/cli/replay_run.h"
+#include "tools/text/json_writer.h"
+#include "tools/text/snake_case.h"
 
 namespace beltgrip::cli {
 

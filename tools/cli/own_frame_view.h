@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "can_dbc/can_frame.h"
-#include "can_dbc/dbc_model.h"
-#include "can_dbc/e2e.h"
-#include "can_dbc/message_codec.h"
-#include "daemon/core/config.h"
+#include "can_dbc/dbc/message_codec.h"
+#include "can_dbc/dbc/model.h"
+#include "can_dbc/frame/can_frame.h"
+#include "can_dbc/frame/e2e.h"
+#include "daemon/core/config/config.h"
 
 namespace beltgrip::cli {
 

@@ -17,6 +17,8 @@
 #include "tools/cli/configuration.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
+#include "tools/cli/stop_signals.h"
+#include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
 
@@ -117,6 +119,7 @@ void play_logs(const Options& options) {
 }
 
 void run(const Options& options) {
+  end_streams_when_stopped(options.logs);
   if (!options.bus.empty()) return play_logs(options);
   if (options.config.empty()) throw Failure{kUsage, "replay: --config is required"};
   const bool separate = options.logs.size() > 1 && !options.join;
@@ -134,36 +137,40 @@ void run(const Options& options) {
     tasks.push_back({options.logs, {}, {}});
   }
   std::optional<OutputFile> json, trace, log_out;
-  if (!options.json.empty()) json.emplace(options.json);
-  if (!options.trace.empty()) trace.emplace(options.trace);
-  if (!options.log_out.empty()) log_out.emplace(options.log_out);
+  Inputs inputs(options.logs);
+  inputs.add(config.files);
+  if (!options.json.empty()) json.emplace(options.json, inputs);
+  if (!options.trace.empty()) trace.emplace(options.trace, inputs);
+  if (!options.log_out.empty()) log_out.emplace(options.log_out, inputs);
   const ReplayOutputs outputs{trace ? trace->get() : nullptr, log_out ? log_out->get() : nullptr};
   const bool text_to_stdout = options.json != "-" && options.trace != "-" && options.log_out != "-";
 
   const auto begin = std::chrono::steady_clock::now();
   std::uint64_t frames = 0;
   int exit_code = kDone;
+  bool any = false;
   const unsigned jobs = options.jobs > 0 ? options.jobs : std::thread::hardware_concurrency();
   run_all(
       tasks, std::max(jobs, 1u), [&](Task& task) { run_task(task, options, config, outputs); },
       [&](Task& task) {
         if (task.failure) {
-          std::fprintf(stderr, "beltgrip: %s\n", task.failure->text.c_str());
+          complain(task.failure->text);
           if (exit_code == kDone) exit_code = task.failure->exit_code;
           return;
         }
         for (const std::string& warning : task.result->warnings) {
-          std::fprintf(stderr, "beltgrip: warning: %s\n", warning.c_str());
+          warn(warning);
         }
+        any = true;
         frames += task.result->frames;
         if (json) json->write(experiment_lines(*task.result) + summary_line(*task.result));
         if (text_to_stdout) {
-          std::fputs(text(*task.result).c_str(), stdout);
+          print(stdout, text(*task.result));
         } else if (task.result->experiments.empty()) {
-          std::fprintf(stderr, "beltgrip: %s: %s\n", task.result->log.c_str(),
-                       no_experiment(*task.result).c_str());
+          complain(task.result->log + ": " + no_experiment(*task.result));
         }
       });
+  if (!any) throw Failure{exit_code, ""};  // what earlier runs left stays
   if (json) json->close();
   if (trace) trace->close();
   if (log_out) log_out->close();

@@ -1,16 +1,22 @@
 #include "tools/cli/replay_run.h"
 
 #include <cmath>
+#include <filesystem>
 #include <memory>
+#include <optional>
+#include <span>
 
-#include "can_dbc/can_log.h"
-#include "daemon/core/loop.h"
-#include "daemon/core/own_frames.h"
+#include "can_dbc/log/can_log.h"
+#include "daemon/core/loop/loop.h"
+#include "daemon/core/publish/names.h"
+#include "daemon/core/publish/own_frames.h"
+#include "estimator/method/possible_friction.h"
 #include "tools/cli/exit_codes.h"
-#include "tools/cli/json_writer.h"
-#include "tools/sim/log_timeline.h"
-#include "tools/sim/record_port.h"
-#include "tools/sim/replay_port.h"
+#include "tools/ports/log_timeline.h"
+#include "tools/ports/record_port.h"
+#include "tools/ports/replay_port.h"
+#include "tools/text/json_writer.h"
+#include "tools/text/snake_case.h"
 
 namespace beltgrip::cli {
 
@@ -19,30 +25,18 @@ namespace {
 constexpr std::size_t kBadLinesShown = 3;
 constexpr double kShownInhibit_s = 0.05;
 
-std::string outcome_text(daemon::Outcome outcome) {
-  return snake_case(own_label("BeltGripStatus", "Outcome", static_cast<int>(outcome)));
-}
-std::string reason_text(estimator::StopReason reason) {
-  return snake_case(own_label("BeltGripStatus", "StopReason", static_cast<int>(reason)));
-}
-const char* direction_text(estimator::Direction direction) {
-  return direction == estimator::Direction::kDrive ? "drive" : "overrun";
-}
-const char* ratio_text(estimator::EndStop end_stop) {
-  return end_stop == estimator::EndStop::kLow ? "low" : "overdrive";
-}
-
 // Collects the results and writes the trace as samples come.
 class Sink final : public daemon::SampleSink {
  public:
   Sink(ReplayResult& result, const daemon::Pipeline& pipeline, const daemon::Config& config,
-       std::FILE* trace)
+       const ReplayOutputs& outputs)
       : result_(result),
         pipeline_(pipeline),
-        trace_(trace),
+        trace_(outputs.trace),
+        also_(outputs.also),
         period_s_(1.0 / config.estimator.sample_rate_hz) {
     for (int phase = 0; phase < 4; ++phase) {
-      phases_[phase] = own_label("BeltGripSlip", "Phase", phase);
+      phases_[phase] = daemon::phase_name(static_cast<estimator::Phase>(phase));
     }
     if (trace_ != nullptr) {
       std::fputs(
@@ -57,11 +51,8 @@ class Sink final : public daemon::SampleSink {
       result_.experiments.push_back(report.result);
       result_.lost.push_back(lost_now());
     }
-    if (!report.in_experiment && (report.inhibits & kFeet) == 0) {
-      for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
-        if ((report.inhibits >> i & 1) != 0) result_.inhibited_s[i] += period_s_;
-      }
-    }
+    count_inhibits(report, 1);
+    if (also_ != nullptr) also_->on_report(report);
     if (trace_ == nullptr || !report.in_experiment || !report.curve.usable) return;
     const estimator::CurveEstimate& curve = report.curve;
     row_ = seconds_text(report.t);
@@ -85,7 +76,20 @@ class Sink final : public daemon::SampleSink {
     std::fwrite(row_.data(), 1, row_.size(), trace_);
   }
 
+  void on_silence(const daemon::SampleReport& last, std::int64_t samples) noexcept override {
+    count_inhibits(last, samples);
+    if (also_ != nullptr) also_->on_silence(last, samples);
+  }
+
  private:
+  void count_inhibits(const daemon::SampleReport& report, std::int64_t samples) noexcept {
+    if (report.in_experiment || (report.inhibits & kFeet) != 0) return;
+    for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
+      if ((report.inhibits >> i & 1) == 0) continue;
+      result_.inhibited_s[i] += static_cast<double>(samples) * period_s_;
+    }
+  }
+
   std::string lost_now() const {
     std::string roles;
     for (std::size_t i = 0; i < daemon::kRoleCount; ++i) {
@@ -114,6 +118,7 @@ class Sink final : public daemon::SampleSink {
   ReplayResult& result_;
   const daemon::Pipeline& pipeline_;
   std::FILE* trace_;
+  daemon::SampleSink* also_;
   double period_s_;
   std::string phases_[4];
   std::string row_;
@@ -168,19 +173,11 @@ std::string format(const char* pattern, auto... arguments) {
 
 }  // namespace
 
-std::string own_label(const char* message, const char* signal, std::int64_t raw) {
-  const auto* definition = daemon::own_database().find_message(message);
-  return definition->find_signal(signal)->values.at(raw);
+std::string outcome_text(daemon::Outcome outcome) {
+  return snake_case(daemon::outcome_name(outcome));
 }
-
-std::string snake_case(const std::string& label) {
-  std::string result;
-  for (const char c : label) {
-    const bool upper = c >= 'A' && c <= 'Z';
-    if (upper && !result.empty()) result += '_';
-    result += upper ? static_cast<char>(c - 'A' + 'a') : c;
-  }
-  return result;
+std::string reason_text(estimator::StopReason reason) {
+  return snake_case(daemon::stop_reason_name(reason));
 }
 
 std::string seconds_text(std::int64_t t_ns) {
@@ -238,18 +235,28 @@ std::string why_unusable(const daemon::Pipeline& pipeline, const daemon::Config&
 }
 
 void run_pipeline(daemon::Port& port, daemon::Pipeline& pipeline, const daemon::Config& config,
-                  estimator::StopReason end, ReplayResult& result, std::FILE* trace) {
-  Sink sink(result, pipeline, config, trace);
+                  estimator::StopReason end, ReplayResult& result, const ReplayOutputs& outputs) {
+  result.assumed = config.assumed;
+  Sink sink(result, pipeline, config, outputs);
   daemon::run_loop(port, pipeline, config.estimator.sample_rate_hz, end, &sink);
   result.frames_decoded = pipeline.counters().frames_decoded;
   result.frames_bad = pipeline.counters().frames_bad;
   result.unusable = why_unusable(pipeline, config);
 }
 
-bool is_record(const std::string& path) {
-  if (path == "-") return false;
+// What the flight recorder wrote; 0: a log. It is read twice, which a pipe cannot be.
+int record_version(const std::string& path) {
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(path, none)) return 0;
   try {
-    return sim::RecordPort::is_record(path);
+    const std::optional<int> version = sim::RecordPort::version_of(path);
+    constexpr int kNewest = sim::RecordPort::kVersion;
+    if (version && (*version < 1 || *version > kNewest)) {
+      throw Failure{kBadInput, path + ": found a flight record of version " +
+                                   std::to_string(*version) + ", expected 1 to " +
+                                   std::to_string(kNewest)};
+    }
+    return version.value_or(0);
   } catch (const can::LogOpenError& error) {
     throw Failure{kNoInput, error.text};
   }
@@ -257,15 +264,23 @@ bool is_record(const std::string& path) {
 
 // What the flight recorder kept, decided again as the daemon did.
 ReplayResult replay_record(const std::string& path, const daemon::Config& config,
-                           const sim::ReplayPort::Receiver& receiver, std::FILE* trace) {
+                           const sim::ReplayPort::Receiver& receiver,
+                           const ReplayOutputs& outputs) {
   ReplayResult result;
   result.log = path;
   daemon::Pipeline pipeline(config);
   sim::RecordPort port(path, receiver, [&](const sim::RecordedKnowledge& known) {
     estimator::LearnedFriction learned;
     for (std::size_t i = 0; i < learned.groups.size(); ++i) {
-      learned.groups[i].known = known.mu_max[i] > 0.0;
-      learned.groups[i].mu_max = known.mu_max[i];
+      learned.groups[i].known = known.groups[i].mu_max > 0.0;
+      learned.groups[i].mu_max = known.groups[i].mu_max;
+      learned.groups[i].ci95_low = known.groups[i].low;
+      learned.groups[i].repeatability_percent = known.groups[i].scatter_percent;
+    }
+    using estimator::BeltMemory;
+    if (known.memory.size() == BeltMemory::kNumbers) {
+      const std::span<const double, BeltMemory::kNumbers> numbers(known.memory);
+      learned.memory = BeltMemory::of_numbers(numbers);
     }
     learned.doubtful = known.doubtful;
     learned.unwritten = known.unwritten;
@@ -274,7 +289,7 @@ ReplayResult replay_record(const std::string& path, const daemon::Config& config
   run_pipeline(port, pipeline, config,
                port.ends_with_the_daemon() ? estimator::StopReason::kShutdown
                                            : estimator::StopReason::kTraceEnd,
-               result, trace);
+               result, outputs);
   result.frames = port.stats().frames;
   result.lines_bad = port.stats().lines_bad;
   result.duration_ns = port.duration();
@@ -285,9 +300,9 @@ ReplayResult replay_record(const std::string& path, const daemon::Config& config
 }  // namespace
 
 void run_daemon(daemon::Port& port, const daemon::Config& config, ReplayResult& result,
-                std::FILE* trace) {
+                const ReplayOutputs& outputs) {
   daemon::Pipeline pipeline(config);
-  run_pipeline(port, pipeline, config, estimator::StopReason::kTraceEnd, result, trace);
+  run_pipeline(port, pipeline, config, estimator::StopReason::kTraceEnd, result, outputs);
 }
 
 ReplayResult replay(const std::vector<std::string>& paths, const std::string& interface,
@@ -303,15 +318,23 @@ ReplayResult replay(const std::vector<std::string>& paths, const std::string& in
       writer->write(t, bus == 0 ? config.interface : further, frame);
     };
   }
-  if (paths.size() == 1 && interface.empty() && is_record(paths[0])) {
-    return replay_record(paths[0], config, receiver, outputs.trace);
+  const int version = paths.size() == 1 && interface.empty() ? record_version(paths[0]) : 0;
+  if (version > 0) {
+    result = replay_record(paths[0], config, receiver, outputs);
+    if (version < sim::RecordPort::kVersion) {
+      result.warnings.push_back(result.log + ": a flight record of version " +
+                                std::to_string(version) + ": of what the history had learned it " +
+                                (version == 1 ? "has mu_max alone" : "lacks the newest results") +
+                                ", forces may differ from the daemon's");
+    }
+    return result;
   }
   const auto timeline = open_timeline(paths, interface, config.identifiers, further);
   sim::ReplayPort port(*timeline, std::move(receiver));
   const can::LogStats head = timeline->stats();
   if (head.frames == 0 || port.empty()) throw no_frames(result, head, interface);
 
-  run_daemon(port, config, result, outputs.trace);
+  run_daemon(port, config, result, outputs);
 
   const can::LogStats stats = timeline->stats();
   const sim::TimelineCounters& counters = timeline->counters();
@@ -335,49 +358,34 @@ constexpr double kSlipMost_percent = 100.0;
 
 }  // namespace
 
-std::string experiment_lines(const ReplayResult& result) {
-  std::string lines;
-  JsonWriter json;
-  for (const daemon::ExperimentResult& e : result.experiments) {
-    const bool completed = e.outcome == daemon::Outcome::kCompleted;
-    const bool slips = e.stopped && e.sigma_stop_percent < kSlipMost_percent;
-    json.begin_object()
-        .field("type", "experiment")
-        .field("log", result.log)
-        .key("start_s")
-        .raw(seconds_text(e.start))
-        .key("stop_s")
-        .raw(e.stopped ? seconds_text(e.end) : "null")
-        .field("outcome", outcome_text(e.outcome))
-        .field("stop_reason", reason_text(e.stop_reason))
-        .field("mu_max", completed ? e.peak.mu_max : kJsonNull)
-        .field("mu_max_std", completed ? e.peak.mu_max_std : kJsonNull)
-        .key("mu_max_ci95");
-    if (completed) {
-      json.begin_array().value(e.peak.ci95_low).value(e.peak.ci95_high).end_array();
-    } else {
-      json.null();
-    }
-    json.field("mu_max_lower_bound", has_bound(e) ? e.peak.mu_max : kJsonNull)
-        .field("sigma_stop_percent", slips ? e.sigma_stop_percent : kJsonNull)
-        .field("contradictory", e.peak.contradictory)
-        .field("impossible", e.peak.impossible)
-        .field("sigma_peak_percent", completed ? e.peak.sigma_peak_percent : kJsonNull)
-        .field("samples", e.samples)
-        .field("direction", direction_text(e.direction))
-        .field("ratio", ratio_text(e.end_stop))
-        .end_object();
-    lines += json.take() + "\n";
+namespace {
+
+void interval(JsonWriter& json, bool known, double low, double high) {
+  if (known) {
+    json.begin_array().value(low).value(high).end_array();
+  } else {
+    json.null();
   }
-  return lines;
+}
+
+// What reads the friction too high or too low, the likeliest first.
+std::string why_impossible(double mu) {
+  const bool high = mu > estimator::kBeltMost;
+  return format("a friction of %.3g is %s than any metal belt has (%.2f to %.2f): ", mu,
+                high ? "higher" : "lower", estimator::kBeltLeast, estimator::kBeltMost) +
+         (high
+              ? "piston area or spring force too small, centrifugal term left out, radius too "
+                "small, pressure or torque unit?"
+              : "piston area or spring force too large, inertia or sign of the torque, pressure or "
+                "torque unit?");
 }
 
 // Where nothing is known of mu_max.
 std::string why_no_value(const daemon::ExperimentResult& e, const std::string& lost) {
-  if (e.peak.contradictory) return "its points lie on no one friction curve";
-  if (e.peak.impossible) {
-    return "no belt has the friction that was read; is pressure, torque or their unit wrong?";
-  }
+  if (e.peak.impossible) return why_impossible(e.peak.mu_refused);
+  if (e.peak.contradictory)
+    return "its points lie on no one friction curve; is the piston area, the spring or the "
+           "centrifugal term wrong?";
   switch (e.stop_reason) {
     case estimator::StopReason::kRatio:
       return "speeds and torque do not fit the ratio at the end stop; is a speed or the sign of "
@@ -392,6 +400,57 @@ std::string why_no_value(const daemon::ExperimentResult& e, const std::string& l
                  ? "the experiment was broken off"
                  : "too short, or too little torque or clamp force, or an input that stood still";
   }
+}
+
+// Why it ended; where nothing is known of mu_max for another reason, that first.
+std::string why(const daemon::ExperimentResult& e, const std::string& lost) {
+  std::string cause = daemon::cause_text(e.stop_reason, e.cause);
+  if (cause.empty()) return why_no_value(e, lost);
+  const bool known = e.outcome == daemon::Outcome::kCompleted || has_bound(e);
+  if (known || e.outcome == daemon::Outcome::kAborted) return cause;
+  return why_no_value(e, lost) + " (" + cause + ")";
+}
+
+}  // namespace
+
+std::string experiment_lines(const ReplayResult& result) {
+  std::string lines;
+  JsonWriter json;
+  for (std::size_t i = 0; i < result.experiments.size(); ++i) {
+    const daemon::ExperimentResult& e = result.experiments[i];
+    const bool completed = e.outcome == daemon::Outcome::kCompleted;
+    const bool slips = e.stopped && e.sigma_stop_percent < kSlipMost_percent;
+    json.begin_object()
+        .field("type", "experiment")
+        .field("log", result.log)
+        .key("start_s")
+        .raw(seconds_text(e.start))
+        .key("stop_s")
+        .raw(e.stopped ? seconds_text(e.end) : "null")
+        .field("outcome", outcome_text(e.outcome))
+        .field("stop_reason", reason_text(e.stop_reason))
+        .field("mu_max", completed ? e.peak.mu_max : kJsonNull)
+        .field("mu_max_std", completed ? e.peak.mu_max_std : kJsonNull)
+        .key("mu_max_ci95");
+    interval(json, completed, e.peak.ci95_low, e.peak.ci95_high);
+    json.key("mu_max_ci95_noise");
+    interval(json, completed, e.peak.noise_low, e.peak.noise_high);
+    json.key("assumed").begin_array();
+    for (const std::string& key : result.assumed) json.value(key);
+    json.end_array();
+    json.field("reason", why(e, result.lost[i]));
+    json.field("mu_max_lower_bound", has_bound(e) ? e.peak.mu_max : kJsonNull)
+        .field("sigma_stop_percent", slips ? e.sigma_stop_percent : kJsonNull)
+        .field("contradictory", e.peak.contradictory)
+        .field("impossible", e.peak.impossible)
+        .field("sigma_peak_percent", completed ? e.peak.sigma_peak_percent : kJsonNull)
+        .field("samples", e.samples)
+        .field("direction", snake_case(daemon::direction_name(e.direction)))
+        .field("ratio", snake_case(daemon::end_stop_name(e.end_stop)))
+        .end_object();
+    lines += json.take() + "\n";
+  }
+  return lines;
 }
 
 std::string summary_line(const ReplayResult& result) {
@@ -436,13 +495,15 @@ std::string text(const ReplayResult& result) {
   std::string out = result.log + "\n";
   for (std::size_t i = 0; i < result.experiments.size(); ++i) {
     const daemon::ExperimentResult& e = result.experiments[i];
-    out += "  " + outcome_text(e.outcome) + ", " + direction_text(e.direction) + ", " +
-           ratio_text(e.end_stop) + ": ";
+    out += "  " + outcome_text(e.outcome) + ", " + snake_case(daemon::direction_name(e.direction)) +
+           ", " + snake_case(daemon::end_stop_name(e.end_stop)) + ": ";
     const double end_s = static_cast<double>(e.end) * 1e-9;
     const double length_s = static_cast<double>(e.end - e.start) * 1e-9;
     out += e.stopped ? format("stopped at %.3f s", end_s) : format("ended at %.3f s", end_s);
     out += format(" (%s) after %.1f s", reason_text(e.stop_reason).c_str(), length_s);
     if (e.stopped) out += format(", at %.2f %% slip", e.sigma_stop_percent);
+    const std::string cause = daemon::cause_text(e.stop_reason, e.cause);
+    if (!cause.empty()) out += ": " + cause;
     out += "\n";
     if (e.outcome == daemon::Outcome::kCompleted) {
       out += format("  mu_max %.4f, std %.4f, 95 %% %.4f .. %.4f, peak at %.2f %% slip\n",
@@ -459,6 +520,13 @@ std::string text(const ReplayResult& result) {
     out += "  " + no_experiment(result) + "\n";
   } else if (!why.empty()) {
     out += "  neither pedal pressed, and no experiment for: " + why + "\n";
+  }
+  if (!result.assumed.empty()) {
+    out += "  assumed, as the configuration leaves them out: ";
+    for (const std::string& key : result.assumed) {
+      out += (&key == &result.assumed.front() ? "" : ", ") + key;
+    }
+    out += "\n";
   }
   out += format("  %llu frames in %.1f s, %llu decoded, %llu bad; %llu bad lines\n",
                 static_cast<unsigned long long>(result.frames),

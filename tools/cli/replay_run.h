@@ -9,18 +9,20 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core/arming.h"
-#include "daemon/core/config.h"
-#include "daemon/core/pipeline.h"
-#include "daemon/core/port.h"
-#include "tools/sim/log_timeline.h"
+#include "daemon/core/base/port.h"
+#include "daemon/core/config/config.h"
+#include "daemon/core/experiment/arming.h"
+#include "daemon/core/loop/loop.h"
+#include "daemon/core/loop/pipeline.h"
+#include "tools/ports/log_timeline.h"
 
 namespace beltgrip::cli {
 
 struct ReplayResult {
   std::string log;  // its name: the path, joined ones with "+"
   std::vector<daemon::ExperimentResult> experiments;
-  std::vector<std::string> lost;  // with each: the roles that were lost as it ended; empty: none
+  std::vector<std::string> lost;     // with each: the roles that were lost as it ended; empty: none
+  std::vector<std::string> assumed;  // keys that nobody stated and a result rests on
   std::vector<std::string> warnings;  // one line each
   std::uint64_t frames = 0;           // in the log
   std::uint64_t frames_decoded = 0;
@@ -34,8 +36,9 @@ struct ReplayResult {
 };
 
 struct ReplayOutputs {
-  std::FILE* trace = nullptr;    // CSV, one row a sample of an experiment
-  std::FILE* log_out = nullptr;  // candump, what the daemon would have sent
+  std::FILE* trace = nullptr;          // CSV, one row a sample of an experiment
+  std::FILE* log_out = nullptr;        // candump, what the daemon would have sent
+  daemon::SampleSink* also = nullptr;  // sees every report, after the results
 };
 
 // The logs as one timeline without BeltGrip's own frames; those of an interface named as the
@@ -53,7 +56,7 @@ ReplayResult replay(const std::vector<std::string>& paths, const std::string& in
 
 // The daemon's loop on this port until it closes; the results go into `result`.
 void run_daemon(daemon::Port& port, const daemon::Config& config, ReplayResult& result,
-                std::FILE* trace);
+                const ReplayOutputs& outputs = {});
 
 // A line for each experiment, and the line of the summary.
 std::string experiment_lines(const ReplayResult& result);
@@ -64,9 +67,7 @@ std::string text(const ReplayResult& result);
 
 // "12.345" without a rounding error, whatever the origin of the stamps.
 std::string seconds_text(std::int64_t t_ns);
-// Text of a value of BeltGrip's own frames, as in beltgrip.dbc: ("BeltGripSlip", "Phase", 2) is
-// "Peak".
-std::string own_label(const char* message, const char* signal, std::int64_t raw);
-std::string snake_case(const std::string& label);
+std::string outcome_text(daemon::Outcome outcome);
+std::string reason_text(estimator::StopReason reason);
 
 }  // namespace beltgrip::cli

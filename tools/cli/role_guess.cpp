@@ -4,7 +4,7 @@
 #include <array>
 #include <string_view>
 
-#include "can_dbc/unit_text.h"
+#include "can_dbc/text/unit_text.h"
 
 namespace beltgrip::cli {
 
@@ -91,7 +91,47 @@ int score(const RoleWords& row, const std::string& message, const std::string& s
   return sum;
 }
 
+// Names of the value at which a flag is 1, the more telling ones in front; of several such values
+// the one with the shortest name.
+const Words kTrue = {"locked",  "closed",    "lock",      "engaged", "pressed",
+                     "applied", "depressed", "permitted", "allowed", "enabled",
+                     "active",  "running",   "yes",       "true",    "on"};
+const Words kNotTrue = {"not",      "no",     "un",          "in",      "slip",
+                        "slipping", "partly", "partially",   "error",   "fault",
+                        "invalid",  "sna",    "unavailable", "reserved"};
+
+int label_points(const std::string& label) {
+  const std::vector<std::string> words = words_of(label);
+  const bool denied = std::any_of(words.begin(), words.end(), [](const std::string& word) {
+    return std::find(kNotTrue.begin(), kNotTrue.end(), word) != kNotTrue.end();
+  });
+  if (denied) return 0;
+  constexpr int kPerWord = 100;
+  const int best = points(kTrue, words);
+  return best == 0 ? 0
+                   : best * kPerWord - static_cast<int>(std::min<std::size_t>(words.size(), 99));
+}
+
 }  // namespace
+
+TrueWhen guess_true_when(daemon::Role role, const can::SignalDef& signal) {
+  TrueWhen result;
+  if (daemon::role_dimension(role) != can::Dimension::kNone || signal.values.empty()) return result;
+  int best = 0;
+  std::int64_t at = 1;
+  for (const auto& [value, label] : signal.values) {
+    const int gained = label_points(label);
+    if (gained <= best) continue;
+    best = gained;
+    at = value;
+    result.label = label;
+  }
+  const bool plain = std::all_of(signal.values.begin(), signal.values.end(), [](const auto& each) {
+    return each.first == 0 || each.first == 1;
+  });
+  result.needed = !plain || at != 1;
+  return result;
+}
 
 std::vector<std::string> words_of(const std::string& name) {
   std::vector<std::string> words;

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "can_dbc/dbc_model.h"
-#include "daemon/core/config.h"
+#include "can_dbc/dbc/model.h"
+#include "daemon/core/config/config.h"
 
 namespace beltgrip::cli {
 
@@ -20,6 +20,13 @@ struct RoleCandidate {
 // Best first. Pointers into the databases.
 std::vector<RoleCandidate> guess_role(daemon::Role role,
                                       const std::vector<can::Database>& databases);
+
+// At which values a flag is 1.
+struct TrueWhen {
+  bool needed = false;  // 1 does not do: it has other values, or 1 is the name of something else
+  std::string label;    // of the value table; empty: none tells
+};
+TrueWhen guess_true_when(daemon::Role role, const can::SignalDef& signal);
 
 // "N_PrimSpd2" -> n, prim, spd.
 std::vector<std::string> words_of(const std::string& name);

@@ -13,8 +13,8 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/core/loop.h"
-#include "daemon/core/pipeline.h"
+#include "daemon/core/loop/loop.h"
+#include "daemon/core/loop/pipeline.h"
 #include "daemon/io/inproc_bus.h"
 #include "tools/cli/bus.h"
 #include "tools/cli/command.h"
@@ -167,7 +167,7 @@ void run_vehicle(const Options& options) {
   };
   sim::VehiclePort port(scenario, options.scenario.seed, observers);
   ReplayResult result;
-  run_daemon(port, config, result, nullptr);
+  run_daemon(port, config, result);
   if (!port.finite()) {
     fail_not_finite(static_cast<double>(port.now()) * 1e-9, options.scenario.seed);
   }

@@ -5,10 +5,11 @@
 #include <limits>
 #include <sstream>
 
+#include "daemon/core/config/toml_bounds.h"
 #include "tools/cli/exit_codes.h"
-#include "tools/cli/json_writer.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/vehicle_scenario.h"
+#include "tools/text/json_writer.h"
 
 namespace beltgrip::cli {
 
@@ -27,6 +28,21 @@ std::string shipped_names() {
   return names;
 }
 
+// Before a parser sees it.
+sim::ScenarioLayer bounded(sim::ScenarioLayer layer) {
+  if (const auto beyond = daemon::beyond_bounds(layer.text)) {
+    throw Failure{kConfiguration, layer.source + ":" + std::to_string(beyond->line) + ": found " +
+                                      beyond->text + ", expected a scenario in TOML"};
+  }
+  return layer;
+}
+
+// "KEY=VALUE" of --set.
+sim::ScenarioLayer setting_of(const std::string& setting) {
+  bounded({"--set", setting});
+  return sim::setting_layer(setting);
+}
+
 sim::ScenarioLayer layer_of(const std::string& scenario) {
   if (const auto text = sim::resource(scenario + std::string(kSuffix))) {
     return {scenario + std::string(kSuffix), std::string(*text)};
@@ -37,7 +53,7 @@ sim::ScenarioLayer layer_of(const std::string& scenario) {
     throw Failure{kNoInput, scenario + ": neither a readable file nor a shipped scenario (" +
                                 shipped_names() + ")"};
   }
-  return {scenario, text.str()};
+  return bounded({scenario, text.str()});
 }
 
 }  // namespace
@@ -62,7 +78,7 @@ void ScenarioOptions::add_to(CLI::App& command) {
 sim::Scenario ScenarioOptions::load() const {
   std::vector<sim::ScenarioLayer> layers{{kBase, std::string(sim::shipped(kBase))}};
   layers.push_back(layer_of(scenario));
-  for (const std::string& setting : settings) layers.push_back(sim::setting_layer(setting));
+  for (const std::string& setting : settings) layers.push_back(setting_of(setting));
   if (!belt.empty()) layers.push_back({"--belt " + belt, "belt = \"" + belt + "\""});
   sim::ScenarioResult result = sim::parse_scenario(layers);
   if (!result.errors.empty()) {
@@ -83,7 +99,7 @@ sim::VehicleScenario ScenarioOptions::load_vehicle() const {
                   "--belt and --start are for the rig; a vehicle takes --set belt.mu_max=..."};
   }
   std::vector<sim::ScenarioLayer> layers{layer_of(scenario)};
-  for (const std::string& setting : settings) layers.push_back(sim::setting_layer(setting));
+  for (const std::string& setting : settings) layers.push_back(setting_of(setting));
   if (duration_s > 0.0) {
     layers.push_back(sim::setting_layer("run.duration_s=" + std::to_string(duration_s)));
   }

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "can_dbc/can_log.h"
+#include "can_dbc/log/can_log.h"
 #include "tools/cli/bus.h"
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"
@@ -15,11 +15,13 @@
 #include "tools/cli/replay_run.h"
 #include "tools/cli/scenario_options.h"
 #include "tools/cli/simulate_vehicle.h"
+#include "tools/cli/stop_signals.h"
 #include "tools/cli/verdict.h"
-#include "tools/sim/replay_port.h"
+#include "tools/ports/replay_port.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/rig_source.h"
 #include "tools/sim/vehicle_bus.h"
+#include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
 
@@ -36,6 +38,7 @@ struct Options {
   std::string model;
   int experiment = 0;
   double speed = 1.0;
+  bool force = false;
 
   // The machine that runs: the scenario with the model on it.
   template <typename Scenario>
@@ -103,7 +106,7 @@ Run run_rig(const Options& options, std::FILE* log, bool results) {
     logs.push_back(std::move(reader));
     sim::LogTimeline timeline(std::move(logs), {});
     sim::ReplayPort port(timeline, {});
-    run_daemon(port, load_configuration_text(run.configuration, run.dbc, ""), run.daemon, nullptr);
+    run_daemon(port, load_configuration_text(run.configuration, run.dbc, ""), run.daemon);
     run.daemon.log = scenario.name;
     run.daemon.frames = timeline.stats().frames;
     run.daemon.duration_ns = timeline.counters().last_ns - timeline.counters().first_ns;
@@ -164,26 +167,38 @@ void run(const Options& options) {
       throw Failure{kCannotCreate, options.out_dir + ": cannot be created: " + error.message()};
     }
   }
-  std::optional<OutputFile> log, json;
-  if (!options.out_dir.empty()) log.emplace((directory / "trace.log").string());
-  if (!options.log_out.empty()) log.emplace(options.log_out);
-  if (!options.json.empty()) json.emplace(options.json);
+  const Inputs inputs{options.scenario.scenario, options.model};
+  std::optional<OutputFile> log, json, dbc, configuration, truth;
+  if (!options.out_dir.empty()) {
+    const auto open = [&](std::optional<OutputFile>& file, const char* name) {
+      file.emplace((directory / name).string(), inputs, unless_forced(options.force));
+    };
+    open(log, "trace.log");
+    open(dbc, "vehicle.dbc");
+    open(configuration, "beltgrip.toml");
+    open(truth, "truth.json");
+  }
+  if (!options.log_out.empty()) log.emplace(options.log_out, inputs);
+  if (!options.json.empty()) json.emplace(options.json, inputs);
   std::FILE* const log_file = log ? log->get() : nullptr;
   // A log of the rig alone does not need the daemon, which would double its time.
   const bool results = json || places == 0;
   const Run run = options.scenario.is_vehicle() ? run_vehicle(options, log_file)
                                                 : run_rig(options, log_file, results);
   if (log) log->close();
-  if (!options.out_dir.empty()) {
-    write_file((directory / "vehicle.dbc").string(), run.dbc);
-    write_file((directory / "beltgrip.toml").string(), run.configuration);
-    write_file((directory / "truth.json").string(), run.truth_json);
-  }
+  const auto finish = [](std::optional<OutputFile>& file, std::string_view text) {
+    if (!file) return;
+    file->write(text);
+    file->close();
+  };
+  finish(dbc, run.dbc);
+  finish(configuration, run.configuration);
+  finish(truth, run.truth_json);
   if (json) {
     json->write(experiment_lines(run.daemon) + run.truth_json + summary_line(run.daemon));
     json->close();
   }
-  if (results && !to_stdout) std::fputs((text(run.daemon) + run.truth_text).c_str(), stdout);
+  if (results && !to_stdout) print(stdout, text(run.daemon) + run.truth_text);
 }
 
 }  // namespace
@@ -196,6 +211,7 @@ void add_simulate(CLI::App& app) {
   options->scenario.add_to(*command);
   command->add_option("--out-dir", options->out_dir,
                       "Write trace.log, vehicle.dbc, beltgrip.toml and truth.json there");
+  command->add_flag("--force", options->force, "Replace files of --out-dir that exist");
   command->add_option("--log-out", options->log_out, "Write the log alone, '-': standard output");
   command->add_option("--json", options->json,
                       "Results and truth as JSON lines, '-': standard output");

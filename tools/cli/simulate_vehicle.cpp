@@ -7,13 +7,14 @@
 #include <optional>
 #include <vector>
 
-#include "can_dbc/can_log.h"
+#include "can_dbc/log/can_log.h"
 #include "tools/cli/bus.h"
 #include "tools/cli/configuration.h"
 #include "tools/cli/exit_codes.h"
-#include "tools/cli/json_writer.h"
+#include "tools/cli/stop_signals.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/vehicle_port.h"
+#include "tools/text/json_writer.h"
 
 namespace beltgrip::cli {
 
@@ -121,7 +122,7 @@ DriveResult drive_with_daemon(const sim::VehicleScenario& believed,
     ++result.daemon.frames;
   };
   sim::VehiclePort port(machine, seed, observers);
-  run_daemon(port, config, result.daemon, nullptr);
+  run_daemon(port, config, result.daemon);
   port.run_alone();  // where the script ended the daemon before the drive
   if (!port.finite()) fail_not_finite(seconds(port.vehicle()), seed);
   result.daemon.duration_ns = port.vehicle().now_ns();

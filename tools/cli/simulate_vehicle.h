@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core/port.h"
+#include "daemon/core/base/port.h"
 #include "tools/cli/replay_run.h"
 #include "tools/sim/vehicle_bus.h"
 #include "tools/sim/vehicle_parameters.h"

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "tools/cli/exit_codes.h"
+#include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
 
@@ -26,6 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 constexpr const char* kRuntimeFolder = "/run/beltgrip";
 constexpr timeval kPatience{5, 0};
+constexpr std::size_t kAnswerMost = std::size_t{1} << 20;
 
 struct Options {
   std::string interface;
@@ -75,14 +77,16 @@ std::string ask(const std::string& path) {
   char buffer[4096];
   for (ssize_t size; (size = read(*fd, buffer, sizeof buffer)) > 0;) {
     text.append(buffer, static_cast<std::size_t>(size));
+    if (text.size() > kAnswerMost) throw Failure{kBadInput, path + ": an answer without end"};
   }
   if (text.empty()) throw Failure{kUnavailable, path + ": beltgripd did not answer within 5 s"};
   return text;
 }
 
-void print(const nlohmann::ordered_json& status) {
+void show(const nlohmann::ordered_json& status) {
   const auto line = [](const std::string& name, const std::string& text) {
-    std::printf("%-16s %s\n", name.c_str(), text.c_str());
+    print(stdout, can::printable(name) + std::string(name.size() < 16 ? 16 - name.size() : 0, ' ') +
+                      " " + can::printable(text) + "\n");
   };
   const auto list = [](const nlohmann::ordered_json& names) {
     std::string text;
@@ -142,9 +146,14 @@ void add_status(CLI::App& app) {
     const auto status = nlohmann::ordered_json::parse(text, nullptr, false);
     if (status.is_discarded()) throw Failure{kBadInput, path + ": the answer is not whole"};
     if (options->json) {
-      std::fputs(text.c_str(), stdout);
+      print(stdout, text);
     } else {
-      print(status);
+      try {
+        show(status);
+      } catch (const nlohmann::json::exception& error) {
+        throw Failure{kBadInput, path + ": found an answer that is not beltgripd's (" +
+                                     error.what() + "), expected its state as JSON"};
+      }
     }
   });
 }

@@ -1,12 +1,14 @@
 #include "tools/cli/verdict.h"
+#include "can_dbc/text/printable.h"
 
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "tools/cli/exit_codes.h"
-#include "tools/cli/json_writer.h"
 #include "tools/cli/replay_run.h"
+#include "tools/text/json_writer.h"
+#include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
 
@@ -19,7 +21,8 @@ std::string format(const char* pattern, auto... arguments) {
 }
 
 void line(std::FILE* out, const char* what, const std::string& measured, const std::string& truth) {
-  std::fprintf(out, "  %-12s %-22s %s\n", what, measured.c_str(), truth.c_str());
+  std::fprintf(out, "  %-12s %-22s %s\n", what, can::printable(measured).c_str(),
+               can::printable(truth).c_str());
 }
 
 }  // namespace

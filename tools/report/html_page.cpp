@@ -23,12 +23,19 @@ th { background: #f3f3f3; }
 // One scatter chart per entry of `data`; a series is [name, is a line, is dashed, [x, y, x, y,
 // ...]].
 constexpr std::string_view kScript = R"(
-const colours = ['#1f6fb4', '#d1495b', '#999999', '#2e8b57', '#8d6a9f', '#b8860b', '#555555'];
+const colours = ['#1f6fb4', '#d1495b', '#999999', '#2e8b57', '#8d6a9f', '#b8860b', '#555555',
+                 '#17a2b8', '#e377c2', '#000000'];
+// What bears the same name has the same colour in every chart of the page.
+const names = [];
+const colourOf = (name) => {
+  if (!names.includes(name)) names.push(name);
+  return colours[names.indexOf(name) % colours.length];
+};
 for (const [id, title, xLabel, yLabel, series] of data) {
-  const datasets = series.map(([label, line, dashed, xy], i) => {
+  const datasets = series.map(([label, line, dashed, xy]) => {
     const points = [];
     for (let k = 0; k + 1 < xy.length; k += 2) points.push({x: xy[k], y: xy[k + 1]});
-    const colour = colours[i % colours.length];
+    const colour = colourOf(label);
     return {label, data: points, showLine: line, borderColor: colour, backgroundColor: colour,
             borderWidth: line ? 1.5 : 0, borderDash: dashed ? [5, 4] : [],
             pointRadius: line ? 0 : 1.5};

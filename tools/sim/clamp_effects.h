@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "estimator/machine_effects.h"
+#include "estimator/physics/machine_effects.h"
 
 namespace beltgrip::sim {
 

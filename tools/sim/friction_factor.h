@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/machine_effects.h"
+#include "estimator/physics/machine_effects.h"
 
 namespace beltgrip::sim {
 

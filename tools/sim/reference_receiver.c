@@ -86,3 +86,21 @@ double beltgrip_receiver_force(struct beltgrip_receiver* receiver,
   receiver->applied_at_us = now_us;
   return force_N;
 }
+
+double beltgrip_own_torque_Nm(struct beltgrip_own_torque* torque, double requested_Nm,
+                              double actual_Nm, uint32_t now_us) {
+  const double requested = requested_Nm < 0.0 ? -requested_Nm : requested_Nm;
+  const double actual = actual_Nm < 0.0 ? -actual_Nm : actual_Nm;
+  const double now_Nm = requested > actual ? requested : actual;
+  const bool differ = (requested_Nm < 0.0) != (actual_Nm < 0.0);
+  if (!torque->reversing && !differ) return now_Nm;
+  if (!torque->reversing || torque->held_Nm < now_Nm) torque->held_Nm = now_Nm;
+  if (differ) {
+    torque->reversing = true;
+    torque->differed_us = now_us;
+  } else if ((uint32_t)(now_us - torque->differed_us) >= BELTGRIP_REVERSAL_US) {
+    torque->reversing = false;
+    return now_Nm;
+  }
+  return torque->held_Nm;
+}

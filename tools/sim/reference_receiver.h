@@ -60,6 +60,23 @@ double beltgrip_receiver_force(struct beltgrip_receiver* receiver,
                                const struct beltgrip_limits* limits, double own_force_N,
                                bool permitted, uint32_t now_us);
 
+/* The torque that the controller's own clamping law has to hold, as a magnitude. The actual torque
+ * follows the requested one late, and the hydraulics follow late again; through a reversal the
+ * magnitude of either passes zero while the belt is about to be loaded the other way. So: the
+ * larger of the two, and from the moment their signs differ until BELTGRIP_REVERSAL_US after they
+ * agree again, the largest of all that was seen since. */
+#define BELTGRIP_REVERSAL_US 300000u
+
+struct beltgrip_own_torque {
+  bool reversing;
+  double held_Nm;
+  uint32_t differed_us; /* when the signs last differed */
+};
+
+/* Once every control cycle; signed torques, positive in drive. Begins zeroed. */
+double beltgrip_own_torque_Nm(struct beltgrip_own_torque* torque, double requested_Nm,
+                              double actual_Nm, uint32_t now_us);
+
 #ifdef __cplusplus
 }
 #endif

@@ -1,5 +1,5 @@
 // Files that are part of the program: shipped scenarios and DBC files, so that it needs none beside
-// it. Generated from tools/scenarios and can_dbc at build. Tools only.
+// it. Generated from tools/scenarios at build. Tools only.
 #pragma once
 
 #include <optional>

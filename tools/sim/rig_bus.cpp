@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "can_dbc/unit_text.h"
+#include "can_dbc/text/unit_text.h"
 
 namespace beltgrip::sim {
 

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "can_dbc/can_frame.h"
-#include "can_dbc/dbc_model.h"
-#include "can_dbc/signal_codec.h"
+#include "can_dbc/dbc/model.h"
+#include "can_dbc/dbc/signal_codec.h"
+#include "can_dbc/frame/can_frame.h"
 #include "tools/sim/random.h"
 #include "tools/sim/rig_simulation.h"
 #include "tools/sim/scenario.h"

@@ -5,8 +5,8 @@
 #include <limits>
 #include <numbers>
 
-#include "can_dbc/dbc_parser.h"
-#include "estimator/variator_geometry.h"
+#include "can_dbc/dbc/parser.h"
+#include "estimator/physics/variator_geometry.h"
 #include "tools/sim/resources.h"
 
 namespace beltgrip::sim {
@@ -45,7 +45,7 @@ std::string rig_configuration(const Scenario& scenario, const std::string& inter
   const auto& v = scenario.variator;
   const auto radii = estimator::running_radii(v.ratio, v.belt_length_m, v.centre_distance_m);
   const char* const stop = v.ratio < 1.0 ? "low" : "overdrive";
-  char text[1600];
+  char text[2200];
   std::snprintf(
       text, sizeof text,
       "# BeltGrip on the simulated rig (scenario %s).\n"
@@ -69,6 +69,13 @@ std::string rig_configuration(const Scenario& scenario, const std::string& inter
       "primary_radius_%s_m = %.4f\n"
       "secondary_piston_area_m2   = %.6g\n"
       "secondary_spring_force_N   = %.6g\n"
+      "secondary_centrifugal_N_s2 = 0\n"
+      "\n"
+      "[sensors]   # those of a test bench, calibrated against each other\n"
+      "primary_speed      = { bias_rad_s = 0, gain = 0 }\n"
+      "secondary_speed    = { bias_rad_s = 0, gain = 0 }\n"
+      "secondary_pressure = { bias_Pa = 0, gain = 0 }\n"
+      "primary_torque     = { bias_Nm = 0, gain = 0 }\n"
       "\n"
       "[estimator]\n"
       "method = \"robust\"\n"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "can_dbc/can_frame.h"
+#include "can_dbc/frame/can_frame.h"
 #include "tools/sim/rig_bus.h"
 #include "tools/sim/rig_simulation.h"
 

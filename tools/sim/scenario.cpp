@@ -9,7 +9,7 @@
 #include <sstream>
 #include <variant>
 
-#include "estimator/variator_geometry.h"
+#include "estimator/physics/variator_geometry.h"
 
 namespace beltgrip::sim {
 

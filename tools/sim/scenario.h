@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/machine_effects.h"
+#include "estimator/physics/machine_effects.h"
 #include "tools/sim/friction_curve.h"
 #include "tools/sim/variator_plant.h"
 

@@ -93,13 +93,15 @@ void TcuModel::decide_permission(const TcuInput& input, double t_s) {
   out_.permitted = settled && t_s - settled_since_s_ >= kPermitSettle_s;
 }
 
-double TcuModel::own_force_N(const TcuInput& input) const {
+double TcuModel::own_force_N(const TcuInput& input, double t_s) {
   const double wedge = std::cos(variator_.half_wedge_angle_rad);
   // A clutch that slips carries what it can, whatever the engine gives.
   const double clutch_Nm = out_.lockup_closed ? 0.0 : out_.lockup_capacity_Nm;
-  const double torque_Nm = std::max({std::abs(input.torque_e_Nm), clutch_Nm,
-                                     input.accelerator * engine_.torque_max_Nm}) +
-                           parameters_.torque_reserve_Nm;
+  const double held_Nm = beltgrip_own_torque_Nm(&own_torque_, input.torque_requested_Nm,
+                                                input.torque_e_Nm, microseconds(t_s));
+  const double torque_Nm =
+      std::max({held_Nm, clutch_Nm, input.accelerator * engine_.torque_max_Nm}) +
+      parameters_.torque_reserve_Nm;
   const double centrifugal_N =
       variator_.secondary_centrifugal_N_s2 * input.omega_s_rad_s * input.omega_s_rad_s;
   const double least_N = variator_.secondary_spring_force_N + centrifugal_N +
@@ -139,7 +141,9 @@ void TcuModel::cycle(double t_s, const TcuInput& input) {
   ratio_target_ =
       std::clamp(ratio_target(input, t_s), ratio_target_ / limit, ratio_target_ * limit);
   decide_lockup(input, t_s);
-  out_.own_force_N = own_force_N(input);
+  out_.own_force_N =
+      std::max(own_force_N(input, t_s),
+               out_.own_force_N - parameters_.own_fall_max_N_per_s * parameters_.cycle_s);
   decide_permission(input, t_s);
   out_.force_N = secondary_force_N(t_s);
 

@@ -2,7 +2,8 @@
 // the reference receiver through which it obeys a BeltGripClamp request within its limits. Runs
 // every cycle_s on the values of its own sensors. Simulation only.
 //
-//   own clamp force  F_s = (max(|T_e|, pedal demand) + reserve) cos(theta) / (2 R_p mu_design)
+//   own clamp force  F_s = (T + reserve) cos(theta) / (2 R_p mu_design), T from requested and
+//   actual engine torque by beltgrip_own_torque_Nm of the reference receiver
 // It withdraws its permission when its own force has risen by a sixth since a request began: more
 // torque than it agreed to.
 //   primary force    F_s e^(a ln r_g) e^(controller), more than that at the overdrive stop, less at
@@ -11,7 +12,7 @@
 
 #include <cstdint>
 
-#include "can_dbc/can_frame.h"
+#include "can_dbc/frame/can_frame.h"
 #include "tools/sim/fault_script.h"
 #include "tools/sim/reference_receiver.h"
 #include "tools/sim/vehicle_parameters.h"
@@ -24,6 +25,7 @@ struct TcuInput {
   double omega_s_rad_s = 0.0;
   double speed_m_s = 0.0;
   double torque_e_Nm = 0.0;
+  double torque_requested_Nm = 0.0;
   double ratio = 0.0;
   double accelerator = 0.0;
   double brake_m_s2 = 0.0;
@@ -59,7 +61,7 @@ class TcuModel {
   double ratio_target(const TcuInput& input, double t_s) const;
   void decide_lockup(const TcuInput& input, double t_s);
   void decide_permission(const TcuInput& input, double t_s);
-  double own_force_N(const TcuInput& input) const;
+  double own_force_N(const TcuInput& input, double t_s);
   double secondary_force_N(double t_s);
 
   VariatorParameters variator_;
@@ -68,6 +70,7 @@ class TcuModel {
   double pressure_floor_Pa_;
   FaultScript& faults_;
   beltgrip_receiver receiver_;
+  beltgrip_own_torque own_torque_{};
   double ratio_integral_ = 0.0;
   double ratio_target_ = 0.0;
   double settled_since_s_ = 0.0;

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "estimator/variator_geometry.h"
+#include "estimator/physics/variator_geometry.h"
 
 namespace beltgrip::sim {
 

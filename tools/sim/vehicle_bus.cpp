@@ -7,9 +7,9 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "can_dbc/dbc_parser.h"
-#include "can_dbc/unit_text.h"
-#include "estimator/variator_geometry.h"
+#include "can_dbc/dbc/parser.h"
+#include "can_dbc/text/unit_text.h"
+#include "estimator/physics/variator_geometry.h"
 #include "tools/sim/resources.h"
 
 namespace beltgrip::sim {
@@ -302,6 +302,8 @@ std::string vehicle_configuration(const VehicleScenario& scenario, std::string_v
                 "0x210 }\n"
                 "\n"
                 "[sensors]\n"
+                "primary_speed      = { bias_rad_s = 0, gain = 0 }\n"
+                "secondary_speed    = { bias_rad_s = 0, gain = 0 }\n"
                 "engine_torque      = { bias_Nm = %.6g, gain = %.6g }\n"
                 "secondary_pressure = { bias_Pa = %.6g, gain = %.6g }\n"
                 "\n"

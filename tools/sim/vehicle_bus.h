@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "can_dbc/can_frame.h"
-#include "can_dbc/dbc_model.h"
-#include "can_dbc/signal_codec.h"
+#include "can_dbc/dbc/model.h"
+#include "can_dbc/dbc/signal_codec.h"
+#include "can_dbc/frame/can_frame.h"
 #include "tools/sim/random.h"
 #include "tools/sim/vehicle_simulation.h"
 

@@ -41,6 +41,7 @@ double VehicleEngine::step(double accelerator, double omega_rad_s, double extra_
     const double idle_Nm = drag_Nm + kIdleGain_Nm_s * (parameters_.idle_rad_s - omega_rad_s);
     wanted_Nm = std::max({wanted_Nm, starter_Nm, std::clamp(idle_Nm, 0.0, kIdleTorqueMax_Nm)});
   }
+  requested_Nm_ = wanted_Nm - drag_Nm;
   demand_Nm_ = std::min(wanted_Nm, demand_Nm_ + parameters_.torque_rise_Nm_s * step_s);
   torque_Nm_ += -std::expm1(-step_s / parameters_.torque_lag_s) * (demand_Nm_ - torque_Nm_);
   reported_Nm_ = torque_Nm_ - drag_Nm + extra_Nm;

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/machine_effects.h"
+#include "estimator/physics/machine_effects.h"
 #include "tools/sim/fault_script.h"
 #include "tools/sim/friction_curve.h"
 
@@ -89,6 +89,7 @@ struct TcuParameters {
   double design_friction = 0.0;
   double force_floor_N = 0.0;  // for requests
   double force_fall_max_N_per_s = 0.0;
+  double own_fall_max_N_per_s = 0.0;      // of its own force
   double coast_engine_speed_rad_s = 0.0;  // ratio schedule: primary speed at zero pedal
   double full_engine_speed_rad_s = 0.0;   // and at full pedal
   double lockup_above_m_s = 0.0;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/variator_geometry.h"
+#include "estimator/physics/variator_geometry.h"
 #include "tools/sim/friction_factor.h"
 
 namespace beltgrip::sim {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "can_dbc/e2e.h"
+#include "can_dbc/frame/e2e.h"
 
 namespace beltgrip::sim {
 

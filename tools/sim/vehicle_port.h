@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "daemon/core/port.h"
+#include "daemon/core/base/port.h"
 #include "tools/sim/vehicle_bus.h"
 #include "tools/sim/vehicle_simulation.h"
 

@@ -6,7 +6,7 @@
 
 #include <toml++/toml.h>
 
-#include "estimator/variator_geometry.h"
+#include "estimator/physics/variator_geometry.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/scenario_reader.h"
 #include "tools/sim/vehicle_bus.h"
@@ -131,6 +131,8 @@ void name_controller(ScenarioReader& r, TcuParameters& t) {
   r.number("controller.force_floor_N", t.force_floor_N, 0.0, 1e5, "the belt must be clamped");
   r.number("controller.force_fall_max_N_per_s", t.force_fall_max_N_per_s, 1.0, 1e5,
            "the force falls at this rate");
+  r.number("controller.own_fall_max_N_per_s", t.own_fall_max_N_per_s, 1.0, 1e9,
+           "a rate of its own force");
   r.number("controller.coast_engine_speed_rad_s", t.coast_engine_speed_rad_s, 50.0, 500.0,
            "an engine speed above idle");
   r.number("controller.full_engine_speed_rad_s", t.full_engine_speed_rad_s, 50.0, 800.0,

@@ -66,6 +66,7 @@ void VehicleSimulation::control(double t_s, const DriverOutput& driver) {
   input.omega_s_rad_s = plant_.state().omega_s_rad_s;
   input.speed_m_s = plant_.speed_m_s();
   input.torque_e_Nm = engine_.reported_torque_Nm();
+  input.torque_requested_Nm = engine_.requested_torque_Nm();
   input.ratio = plant_.state().ratio;
   input.accelerator = driver.accelerator;
   input.brake_m_s2 = driver.brake_m_s2;

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "can_dbc/can_frame.h"
+#include "can_dbc/frame/can_frame.h"
 #include "tools/sim/clamp_effects.h"
 #include "tools/sim/fault_script.h"
 #include "tools/sim/hydraulic_actuator.h"

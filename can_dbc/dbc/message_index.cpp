@@ -1,0 +1,100 @@
+#include "can_dbc/dbc/message_index.h"
+
+#include <bit>
+
+namespace beltgrip::can {
+
+namespace {
+constexpr std::uint32_t kSourceMask = 0xFF;
+constexpr std::uint32_t kNullSource = 0xFE;  // what a DBC writes for "any source"
+}  // namespace
+
+MessageIndex::MessageIndex(std::span<const Database* const> databases)
+    : standard_(kStandardIdMax + 1, kEmpty) {
+  std::size_t extended = 0;
+  for (const Database* database : databases) {
+    for (const MessageDef& message : database->messages) extended += message.id.extended ? 1 : 0;
+  }
+  constexpr std::size_t kKeysPerMessage = 3;
+  slots_.resize(std::bit_ceil(2 * kKeysPerMessage * extended + 1));
+
+  for (std::uint32_t database = 0; database < databases.size(); ++database) {
+    const std::vector<MessageDef>& messages = databases[database]->messages;
+    for (std::uint32_t message = 0; message < messages.size(); ++message) {
+      places_.push_back({database, message});
+      insert_message(messages[message], static_cast<std::uint32_t>(places_.size() - 1));
+    }
+  }
+  // The group alone: a message from the null address stands for every source, before all others.
+  for (const bool null_source : {true, false}) {
+    for (std::uint32_t place = 0; place < places_.size(); ++place) {
+      const MessageDef& message =
+          databases[places_[place].database]->messages[places_[place].message];
+      if (!message.j1939 || !message.id.extended) continue;
+      if (((message.id.value & kSourceMask) == kNullSource) != null_source) continue;
+      insert(key_of(Kind::kGroup, parameter_group(message.id.value)), place);
+    }
+  }
+}
+
+void MessageIndex::insert_message(const MessageDef& message, std::uint32_t place) {
+  const auto conflict_with = [&](const Place& used) {
+    // Within one file it is a warning of that file.
+    if (used.database != places_[place].database) conflicts_.push_back({used, places_[place]});
+  };
+  const std::uint32_t id = message.id.value;
+  if (!message.id.extended) {
+    if (id > kStandardIdMax) return;
+    if (standard_[id] == kEmpty) {
+      standard_[id] = place;
+    } else {
+      conflict_with(places_[standard_[id]]);
+    }
+    return;
+  }
+  const std::uint64_t exact = key_of(Kind::kIdentifier, id);
+  const bool is_new = insert(exact, place);
+  if (!is_new) conflict_with(*find(exact));
+  if (!message.j1939) return;
+  const std::uint64_t group =
+      key_of(Kind::kGroupAndSource, (parameter_group(id) << 8) | (id & kSourceMask));
+  if (!insert(group, place) && is_new) conflict_with(*find(group));
+}
+
+std::size_t MessageIndex::slot_of(std::uint64_t key) const noexcept {
+  // Multiplicative hashing: the high bits of the product with 2^64 / golden ratio.
+  constexpr std::uint64_t kMultiplier = 0x9E37'79B9'7F4A'7C15U;
+  const int bits = std::countr_zero(slots_.size());
+  std::size_t slot = bits == 0 ? 0 : static_cast<std::size_t>((key * kMultiplier) >> (64 - bits));
+  while (slots_[slot].place != kEmpty && slots_[slot].key != key) {
+    slot = (slot + 1) & (slots_.size() - 1);
+  }
+  return slot;
+}
+
+const MessageIndex::Place* MessageIndex::find(std::uint64_t key) const noexcept {
+  const Slot& slot = slots_[slot_of(key)];
+  return slot.place == kEmpty ? nullptr : &places_[slot.place];
+}
+
+bool MessageIndex::insert(std::uint64_t key, std::uint32_t place) {
+  Slot& slot = slots_[slot_of(key)];
+  if (slot.place != kEmpty) return false;
+  slot = {key, place};
+  return true;
+}
+
+const MessageIndex::Place* MessageIndex::lookup(CanId id) const noexcept {
+  if (places_.empty()) return nullptr;
+  if (!id.extended) {
+    if (id.value > kStandardIdMax || standard_[id.value] == kEmpty) return nullptr;
+    return &places_[standard_[id.value]];
+  }
+  if (const Place* place = find(key_of(Kind::kIdentifier, id.value))) return place;
+  const std::uint32_t group = parameter_group(id.value);
+  const std::uint32_t group_and_source = (group << 8) | (id.value & kSourceMask);
+  if (const Place* place = find(key_of(Kind::kGroupAndSource, group_and_source))) return place;
+  return find(key_of(Kind::kGroup, group));
+}
+
+}  // namespace beltgrip::can

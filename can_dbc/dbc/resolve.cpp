@@ -1,0 +1,712 @@
+// Second step of the DBC parser: statements that refer to messages, signals, nodes and variables
+// find them, wherever they stand in the file; attributes take effect (long names, frame format,
+// cycle time); multiplexing becomes one rule per signal.
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <set>
+#include <span>
+#include <utility>
+
+#include "can_dbc/dbc/draft.h"
+#include "can_dbc/text/encoding.h"
+
+namespace beltgrip::can::dbc {
+
+namespace {
+
+// Objects of one name or identifier beyond this many are not looked at: copies would multiply.
+constexpr std::size_t kDuplicatesMax = 8;
+// Copies of long text would multiply too.
+constexpr std::size_t kChoiceLengthMax = 255;
+constexpr std::size_t kLongNameLengthMax = 255;
+constexpr std::string_view kIndependentMessage = "VECTOR__INDEPENDENT_SIG_MSG";
+constexpr std::uint32_t kIndependentId = 0xC000'0000U;
+
+using Indices = std::span<const std::uint32_t>;
+
+class Resolver {
+ public:
+  explicit Resolver(Draft& draft) : draft_(draft), db_(draft.database) {}
+  void run();
+
+ private:
+  void index_messages();
+  Indices find_messages(std::uint32_t raw_id);
+  Indices find_signals(std::uint32_t message, std::string_view name);
+  // Calls action(signal, its source) for each signal referred to; warns and keeps the statement if
+  // there is none.
+  template <typename Action>
+  void for_signals(const Reference& reference, Action action);
+  template <typename Action>
+  void for_messages(const Reference& reference, Action action);
+  EnvironmentVariable* find_variable(std::string_view name);
+  void unresolved(const Reference& reference, const char* code, const std::string& what);
+
+  void comments();
+  void value_tables();
+  void data_bytes();
+  void attribute_defaults();
+  void attributes();
+  void relations();
+  void values();
+  void value_types();
+  void senders();
+  void groups();
+  void multiplexing();
+  void multiplex_message(std::uint32_t message, std::span<const MultiplexRef* const> rules);
+  void frame_formats();
+  void cycle_times();
+  void long_names();
+  void unassigned();
+  void kept_text();
+
+  const AttributeDef* definition_of(std::string_view name) const;
+  std::string attribute_text(const AttributeRef& reference);
+  std::string message_attribute(const MessageDef& message, const char* name) const;
+
+  Draft& draft_;
+  Database& db_;
+  std::vector<std::uint32_t> by_id_;                 // messages by raw identifier, then file order
+  std::vector<std::vector<std::uint32_t>> by_name_;  // of each message: signals by name, on demand
+  std::map<std::string_view, std::size_t> variables_;
+  std::set<std::string_view> nodes_;
+  std::map<std::string_view, std::size_t> definitions_;
+  Indices last_messages_;
+};
+
+void Resolver::index_messages() {
+  by_id_.resize(db_.messages.size());
+  std::iota(by_id_.begin(), by_id_.end(), 0U);
+  std::stable_sort(by_id_.begin(), by_id_.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return draft_.messages[a].raw_id < draft_.messages[b].raw_id;
+  });
+  by_name_.resize(db_.messages.size());
+  for (std::size_t i = 0; i < db_.environment_variables.size(); ++i) {
+    variables_.emplace(db_.environment_variables[i].name, i);
+  }
+  nodes_.insert(db_.nodes.begin(), db_.nodes.end());
+  for (std::size_t i = 0; i < db_.attribute_definitions.size(); ++i) {
+    definitions_[db_.attribute_definitions[i].name] = i;  // the last one stands
+  }
+}
+
+Indices Resolver::find_messages(std::uint32_t raw_id) {
+  if (!last_messages_.empty() && draft_.messages[last_messages_[0]].raw_id == raw_id) {
+    return last_messages_;
+  }
+  const auto less = [&](std::uint32_t message, std::uint32_t id) {
+    return draft_.messages[message].raw_id < id;
+  };
+  const auto first = std::lower_bound(by_id_.begin(), by_id_.end(), raw_id, less);
+  std::size_t count = 0;
+  while (count < kDuplicatesMax && first + static_cast<std::ptrdiff_t>(count) != by_id_.end() &&
+         draft_.messages[*(first + static_cast<std::ptrdiff_t>(count))].raw_id == raw_id) {
+    ++count;
+  }
+  if (count == 0) return {};
+  last_messages_ = Indices(&*first, count);
+  return last_messages_;
+}
+
+Indices Resolver::find_signals(std::uint32_t message, std::string_view name) {
+  const std::vector<SignalDef>& signals = db_.messages[message].signals;
+  std::vector<std::uint32_t>& order = by_name_[message];
+  if (order.size() != signals.size()) {
+    order.resize(signals.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return signals[a].name < signals[b].name;
+    });
+  }
+  const auto less = [&](std::uint32_t signal, std::string_view wanted) {
+    return signals[signal].name < wanted;
+  };
+  const auto first = std::lower_bound(order.begin(), order.end(), name, less);
+  auto last = first;
+  while (last != order.end() && last - first < static_cast<std::ptrdiff_t>(kDuplicatesMax) &&
+         signals[*last].name == name) {
+    ++last;
+  }
+  return first == last ? Indices{} : Indices(&*first, static_cast<std::size_t>(last - first));
+}
+
+void Resolver::unresolved(const Reference& reference, const char* code, const std::string& what) {
+  draft_.problems.warn(reference.offset, code, what + "; kept as text");
+  draft_.keep(reference.offset, reference.end);
+}
+
+template <typename Action>
+void Resolver::for_messages(const Reference& reference, Action action) {
+  const Indices messages = find_messages(reference.raw_id);
+  if (messages.empty()) {
+    unresolved(reference, "unknown-message",
+               "no message has the identifier " + std::to_string(reference.raw_id));
+  }
+  for (const std::uint32_t message : messages) action(db_.messages[message]);
+}
+
+template <typename Action>
+void Resolver::for_signals(const Reference& reference, Action action) {
+  if (reference.name.empty()) return draft_.keep(reference.offset, reference.end);  // said before
+  const Indices messages = find_messages(reference.raw_id);
+  if (messages.empty()) {
+    unresolved(reference, "unknown-message",
+               "no message has the identifier " + std::to_string(reference.raw_id));
+    return;
+  }
+  const std::string converted = is_ascii(reference.name) ? "" : draft_.utf8(reference.name);
+  const std::string_view name = converted.empty() ? reference.name : std::string_view(converted);
+  bool found = false;
+  for (const std::uint32_t message : messages) {
+    for (const std::uint32_t signal : find_signals(message, name)) {
+      found = true;
+      action(db_.messages[message].signals[signal]);
+    }
+  }
+  if (!found) {
+    unresolved(reference, "unknown-signal",
+               "message \"" + clip(db_.messages[messages[0]].name) + "\" has no signal \"" +
+                   clip(name) + "\"");
+  }
+}
+
+EnvironmentVariable* Resolver::find_variable(std::string_view name) {
+  const auto found = variables_.find(name);
+  return found == variables_.end() ? nullptr : &db_.environment_variables[found->second];
+}
+
+void Resolver::comments() {
+  for (CommentRef& reference : draft_.comments) {
+    // A second comment of one object joins the first; of the network, without a break between.
+    const auto take = [&](std::string& comment, bool network) {
+      if (!comment.empty() && !network) {
+        draft_.problems.warn(reference.offset, "duplicate-comment",
+                             "a second comment of the same object; joined to the first");
+        comment += '\n';
+      }
+      comment += reference.text;
+    };
+    if (reference.object.empty()) {
+      take(db_.comment, true);
+    } else if (reference.object == "BO_") {
+      for_messages(reference, [&](MessageDef& message) { take(message.comment, false); });
+    } else if (reference.object == "SG_") {
+      for_signals(reference, [&](SignalDef& signal) { take(signal.comment, false); });
+    } else if (reference.name.empty()) {
+      draft_.keep(reference.offset, reference.end);
+    } else if (reference.object == "BU_") {
+      const std::string name = draft_.utf8(reference.name);
+      if (!nodes_.contains(name)) {
+        unresolved(reference, "unknown-node", "no node is named \"" + clip(name) + "\"");
+      } else {
+        take(db_.node_details[name].comment, false);
+      }
+    } else if (EnvironmentVariable* variable = find_variable(draft_.utf8(reference.name))) {
+      take(variable->comment, false);
+    } else {
+      unresolved(reference, "unknown-variable",
+                 "no environment variable is named \"" + clip(reference.name) + "\"");
+    }
+  }
+}
+
+void Resolver::data_bytes() {
+  for (const DataBytesRef& reference : draft_.data_bytes) {
+    if (EnvironmentVariable* variable = find_variable(draft_.utf8(reference.name))) {
+      variable->data_bytes = reference.bytes;
+    } else {
+      unresolved(reference, "unknown-variable",
+                 "no environment variable is named \"" + clip(reference.name) + "\"");
+    }
+  }
+}
+
+const AttributeDef* Resolver::definition_of(std::string_view name) const {
+  const auto found = definitions_.find(name);
+  return found == definitions_.end() ? nullptr : &db_.attribute_definitions[found->second];
+}
+
+// The value as it is shown: of an enumeration the text chosen, whether the file gives its number or
+// the text itself.
+std::string Resolver::attribute_text(const AttributeRef& reference) {
+  const AttributeDef* definition = definition_of(reference.attribute);
+  if (definition == nullptr) {
+    draft_.problems.warn(reference.offset, "undefined-attribute",
+                         "attribute \"" + clip(reference.attribute) + "\" is not defined");
+    return reference.value;
+  }
+  const char* const begin = reference.value.data();
+  const char* const end = begin + reference.value.size();
+  if (definition->type != "ENUM") {
+    double value = 0.0;
+    const bool is_number = std::from_chars(begin, end, value).ec == std::errc{};
+    const bool has_range =
+        definition->minimum && definition->maximum && *definition->minimum < *definition->maximum;
+    if (is_number && has_range &&
+        !(value >= *definition->minimum && value <= *definition->maximum)) {
+      draft_.problems.warn(reference.offset, "attribute-range",
+                           "value " + clip(reference.value) + " of attribute \"" +
+                               clip(reference.attribute) + "\" is outside its range");
+    }
+    return reference.value;
+  }
+  std::size_t index = 0;
+  const auto [rest, status] = std::from_chars(begin, end, index);
+  if (status != std::errc{} || rest != end) {
+    const auto& choices = definition->choices;
+    constexpr std::size_t kChoicesLookedAt = 256;
+    const auto last =
+        choices.begin() + static_cast<std::ptrdiff_t>(std::min(choices.size(), kChoicesLookedAt));
+    const bool known = std::find(choices.begin(), last, reference.value) != last;
+    if (!known && choices.size() <= kChoicesLookedAt && !reference.value.empty()) {
+      draft_.problems.warn(reference.offset, "enum-text",
+                           "\"" + clip(reference.value) + "\" is no choice of attribute \"" +
+                               clip(reference.attribute) + "\"");
+    }
+    return reference.value;
+  }
+  if (index >= definition->choices.size()) {
+    if (!definition->choices.empty()) {
+      draft_.problems.warn(reference.offset, "enum-range",
+                           "number " + clip(reference.value) + " of an enumeration of " +
+                               std::to_string(definition->choices.size()));
+    }
+    return reference.value;
+  }
+  const std::string& choice = definition->choices[index];
+  return choice.size() <= kChoiceLengthMax ? choice : reference.value;
+}
+
+void Resolver::attribute_defaults() {
+  for (const AttributeRef& reference : draft_.attributes) {
+    if (reference.object != "default") continue;
+    const auto found = definitions_.find(reference.attribute);
+    if (found == definitions_.end()) {
+      unresolved(reference, "undefined-attribute",
+                 "attribute \"" + clip(reference.attribute) + "\" is not defined");
+      continue;
+    }
+    db_.attribute_definitions[found->second].default_value = attribute_text(reference);
+  }
+}
+
+void Resolver::attributes() {
+  for (const AttributeRef& reference : draft_.attributes) {
+    if (reference.object == "default") continue;
+    const std::string value = attribute_text(reference);
+    const auto take = [&](Attributes& attributes) {
+      const auto [place, is_new] = attributes.insert_or_assign(reference.attribute, value);
+      if (!is_new) {
+        draft_.problems.warn(reference.offset, "duplicate-attribute",
+                             "attribute \"" + clip(place->first) +
+                                 "\" of the same object again; this value is used");
+      }
+    };
+    if (reference.object.empty()) {
+      take(db_.attributes);
+    } else if (reference.object == "BO_") {
+      for_messages(reference, [&](MessageDef& message) { take(message.attributes); });
+    } else if (reference.object == "SG_") {
+      for_signals(reference, [&](SignalDef& signal) { take(signal.attributes); });
+    } else if (reference.name.empty()) {
+      draft_.keep(reference.offset, reference.end);  // said before
+    } else if (reference.object == "BU_") {
+      const std::string name = draft_.utf8(reference.name);
+      if (!nodes_.contains(name)) {
+        unresolved(reference, "unknown-node", "no node is named \"" + clip(name) + "\"");
+      } else {
+        take(db_.node_details[name].attributes);
+      }
+    } else if (EnvironmentVariable* variable = find_variable(draft_.utf8(reference.name))) {
+      take(variable->attributes);
+    } else {
+      unresolved(reference, "unknown-variable",
+                 "no environment variable is named \"" + clip(reference.name) + "\"");
+    }
+  }
+}
+
+void Resolver::relations() {
+  for (RelationRef& reference : draft_.relations) {
+    RelationAttribute relation;
+    relation.name = std::move(reference.attribute);
+    relation.kind = reference.kind;
+    relation.node = draft_.utf8(reference.node);
+    relation.value = std::move(reference.value);
+    if (reference.kind == "BU_EV_REL_") {
+      relation.object = draft_.utf8(reference.name);
+    } else {
+      const Indices messages = find_messages(reference.raw_id);
+      if (messages.empty()) {
+        unresolved(reference, "unknown-message",
+                   "no message has the identifier " + std::to_string(reference.raw_id));
+        continue;
+      }
+      relation.object = db_.messages[messages[0]].name;
+      if (reference.kind == "BU_SG_REL_") relation.object += "." + draft_.utf8(reference.name);
+    }
+    db_.relations.push_back(std::move(relation));
+  }
+}
+
+void Resolver::values() {
+  // A table used by name is copied; so much copying that the file cannot have meant it is refused.
+  std::size_t budget = 16 * (draft_.text.size() + 4096);
+  std::map<std::string_view, std::size_t> costs;  // of the tables used so far
+  for (ValuesRef& reference : draft_.values) {
+    if (!reference.table.empty()) {
+      const auto table = db_.value_tables.find(draft_.utf8(reference.table));
+      if (table == db_.value_tables.end()) {
+        unresolved(reference, "unknown-table",
+                   "no value table is named \"" + clip(reference.table) + "\"");
+        continue;
+      }
+      const auto [place, is_new] = costs.try_emplace(table->first, 0);
+      std::size_t& cost = place->second;
+      if (is_new) {
+        for (const auto& [key, text] : table->second) cost += 16 + text.size();
+      }
+      if (cost > budget) {
+        unresolved(reference, "tables-too-large", "the value tables used by name are too large");
+        budget = 0;
+        continue;
+      }
+      budget -= cost;
+      reference.values = table->second;
+    }
+    const auto take = [&](ValueTable& values) {
+      if (!values.empty()) {
+        draft_.problems.warn(reference.offset, "duplicate-values",
+                             "values of the same object again; these are used");
+      }
+      values = reference.values;
+    };
+    if (reference.object == "SG_") {
+      if (reference.values.empty()) continue;
+      for_signals(reference, [&](SignalDef& signal) { take(signal.values); });
+    } else if (EnvironmentVariable* variable = find_variable(draft_.utf8(reference.name))) {
+      take(variable->values);
+    } else {
+      unresolved(reference, "unknown-variable",
+                 "no environment variable is named \"" + clip(reference.name) + "\"");
+    }
+  }
+}
+
+void Resolver::value_types() {
+  for (const ValueTypeRef& reference : draft_.value_types) {
+    for_signals(reference, [&](SignalDef& signal) {
+      if (reference.type == 0) return;
+      const bool width_known = signal.length == 16 || signal.length == 32 || signal.length == 64;
+      if (reference.type > 2 || !width_known) {
+        draft_.problems.warn(reference.offset, "value-type",
+                             "value type " + std::to_string(reference.type) + " with " +
+                                 std::to_string(signal.length) +
+                                 " bits, expected 1 with 32 or 2 with 64; read as an integer");
+        return;
+      }
+      if ((reference.type == 1) != (signal.length <= 32)) {
+        draft_.problems.warn(reference.offset, "value-type",
+                             "value type " + std::to_string(reference.type) + " with " +
+                                 std::to_string(signal.length) + " bits; read as the float of " +
+                                 std::to_string(signal.length) + " bits");
+      }
+      signal.type = signal.length == 64 ? ValueType::kFloat64 : ValueType::kFloat32;
+    });
+  }
+}
+
+void Resolver::senders() {
+  for (SendersRef& reference : draft_.senders) {
+    for_messages(reference, [&](MessageDef& message) {
+      message.senders.insert(message.senders.end(), reference.senders.begin(),
+                             reference.senders.end());
+    });
+  }
+}
+
+void Resolver::groups() {
+  for (GroupRef& reference : draft_.groups) {
+    for_messages(reference, [&](MessageDef& message) {
+      for (const std::string& name : reference.group.signals) {
+        const auto index = static_cast<std::uint32_t>(&message - db_.messages.data());
+        if (!find_signals(index, name).empty()) continue;
+        draft_.problems.warn(reference.offset, "unknown-signal",
+                             "message \"" + clip(message.name) + "\" has no signal \"" +
+                                 clip(name) + "\", which a group names");
+      }
+      message.groups.push_back(reference.group);
+    });
+  }
+}
+
+// One message: which signal selects which. SG_MUL_VAL_ says so where it stands; else "m3" is
+// selected by the only multiplexer there is.
+void Resolver::multiplex_message(std::uint32_t message,
+                                 std::span<const MultiplexRef* const> rules) {
+  MessageDef& definition = db_.messages[message];
+  MessageSource& source = draft_.messages[message];
+  std::vector<SignalDef>& signals = definition.signals;
+
+  for (const MultiplexRef* rule : rules) {
+    const Indices targets = find_signals(message, draft_.utf8(rule->name));
+    const Indices selectors = find_signals(message, draft_.utf8(rule->selector));
+    if (targets.empty() || selectors.empty()) {
+      unresolved(*rule, "unknown-signal",
+                 "message \"" + clip(definition.name) + "\" has no signal \"" +
+                     clip(targets.empty() ? rule->name : rule->selector) + "\"");
+      continue;
+    }
+    const SignalDef& selector = signals[selectors[0]];
+    if (!selector.is_multiplexer) {
+      draft_.problems.warn(rule->offset, "mux-selector",
+                           "signal \"" + clip(selector.name) +
+                               "\" selects others but is not marked as a multiplexer with M");
+    }
+    for (const std::uint32_t target : targets) {
+      std::optional<MuxRule>& known = signals[target].multiplexed_by;
+      if (known) {
+        if (known->selector != selector.name) {
+          unresolved(*rule, "mux-two-selectors",
+                     "signal \"" + clip(signals[target].name) +
+                         "\" has a second multiplexer; the first one is used");
+          continue;
+        }
+        known->ranges.insert(known->ranges.end(), rule->ranges.begin(), rule->ranges.end());
+        continue;
+      }
+      known = MuxRule{selector.name, rule->ranges};
+    }
+  }
+
+  std::size_t multiplexers = 0;
+  std::size_t only = 0;
+  for (std::size_t i = 0; i < signals.size(); ++i) {
+    if (!signals[i].is_multiplexer) continue;
+    ++multiplexers;
+    only = i;
+  }
+  for (std::size_t i = 0; i < signals.size(); ++i) {
+    if (!source.signals[i].multiplexed || signals[i].multiplexed_by) continue;
+    if (multiplexers == 1 && only != i) {
+      const std::uint64_t value = source.signals[i].selector_value;
+      signals[i].multiplexed_by = MuxRule{signals[only].name, {{value, value}}};
+      continue;
+    }
+    if (multiplexers == 1) continue;  // "m0M" alone: the multiplexer of the others
+    draft_.problems.warn(
+        source.signals[i].offset, multiplexers == 0 ? "mux-missing" : "mux-ambiguous",
+        "signal \"" + clip(signals[i].name) + "\" is multiplexed, but its message " +
+            (multiplexers == 0 ? "has no multiplexer"
+                               : "has several multiplexers and no SG_MUL_VAL_ "
+                                 "says which selects it") +
+            "; it is read in every frame");
+  }
+}
+
+void Resolver::multiplexing() {
+  // The rules of each message, in file order.
+  std::vector<std::pair<std::uint32_t, const MultiplexRef*>> rules;
+  for (const MultiplexRef& reference : draft_.multiplexes) {
+    for_messages(reference, [&](MessageDef& message) {
+      rules.emplace_back(static_cast<std::uint32_t>(&message - db_.messages.data()), &reference);
+    });
+  }
+  std::stable_sort(rules.begin(), rules.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<const MultiplexRef*> own;
+  std::size_t next = 0;
+  for (std::uint32_t message = 0; message < db_.messages.size(); ++message) {
+    own.clear();
+    for (; next < rules.size() && rules[next].first == message; ++next) {
+      own.push_back(rules[next].second);
+    }
+    multiplex_message(message, own);
+  }
+}
+
+// The attribute's value for this message, or its default.
+std::string Resolver::message_attribute(const MessageDef& message, const char* name) const {
+  const auto own = message.attributes.find(name);
+  if (own != message.attributes.end()) return own->second;
+  const AttributeDef* definition = definition_of(name);
+  return definition != nullptr ? definition->default_value.value_or("") : "";
+}
+
+// VFrameFormat as text, or where it is a plain number by the numbers Vector's tools use: 3 J1939PG,
+// 14 StandardCAN_FD, 15 ExtendedCAN_FD. Without it the network's protocol decides; a file that says
+// neither but whose 29-bit identifiers all have the null source address 0xFE, which no node sends
+// data with, can only mean parameter groups (NMEA 2000 files are like that).
+void Resolver::frame_formats() {
+  const auto network = [&](const char* name) {
+    const auto own = db_.attributes.find(name);
+    if (own != db_.attributes.end() && !own->second.empty()) return own->second;
+    const AttributeDef* definition = definition_of(name);
+    return definition != nullptr ? definition->default_value.value_or("") : std::string();
+  };
+  const std::string protocol = network("ProtocolType");
+  const auto mentions = [&](std::string_view word) {
+    return std::search(protocol.begin(), protocol.end(), word.begin(), word.end(),
+                       [](char a, char b) { return std::toupper(a) == b; }) != protocol.end();
+  };
+  const bool network_j1939 = mentions("J1939") || mentions("NMEA") || mentions("N2K") ||
+                             mentions("ISOBUS") || mentions("ISO11783");
+  constexpr std::uint32_t kNullAddress = 0xFE;
+  const bool null_sources =
+      protocol.empty() &&
+      std::all_of(db_.messages.begin(), db_.messages.end(), [&](const MessageDef& message) {
+        return !message.id.extended || (message.id.value & 0xFFU) == kNullAddress ||
+               message.name == kIndependentMessage;
+      });
+  for (MessageDef& message : db_.messages) {
+    const std::string format = message_attribute(message, "VFrameFormat");
+    const bool own = message.attributes.contains("VFrameFormat");
+    message.fd = format.ends_with("FD") || format == "14" || format == "15";
+    if (!message.id.extended) continue;
+    const bool names_j1939 = format == "J1939PG" || format == "3";
+    const bool names_other = own && !format.empty() && !names_j1939;
+    message.j1939 = names_j1939 || (!names_other && (network_j1939 || null_sources));
+  }
+}
+
+void Resolver::cycle_times() {
+  for (MessageDef& message : db_.messages) {
+    const std::string text = message_attribute(message, "GenMsgCycleTime");
+    double period_ms = 0.0;
+    const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), period_ms);
+    if (status == std::errc{} && std::isfinite(period_ms) && period_ms > 0.0) {
+      message.cycle_ms = period_ms;
+    }
+  }
+}
+
+// Long names by attribute. Last, for everything else refers by the short ones.
+void Resolver::long_names() {
+  const auto long_name = [](const Attributes& attributes, const char* name) -> const std::string* {
+    const auto found = attributes.find(name);
+    const bool usable = found != attributes.end() && !found->second.empty() &&
+                        found->second.size() <= kLongNameLengthMax;
+    return usable ? &found->second : nullptr;
+  };
+
+  std::map<std::string, std::string> nodes;  // short -> long
+  for (const auto& [name, node] : db_.node_details) {
+    if (const std::string* replacement = long_name(node.attributes, "SystemNodeLongSymbol")) {
+      if (*replacement != name) nodes.emplace(name, *replacement);
+    }
+  }
+  const auto rename_node = [&](std::string& name) {
+    const auto found = nodes.find(name);
+    if (found != nodes.end()) name = found->second;
+  };
+  if (!nodes.empty()) {
+    std::map<std::string, NodeDef> details;
+    for (auto& [name, node] : db_.node_details) {
+      const auto found = nodes.find(name);
+      if (found != nodes.end()) node.short_name = name;
+      details.insert_or_assign(found != nodes.end() ? found->second : name, std::move(node));
+    }
+    db_.node_details = std::move(details);
+    for (std::string& name : db_.nodes) rename_node(name);
+    for (RelationAttribute& relation : db_.relations) rename_node(relation.node);
+  }
+  for (EnvironmentVariable& variable : db_.environment_variables) {
+    if (const std::string* name = long_name(variable.attributes, "SystemEnvVarLongSymbol")) {
+      variable.name = *name;
+    }
+    for (std::string& node : variable.access_nodes) rename_node(node);
+  }
+
+  for (MessageDef& message : db_.messages) {
+    if (const std::string* name = long_name(message.attributes, "SystemMessageLongSymbol")) {
+      if (*name != message.name) message.short_name = std::exchange(message.name, *name);
+    }
+    if (!nodes.empty()) {
+      rename_node(message.transmitter);
+      for (std::string& node : message.senders) rename_node(node);
+    }
+    std::map<std::string, std::string> signals;  // short -> long
+    for (SignalDef& signal : message.signals) {
+      if (!nodes.empty()) {
+        for (std::string& node : signal.receivers) rename_node(node);
+      }
+      const std::string* name = long_name(signal.attributes, "SystemSignalLongSymbol");
+      if (name == nullptr || *name == signal.name) continue;
+      signal.short_name = std::exchange(signal.name, *name);
+      signals.emplace(signal.short_name, signal.name);
+    }
+    if (signals.empty()) continue;
+    const auto rename_signal = [&](std::string& name) {
+      const auto found = signals.find(name);
+      if (found != signals.end()) name = found->second;
+    };
+    for (SignalDef& signal : message.signals) {
+      if (signal.multiplexed_by) rename_signal(signal.multiplexed_by->selector);
+    }
+    for (SignalGroup& group : message.groups) {
+      for (std::string& name : group.signals) rename_signal(name);
+    }
+  }
+}
+
+void Resolver::unassigned() {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < db_.messages.size(); ++i) {
+    const bool independent =
+        db_.messages[i].name == kIndependentMessage || draft_.messages[i].raw_id == kIndependentId;
+    if (independent) {
+      auto& signals = db_.messages[i].signals;
+      std::move(signals.begin(), signals.end(), std::back_inserter(db_.unassigned_signals));
+      continue;
+    }
+    if (kept != i) {
+      db_.messages[kept] = std::move(db_.messages[i]);
+      draft_.messages[kept] = std::move(draft_.messages[i]);
+    }
+    ++kept;
+  }
+  db_.messages.resize(kept);
+  draft_.messages.resize(kept);
+}
+
+void Resolver::kept_text() {
+  std::stable_sort(draft_.kept.begin(), draft_.kept.end(),
+                   [](const Reference& a, const Reference& b) { return a.offset < b.offset; });
+  LineCounter lines(draft_.text);
+  std::size_t covered = 0;  // a statement is kept once, whatever the number of reasons
+  for (const Reference& span : draft_.kept) {
+    if (span.end <= covered) continue;
+    covered = span.end;
+    std::string_view text = draft_.text.substr(span.offset, span.end - span.offset);
+    while (!text.empty() && static_cast<unsigned char>(text.back()) <= ' ') text.remove_suffix(1);
+    db_.other_statements.push_back({lines.at(span.offset).line, draft_.utf8(text)});
+  }
+}
+
+void Resolver::run() {
+  index_messages();
+  comments();
+  data_bytes();
+  attribute_defaults();
+  attributes();
+  relations();
+  values();
+  value_types();
+  senders();
+  groups();
+  multiplexing();
+  frame_formats();
+  cycle_times();
+  long_names();
+  unassigned();
+  kept_text();
+}
+
+}  // namespace
+
+void resolve(Draft& draft) { Resolver(draft).run(); }
+
+}  // namespace beltgrip::can::dbc

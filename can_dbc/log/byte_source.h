@@ -1,0 +1,29 @@
+// A file or standard input as a stream of bytes, unpacked on the way if its content is gzip or
+// zstd, in UTF-8 if it begins with the mark of UTF-16. Memory is flat in the length of the input.
+// Tools only.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+
+namespace beltgrip::can {
+
+class ByteSource {
+ public:
+  virtual ~ByteSource() = default;
+  // Fills at least one byte unless the end is reached; returns how many. 0: the end, or fault()
+  // says why there is no more.
+  virtual std::size_t read(std::span<char> out) = 0;
+  virtual const std::string& fault() const = 0;
+  // True if read() has something (or the end) within that time.
+  virtual bool ready(int timeout_ms) = 0;
+
+  // "-" is standard input. Throws LogOpenError (can_log.h).
+  static std::unique_ptr<ByteSource> open(const std::string& path);
+  // Every source that is opened from now on ends with a fault once this descriptor is readable.
+  static void end_with(int descriptor);
+};
+
+}  // namespace beltgrip::can

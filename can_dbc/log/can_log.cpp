@@ -1,0 +1,318 @@
+#include "can_dbc/log/can_log.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstring>
+
+#include "can_dbc/log/byte_source.h"
+#include "can_dbc/log/format.h"
+
+namespace beltgrip::can {
+
+namespace {
+
+constexpr std::size_t kBufferSize = std::size_t{256} * 1024;
+constexpr std::size_t kLineMax = 65536;
+constexpr std::size_t kSampleBytes = 65536;
+constexpr std::size_t kSampleLines = 2000;
+constexpr std::size_t kBadLinesKept = 10;
+
+// Lines of a byte stream in one buffer of fixed size.
+class LineBuffer {
+ public:
+  explicit LineBuffer(std::unique_ptr<ByteSource> source)
+      : source_(std::move(source)), buffer_(std::make_unique_for_overwrite<char[]>(kBufferSize)) {}
+
+  // What is there soon, at most kSampleBytes of it: whole lines.
+  Sample sample() {
+    constexpr int kPatience_ms = 200;
+    for (bool first = true; end_ < kSampleBytes && (first || source_->ready(kPatience_ms));
+         first = false) {
+      const std::size_t count = source_->read({buffer_.get() + end_, kSampleBytes - end_});
+      if (count == 0) {
+        ended_ = true;
+        break;
+      }
+      end_ += count;
+    }
+    Sample lines;
+    std::string_view text(buffer_.get(), end_);
+    while (!text.empty() && lines.size() < kSampleLines) {
+      const std::size_t length = text.find('\n');
+      if (length == std::string_view::npos && !(ended_ || lines.empty())) break;
+      lines.push_back(text.substr(0, length));
+      if (length == std::string_view::npos) break;
+      text.remove_prefix(length + 1);
+    }
+    return lines;
+  }
+
+  std::string_view peek() const { return {buffer_.get() + begin_, end_ - begin_}; }
+  void skip(std::size_t bytes) { begin_ += bytes; }
+
+  // False at the end. A line that does not fit comes cut, with `whole` false.
+  bool next(std::string_view& line, bool& whole) {
+    whole = true;
+    for (;;) {
+      const char* const start = buffer_.get() + begin_;
+      const auto* const found = static_cast<const char*>(std::memchr(start, '\n', end_ - begin_));
+      if (found != nullptr) {
+        const auto length = static_cast<std::size_t>(found - start);
+        line = {start, length};
+        begin_ += length + 1;
+        if (skipping_) {
+          skipping_ = false;
+          continue;
+        }
+        return true;
+      }
+      if (ended_) {
+        line = {start, end_ - begin_};
+        begin_ = end_;
+        // What a damaged source breaks off in is not a line: its frame would have lost its end.
+        if (!source_->fault().empty()) return false;
+        return !line.empty() && !skipping_;
+      }
+      if (end_ - begin_ > kLineMax) {
+        begin_ = end_;
+        if (skipping_) continue;
+        line = {start, kLineMax};
+        whole = false;
+        skipping_ = true;  // the rest of this line
+        return true;
+      }
+      refill();
+    }
+  }
+
+  const std::string& fault() const { return source_->fault(); }
+
+ private:
+  void refill() {
+    std::memmove(buffer_.get(), buffer_.get() + begin_, end_ - begin_);
+    end_ -= begin_;
+    begin_ = 0;
+    const std::size_t count = source_->read({buffer_.get() + end_, kBufferSize - end_});
+    if (count == 0) ended_ = true;
+    end_ += count;
+  }
+
+  std::unique_ptr<ByteSource> source_;
+  std::unique_ptr<char[]> buffer_;
+  std::size_t begin_ = 0;
+  std::size_t end_ = 0;
+  bool ended_ = false;
+  bool skipping_ = false;
+};
+
+// The format in which most of the sample's lines are frames; among equals, fewest are bad.
+std::unique_ptr<LineParser> find_format(const Sample& sample) {
+  const auto make = [&](std::size_t format) -> std::unique_ptr<LineParser> {
+    switch (format) {
+      case 1:
+        return make_asc_parser();
+      case 2:
+        return make_trc_parser();
+      case 3:
+        return make_csv_parser(sample);
+      default:
+        return make_candump_parser(sample);
+    }
+  };
+  constexpr std::size_t kFormats = 4;
+  std::size_t best = 0;
+  std::int64_t best_score = INT64_MIN;
+  for (std::size_t format = 0; format < kFormats; ++format) {
+    const auto parser = make(format);
+    LogRecord record;
+    std::int64_t score = 0;
+    constexpr std::int64_t kFrameWeight = 1000;
+    for (const std::string_view line : sample) {
+      const LineKind kind = parser->parse(line, record);
+      if (kind == LineKind::kFrame) score += kFrameWeight;
+      if (kind == LineKind::kBad) --score;
+    }
+    if (score > best_score) {
+      best = format;
+      best_score = score;
+    }
+  }
+  return make(best);
+}
+
+// Those at the end belong to it. Any other would hide the frames behind it.
+bool holds_carriage_return(std::string_view line) {
+  while (line.ends_with('\r')) line.remove_suffix(1);
+  return line.find('\r') != std::string_view::npos;
+}
+
+struct BinaryFormat {
+  std::string_view magic;
+  const char* reason;
+};
+constexpr std::array<BinaryFormat, 6> kBinaryFormats{
+    {{"LOGG", "a Vector .blf log, which is not read; export it as .asc"},
+     {"MDF     ", "an MDF measurement, which is not read; export it as .asc or .csv"},
+     {"UnFinMF ", "an MDF measurement, which is not read; export it as .asc or .csv"},
+     {"BZh", "packed with bzip2, which is not read; pack with gzip or zstd"},
+     {"\xFD"
+      "7zXZ",
+      "packed with xz, which is not read; pack with gzip or zstd"},
+     {"\x0A\x0D\x0D\x0A", "a pcapng capture, which is not read; export it as a candump log"}}};
+
+// Whatever the format: no line may say more than one of these.
+bool is_of_two_kinds(const CanFrame& frame) {
+  return static_cast<int>(frame.remote) + static_cast<int>(frame.error) +
+             static_cast<int>(frame.fd) >
+         1;
+}
+
+class TextLogReader : public LogReader {
+ public:
+  TextLogReader(std::unique_ptr<ByteSource> source, bool notes)
+      : lines_(std::move(source)), notes_(notes) {
+    const Sample sample = lines_.sample();
+    for (const BinaryFormat& format : kBinaryFormats) {
+      if (!lines_.peek().starts_with(format.magic)) continue;
+      stats_.lines = 1;
+      report(format.reason);
+      return;
+    }
+    parser_ = find_format(sample);
+    constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+    if (lines_.peek().starts_with(kByteOrderMark)) lines_.skip(kByteOrderMark.size());
+  }
+
+  bool next(LogRecord& record) override {
+    if (parser_ == nullptr) return false;
+    std::string_view line;
+    bool whole = true;
+    while (lines_.next(line, whole)) {
+      ++stats_.lines;
+      if (!whole || line.size() > kLineMax) {
+        report("longer than 65536 bytes");
+        continue;
+      }
+      if (holds_carriage_return(line)) {
+        report("carriage return inside a line, expected lines that end with LF or CR LF");
+        continue;
+      }
+      constexpr std::string_view kNote = "# ";
+      if (notes_ && line.starts_with(kNote)) {
+        record.note = line.substr(kNote.size());
+        return true;
+      }
+      switch (parser_->parse(line, record)) {
+        case LineKind::kFrame:
+          if (is_of_two_kinds(record.frame)) {
+            report("a frame of two kinds: remote, error and CAN FD exclude each other");
+            break;
+          }
+          record.note = {};
+          ++stats_.frames;
+          return true;
+        case LineKind::kNothing:
+          break;
+        case LineKind::kBad:
+          report(parser_->reason());
+          break;
+      }
+    }
+    if (!lines_.fault().empty()) {
+      ++stats_.lines;
+      report(lines_.fault());
+    }
+    parser_.reset();
+    return false;
+  }
+
+  const LogStats& stats() const override { return stats_; }
+
+ private:
+  void report(std::string reason) {
+    ++stats_.lines_bad;
+    if (stats_.first_bad.size() < kBadLinesKept) {
+      stats_.first_bad.push_back({stats_.lines, std::move(reason)});
+    }
+  }
+
+  LineBuffer lines_;
+  bool notes_;
+  std::unique_ptr<LineParser> parser_;
+  LogStats stats_;
+};
+
+constexpr char kHexDigits[] = "0123456789ABCDEF";
+
+void append_hex(std::string& text, std::uint32_t value, int digits) {
+  for (int shift = 4 * (digits - 1); shift >= 0; shift -= 4) {
+    text += kHexDigits[(value >> shift) & 0xFU];
+  }
+}
+
+void append_frame(std::string& text, const CanFrame& frame) {
+  constexpr std::uint32_t kErrorFlag = 0x2000'0000;
+  constexpr int kStandardDigits = 3;
+  constexpr int kExtendedDigits = 8;
+  if (frame.error) {
+    append_hex(text, frame.id.value | kErrorFlag, kExtendedDigits);
+  } else {
+    append_hex(text, frame.id.value, frame.id.extended ? kExtendedDigits : kStandardDigits);
+  }
+  text += '#';
+  if (frame.remote) {
+    text += 'R';
+    if (frame.length > 0) text += kHexDigits[frame.length & 0xFU];
+    return;
+  }
+  if (frame.fd) {
+    text += '#';
+    text += kHexDigits[(frame.bit_rate_switch ? 1U : 0U) | (frame.error_state_indicator ? 2U : 0U)];
+  }
+  for (std::size_t i = 0; i < std::min<std::size_t>(frame.length, kMaxPayload); ++i) {
+    append_hex(text, frame.data[i], 2);
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<LogReader> LogReader::open(const std::string& path, bool notes) {
+  return std::make_unique<TextLogReader>(ByteSource::open(path), notes);
+}
+
+std::string frame_text(const CanFrame& frame) {
+  std::string text;
+  append_frame(text, frame);
+  return text;
+}
+
+void CandumpWriter::write(std::int64_t t_ns, std::string_view interface, const CanFrame& frame) {
+  constexpr std::int64_t kSecond_ns = 1'000'000'000;
+  line_.assign(1, '(');
+  const bool negative = t_ns < 0;
+  if (negative) line_ += '-';
+  const auto magnitude =
+      negative ? ~static_cast<std::uint64_t>(t_ns) + 1 : static_cast<std::uint64_t>(t_ns);
+  std::array<char, 24> digits;
+  const auto end =
+      std::to_chars(digits.data(), digits.data() + digits.size(), magnitude / kSecond_ns).ptr;
+  line_.append(digits.data(), end);
+  line_ += '.';
+  const auto fraction_ns = static_cast<std::uint32_t>(magnitude % kSecond_ns);
+  const bool nine = fraction_ns % 1000 != 0;
+  std::uint32_t fraction = nine ? fraction_ns : fraction_ns / 1000;
+  const std::size_t places = nine ? 9 : 6;
+  line_.append(places, '0');
+  for (std::size_t i = 0; i < places; ++i, fraction /= 10) {
+    line_[line_.size() - 1 - i] = static_cast<char>('0' + fraction % 10);
+  }
+  line_ += ") ";
+  line_ += interface;
+  line_ += ' ';
+  append_frame(line_, frame);
+  line_ += '\n';
+  std::fwrite(line_.data(), 1, line_.size(), out_);
+}
+
+}  // namespace beltgrip::can

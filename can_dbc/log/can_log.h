@@ -1,0 +1,66 @@
+// Streaming readers of CAN logs and the candump writer. Memory flat in the length of the log; one
+// line at a time. A broken line is counted and reported with its number, never fatal. Tools only.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "can_dbc/frame/can_frame.h"
+
+namespace beltgrip::can {
+
+struct LogRecord {
+  std::int64_t t_ns = 0;  // as in the log: exact decimal, 9 digits
+  CanFrame frame;
+  std::string_view interface;  // valid until the next call of next()
+  bool sent = false;           // candump: marked "T", sent by the one who recorded
+  std::string_view note;       // where notes are asked for; then there is no frame
+};
+
+struct BadLine {
+  std::uint64_t line = 0;  // 1-based
+  std::string reason;
+};
+
+struct LogStats {
+  std::uint64_t lines = 0;
+  std::uint64_t frames = 0;
+  std::uint64_t lines_bad = 0;     // neither a frame nor a comment nor empty
+  std::vector<BadLine> first_bad;  // at most 10, the first ones
+};
+
+class LogReader {
+ public:
+  virtual ~LogReader() = default;
+  virtual bool next(LogRecord& record) = 0;  // false at the end
+  virtual const LogStats& stats() const = 0;
+
+  // path "-" is standard input. .gz and .zst are unpacked by content, the format is found from the
+  // content. Throws LogOpenError when the file is missing or unreadable.
+  // notes: lines that begin with "# " come as records with a note, without that beginning.
+  static std::unique_ptr<LogReader> open(const std::string& path, bool notes = false);
+};
+
+struct LogOpenError {
+  std::string text;  // one line: path and reason
+};
+
+// candump -L format: (1700000000.000000) vcan0 123#0011. Nine digits when a stamp needs them.
+class CandumpWriter {
+ public:
+  explicit CandumpWriter(std::FILE* out) : out_(out) {}
+  void write(std::int64_t t_ns, std::string_view interface, const CanFrame& frame);
+
+ private:
+  std::FILE* out_;
+  std::string line_;  // reused: no allocation per frame
+};
+
+// One frame in candump's compact notation, "123#0011", "00000123##10011", "123#R8", "20000004#..."
+std::string frame_text(const CanFrame& frame);
+
+}  // namespace beltgrip::can

@@ -1,0 +1,62 @@
+// The ladder of limits of a clamp request, in one place and in order: the experiment ends itself
+// first, then the safety monitor withdraws its permission, then the transmit gate refuses its
+// frames, all before what is promised. SI; slip as a fraction.
+//
+// Not here: the floor of the clamp force, which is the configuration's
+// (experiment.secondary_pressure_floor_Pa; made a force in experiment/arming and, on its own, in
+// guard/safety_monitor).
+//
+// Who judges keeps its own code; only the numbers are shared. "Origin" says where one comes from:
+// promised (the promise G1), measured (tests/FIGURES.md, tests/campaign), chosen (why).
+#pragma once
+
+#include <cstdint>
+
+#include "daemon/core/base/mono_time.h"
+
+namespace beltgrip::daemon::limits {
+
+// --- what a belt may go through in a request: promised ------------------------------------------
+inline constexpr double kPromisedSlip = 0.10;
+inline constexpr double kPromisedSlipSpeed_m_s = 0.8;
+inline constexpr double kPromisedEnergy_J = 100.0;  // beyond the peak
+
+// --- the request ends itself (experiment/clamp_request) ------------------------------------------
+inline constexpr double kRequestSlip = 0.045;  // chosen: above every peak in an overdrive stop
+inline constexpr double kRequestSlipRate_1_s = 0.12;    // measured: a belt that runs away
+inline constexpr double kRequestSlipRateFrom = 0.0075;  // chosen: below it noise has such rates
+inline constexpr double kSlipCounted = 0.02;      // chosen: from here on slip counts as energy
+inline constexpr double kRequestEnergy_J = 35.0;  // measured: leaves the monitor its reaction
+inline constexpr Duration kRequestLongest = 15 * kSecond;  // chosen: the controller's patience
+inline constexpr double kRequestSpeedShare = 0.93;         // of the least speed at the start
+// Chosen: five frames make a lost one harmless, and a controller that has just come up hears them.
+inline constexpr int kInactiveFrames = 5;
+inline constexpr Duration kClampPeriod = 10 * kMillisecond;
+inline constexpr Duration kAnnounced = kInactiveFrames * kClampPeriod;
+
+// --- the safety monitor withdraws the permission (guard/safety_monitor) --------------------------
+inline constexpr double kMonitorSlipDebounced = 0.055;
+inline constexpr double kMonitorSlip = 0.08;
+inline constexpr double kMonitorSlipSpeed_m_s = 0.70;
+inline constexpr double kMonitorEnergy_J = 80.0;
+inline constexpr Duration kMonitorLongest = kRequestLongest;
+inline constexpr double kMonitorSpeedShare = 0.85;  // of the least speed at the start
+
+// --- the gate refuses the frame (guard/tx_gate) --------------------------------------------------
+// Chosen: the longest request, and the last frames of a loop that is late.
+inline constexpr std::uint32_t kGateFrames =
+    static_cast<std::uint32_t>(kRequestLongest / kClampPeriod) + 10;
+// Chosen: a frame every 10 ms, one sample late at most.
+inline constexpr double kGateFramePeriod_s = 0.016;
+
+static_assert(kRequestSlip < kMonitorSlipDebounced && kMonitorSlipDebounced < kMonitorSlip &&
+              kMonitorSlip < kPromisedSlip);
+static_assert(kRequestSlipRateFrom < kRequestSlip && kSlipCounted < kRequestSlip);
+static_assert(kMonitorSlipSpeed_m_s < kPromisedSlipSpeed_m_s);
+static_assert(kRequestEnergy_J < kMonitorEnergy_J && kMonitorEnergy_J < kPromisedEnergy_J);
+static_assert(kRequestLongest <= kMonitorLongest &&
+              kMonitorLongest < static_cast<Duration>(kGateFrames) * kClampPeriod);
+static_assert(kMonitorSpeedShare < kRequestSpeedShare && kRequestSpeedShare < 1.0);
+static_assert(static_cast<double>(kClampPeriod) * 1e-9 < kGateFramePeriod_s);
+
+}  // namespace beltgrip::daemon::limits

@@ -1,0 +1,268 @@
+#include "daemon/core/experiment/arming.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace beltgrip::daemon {
+
+namespace {
+
+constexpr double kPedalReleased = 0.02;
+constexpr double kPedalMoved = 0.05;      // in an experiment: the driver wants something
+constexpr double kOilBand_K = 1.0;        // in an experiment: below what it may begin with
+constexpr double kRatioTolerance = 0.03;  // slip and deformation of a clamped belt stay below this
+constexpr Duration kSampleLeast = kMillisecond;
+constexpr double kKnownMargin = 1.05;  // the belt may have run in since its last value
+constexpr double kPeakSlipOverdrive = 0.020;
+constexpr double kPeakSlipLow = 0.035;
+constexpr double kDetection_s = 0.03;  // filters and sampler
+constexpr double kBeyondPeak_s = 1.0;  // acquisition at the start, and slip until it is seen
+constexpr double kSlipMean = 5e8;      // ns
+constexpr double kSecondsPerTick = 1e-9;
+constexpr double kPercent = 100.0;
+// A request begins at the own force and falls from there: what that falls by itself within the
+// actuator's answer must stay far inside the band in which a force counts as following. A coasting
+// car's own falls by some 50 N/s.
+constexpr double kForceRate_N_per_s = 150.0;
+constexpr double kForceDeviations = 3.0;
+constexpr std::size_t kForceLookMost = 5;  // blocks, of the longest line that is judged
+// Of white noise: a second difference of means has root 6 of their deviation, the median of its
+// magnitude is 0.6745 of its own.
+constexpr double kPerMedian = 1.0 / (0.6745 * 2.449489742783178);
+
+}  // namespace
+
+Arming::Arming(const Config& config)
+    : trigger_(config.trigger),
+      control_(config.control),
+      variator_(config.variator),
+      choice_(config.estimator.ratio),
+      settings_(config.experiment),
+      inertia_kg_m2_(config.variator.primary_inertia_kg_m2),
+      rate_max_N_per_s_(config.estimator.ramp_rate_max_N_per_s),
+      cosine_(std::cos(config.variator.half_wedge_angle_rad)),
+      force_step_N_(config.variator.secondary_piston_area_m2 * config.estimator.pressure_step_Pa) {}
+
+double Arming::floor_N(double omega_s_rad_s) const noexcept {
+  return variator_.secondary_spring_force_N +
+         variator_.secondary_piston_area_m2 * settings_.secondary_pressure_floor_Pa +
+         variator_.secondary_centrifugal_N_s2 * omega_s_rad_s * omega_s_rad_s;
+}
+
+bool Arming::at_end_stop(double ratio) const noexcept {
+  const auto near = [ratio](double stop) { return std::abs(ratio / stop - 1.0) < kRatioTolerance; };
+  return (choice_ != estimator::RatioChoice::kLow && near(variator_.ratio_overdrive)) ||
+         (choice_ != estimator::RatioChoice::kOverdrive && near(variator_.ratio_low));
+}
+
+std::uint32_t Arming::preconditions(const Now& now) const noexcept {
+  std::uint32_t out = 0;
+  const auto inhibit = [&out](bool set, Inhibit which) {
+    if (set) out |= inhibit_bit(which);
+  };
+  inhibit(now.faulted, Inhibit::kFault);
+  inhibit(!now.usable || !now.conditions.fresh, Inhibit::kInputs);
+  if (out != 0) return out;
+  const Conditions& c = now.conditions;
+  const bool coast = trigger_ == Trigger::kCoastDown;
+  const double torque = coast ? -now.torque_Nm : now.torque_Nm;
+  inhibit(!c.permitted, Inhibit::kPermission);
+  inhibit(coast && c.accelerator > kPedalReleased, Inhibit::kPedal);
+  inhibit(c.brake_pressed, Inhibit::kBrake);
+  inhibit(!c.lockup_closed, Inhibit::kLockup);
+  inhibit(!at_end_stop(now.omega_s_rad_s / now.omega_p_rad_s), Inhibit::kRatio);
+  inhibit(torque < settings_.torque_min_Nm || torque > settings_.torque_max_Nm, Inhibit::kTorque);
+  inhibit(now.omega_p_rad_s < settings_.primary_speed_min_rad_s, Inhibit::kSpeed);
+  inhibit(c.oil_degC < settings_.oil_temperature_min_degC, Inhibit::kOil);
+  inhibit(!now.cooled, Inhibit::kCooldown);
+  return out;
+}
+
+Stop Arming::ended_by(const Conditions& now) const noexcept {
+  using estimator::StopReason;
+  const bool coast = trigger_ == Trigger::kCoastDown;
+  if (!now.permitted) {
+    return {StopReason::kPermission,
+            {.what = "permission withdrawn", .role = Role::kExperimentPermitted}};
+  }
+  if (now.brake_pressed) {
+    return {StopReason::kDriver, {.what = "brake pressed", .role = Role::kBrakePressed}};
+  }
+  if (coast && now.accelerator > kPedalMoved) {
+    return {StopReason::kDriver,
+            {.what = "pedal at",
+             .figure = kPercent * now.accelerator,
+             .limit = kPercent * kPedalMoved,
+             .unit = "%",
+             .role = Role::kAcceleratorPedal}};
+  }
+  if (!now.lockup_closed) {
+    return {StopReason::kTorque, {.what = "lock-up opens", .role = Role::kLockupClosed}};
+  }
+  const double oil_least_degC = settings_.oil_temperature_min_degC - kOilBand_K;
+  if (now.oil_degC < oil_least_degC) {
+    return {StopReason::kPermission,
+            {.what = "oil at",
+             .figure = now.oil_degC,
+             .limit = oil_least_degC,
+             .unit = "degC",
+             .role = Role::kOilTemperature}};
+  }
+  return {};
+}
+
+bool Arming::steady(const Now& now) const noexcept {
+  const double ratio = now.omega_s_rad_s / now.omega_p_rad_s;
+  return std::abs(ratio / ratio_since_ - 1.0) <= kRatioDrift &&
+         std::abs(now.torque_Nm - torque_since_) <=
+             kTorqueDrift * std::abs(torque_since_) + kTorqueDrift_Nm;
+}
+
+void Arming::look(const Now& now) noexcept {
+  const SlipShown& shown = now.shown;
+  const double grown_max_percent =
+      std::max(kSlipLeast_percent, kSlipShare * (shown.peak_percent - shown.own_percent));
+  if (shown.peak_percent > 0.0 && slip_percent_ - shown.own_percent > grown_max_percent) {
+    search_ = {};
+    unclear_ = inhibit_bit(Inhibit::kGrip);
+    return;
+  }
+  const bool low = now.omega_s_rad_s / now.omega_p_rad_s < 1.0;
+  RampPoint point;
+  point.torque_Nm = std::abs(now.torque_Nm);
+  point.omega_p_rad_s = now.omega_p_rad_s;
+  point.primary_radius_m =
+      low ? variator_.primary_radius_low_m : variator_.primary_radius_overdrive_m;
+  point.wedge_cosine = cosine_;
+  point.inertia_kg_m2 = inertia_kg_m2_;
+  point.own_force_N = now.clamp_force_N;
+  point.floor_N = floor_N(now.omega_s_rad_s);
+  point.mu_expected =
+      now.mu_max_known > 0.0 ? kKnownMargin * now.mu_max_known : settings_.friction_expected;
+  point.peak_slip = low ? kPeakSlipLow : kPeakSlipOverdrive;
+  if (reachable_mu(point) < point.mu_expected) {
+    search_ = {};
+    unclear_ = inhibit_bit(Inhibit::kUnreachable);
+    return;
+  }
+
+  Reaction reaction;
+  reaction.detection_s = kDetection_s;
+  reaction.stale_s = static_cast<double>(now.stale) * kSecondsPerTick;
+  reaction.dead_time_s = settings_.actuator_dead_time_s;
+  reaction.lag_s = settings_.actuator_lag_s;
+  search_ = RampSearch(point, reaction, SlipLimits{}, rate_max_N_per_s_);
+}
+
+std::uint32_t Arming::clearance(const Now& now) const noexcept {
+  if (ramp_.rate_N_per_s <= 0.0) return inhibit_bit(Inhibit::kRamp);
+
+  // How long the primary stays above its least speed, as it has slowed since the trigger held.
+  const double held_s = static_cast<double>(now.t - held_since_) * kSecondsPerTick;
+  const double slowing = (omega_p_since_ - now.omega_p_rad_s) / held_s;
+  const double left_s =
+      slowing > 0.0 ? (now.omega_p_rad_s - settings_.primary_speed_min_rad_s) / slowing : 1e9;
+  const double longest_s = static_cast<double>(limits::kRequestLongest) * kSecondsPerTick;
+  return ramp_.duration_s + kBeyondPeak_s > std::min(left_s, longest_s)
+             ? inhibit_bit(Inhibit::kTime)
+             : 0U;
+}
+
+void Arming::follow_force(const Now& now) noexcept {
+  block_sum_N_ += now.clamp_force_N;
+  block_samples_ += 1.0;
+  if (now.t - block_since_ < kForceBlock) return;
+  force_means_N_[force_count_++ % kForceBlocks] = block_sum_N_ / block_samples_;
+  block_since_ = now.t;
+  block_sum_N_ = block_samples_ = 0.0;
+  force_rests_ = force_at_rest();
+}
+
+// Of a mean, read off second differences: neither a line nor, by the median, a force that has just
+// begun to move counts as noise.
+double Arming::force_noise_N() const noexcept {
+  std::array<double, kForceBlocks - 2> seconds_N{};
+  const auto at = [this](std::size_t i) {
+    return force_means_N_[(force_count_ + i) % kForceBlocks];
+  };
+  for (std::size_t i = 0; i < seconds_N.size(); ++i) {
+    seconds_N[i] = std::abs(at(i) - 2.0 * at(i + 1) + at(i + 2));
+  }
+  const auto middle = seconds_N.begin() + seconds_N.size() / 2;
+  std::nth_element(seconds_N.begin(), middle, seconds_N.end());
+  return std::hypot(kPerMedian * *middle, force_step_N_ / std::sqrt(12.0));
+}
+
+// The slopes of the lines through the last means, from two of them on: a fall that has just begun
+// shows in the short ones, a slow one in the long ones. Each less what noise may have made of it.
+bool Arming::force_at_rest() const noexcept {
+  if (force_count_ < kForceBlocks) return false;
+  constexpr double kBlock_s = static_cast<double>(kForceBlock) * kSecondsPerTick;
+  const double noise_N = force_noise_N();
+  for (std::size_t length = 2; length <= kForceLookMost; ++length) {
+    const double n = static_cast<double>(length), middle = 0.5 * (n - 1.0);
+    const double moment = n * (n * n - 1.0) / 12.0;
+    double slope_N = 0.0;  // per block
+    for (std::size_t age = 0; age < length; ++age) {
+      const double mean_N = force_means_N_[(force_count_ - 1 - age) % kForceBlocks];
+      slope_N += mean_N * (middle - static_cast<double>(age)) / moment;
+    }
+    const double deviation_N = noise_N / std::sqrt(moment);
+    if (std::abs(slope_N) - kForceDeviations * deviation_N > kForceRate_N_per_s * kBlock_s) {
+      return false;
+    }
+  }
+  return true;
+}
+
+void Arming::step(const Now& now) noexcept {
+  inhibits_ = preconditions(now);
+  settled_ = false;
+  if (inhibits_ != 0) {
+    held_ = false;
+    return;
+  }
+  if (!held_ || !steady(now)) {
+    held_ = true;
+    held_since_ = now.t;
+    ratio_since_ = now.omega_s_rad_s / now.omega_p_rad_s;
+    torque_since_ = now.torque_Nm;
+    omega_p_since_ = now.omega_p_rad_s;
+    next_look_ = now.t + kSettle;
+    unclear_ = 0;
+    looked_ = cleared_ = false;
+    search_ = {};
+    slip_percent_ = slip_samples_ = 0.0;
+    force_count_ = 0;
+    force_rests_ = false;
+    block_since_ = now.t;
+    block_sum_N_ = block_samples_ = 0.0;
+    last_ = now.t - kSampleLeast;
+  }
+  const double step = static_cast<double>(now.t - last_);
+  last_ = now.t;
+  slip_samples_ = std::min(slip_samples_ + 1.0, std::max(1.0, kSlipMean / step));
+  slip_percent_ += (now.slip_percent - slip_percent_) / slip_samples_;
+  follow_force(now);
+  const Duration held = now.t - held_since_;
+  settled_ = held >= kSettle;
+  if (!settled_ || control_ != Control::kCommand) return;
+  // A search takes some samples, one excursion each; what was found before holds until its end.
+  if (!search_.done()) {
+    if (search_.step()) {
+      ramp_ = search_.ramp();
+      unclear_ = clearance(now);
+    }
+  } else if (now.t >= next_look_) {
+    next_look_ = now.t + kClearancePeriod;
+    look(now);
+  }
+  looked_ = looked_ || search_.done();
+  const std::uint32_t moving = force_rests_ ? 0U : inhibit_bit(Inhibit::kForce);
+  const std::uint32_t quiet = now.watched ? 0U : inhibit_bit(Inhibit::kQuiet);
+  inhibits_ = unclear_ | moving | quiet;
+  cleared_ = looked_ && inhibits_ == 0;
+  settled_ = cleared_ || held >= kSettle + kPatience;
+}
+
+}  // namespace beltgrip::daemon

@@ -1,0 +1,171 @@
+// When an experiment may begin: recognises a coast-down or a steady drive torque, names every
+// precondition that does not hold, and, for control "command", finds out whether the peak of
+// friction is in reach and which ramp is safe. Real-time thread; no allocation.
+//
+// The trigger holds while no precondition is missing. It has settled when it has held for kSettle
+// without the speed ratio or the torque moving by more than kRatioDrift and kTorqueDrift; and, with
+// control "command", either the way is clear and the controller's own force at rest, or patience
+// has run out: as the vehicle slows down, what was out of reach may come into reach.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "daemon/core/base/limits.h"
+#include "daemon/core/base/mono_time.h"
+#include "daemon/core/config/config.h"
+#include "daemon/core/experiment/reachability.h"
+#include "daemon/core/input/stop_cause.h"
+#include "estimator/method/slip_curve_estimator.h"
+
+namespace beltgrip::daemon {
+
+// Why no experiment begins; one bit each.
+enum class Inhibit : std::uint8_t {
+  kInputs,      // an input, or a condition's signal, cannot be used
+  kFault,       // a fault that forbids requests
+  kPermission,  // experiment_permitted is 0
+  kPedal,       // coast_down: the pedal is pressed
+  kBrake,
+  kLockup,       // open
+  kRatio,        // not at an end stop
+  kTorque,       // outside its window
+  kSpeed,        // primary speed below its minimum
+  kOil,          // too cold
+  kCooldown,     // time or distance since the last request
+  kUnreachable,  // the force floor lies above the peak's clamping force
+  kRamp,         // no ramp whose worst-case reaction stays inside the slip limits
+  kTime,         // the ramp would outlast the coast-down or the longest request
+  kGrip,         // friction has fallen so far that the own force hardly holds the belt
+  kForce,        // the controller's own force still rises or falls
+  kQuiet         // a speed that stood still would not show
+};
+inline constexpr std::size_t kInhibitCount = 17;
+inline constexpr std::array<std::string_view, kInhibitCount> kInhibitNames{
+    "inputs", "fault",  "permission", "pedal",     "brake",     "lock-up",
+    "ratio",  "torque", "speed",      "oil",       "cool-down", "unreachable",
+    "ramp",   "time",   "grip",       "own force", "quiet"};
+
+constexpr std::uint32_t inhibit_bit(Inhibit inhibit) {
+  return std::uint32_t{1} << static_cast<unsigned>(inhibit);
+}
+
+// The signals beside the sample. Roles that the configuration leaves out count as fulfilled.
+struct Conditions {
+  bool fresh = true;
+  bool permitted = true;
+  bool lockup_closed = true;
+  bool brake_pressed = false;
+  double accelerator = 0.0;  // 0 to 1
+  double oil_degC = 80.0;
+};
+
+// Slip of the last experiment with a value since the start of the daemon, under the controller's
+// own force and at the peak. The law of that force knows nothing of friction: where the belt slips
+// more under it than it did, friction has fallen. A request ends in that force, which then must
+// still hold the belt.
+struct SlipShown {
+  double own_percent = 0.0;
+  double peak_percent = 0.0;  // 0: there was none
+};
+
+class Arming {
+ public:
+  static constexpr Duration kSettle = 1500 * kMillisecond;
+  static constexpr Duration kPatience = 8 * kSecond;  // after kSettle
+  static constexpr Duration kClearancePeriod = 100 * kMillisecond;
+  static constexpr double kRatioDrift = 0.01;
+  static constexpr double kTorqueDrift = 0.25;
+  static constexpr double kTorqueDrift_Nm = 4.0;
+  // Of the way from own_percent to peak_percent: on a tanh curve the own force is then at 90 % of
+  // the peak, less than the friction of a cylinder and a falling engine torque may take away.
+  static constexpr double kSlipShare = 0.4;
+  static constexpr double kSlipLeast_percent = 0.15;  // beyond what sensors and deformation explain
+
+  explicit Arming(const Config& config);
+
+  struct Now {
+    MonoTime t = 0;
+    bool usable = false;  // sample and curve
+    bool cooled = true;
+    bool faulted = false;
+    double omega_p_rad_s = 0.0;
+    double omega_s_rad_s = 0.0;
+    double torque_Nm = 0.0;  // on the belt, signed
+    double clamp_force_N = 0.0;
+    double slip_percent = 0.0;  // in the direction of the torque
+    double mu_max_known = 0.0;  // the last value; 0: none
+    SlipShown shown;            // at this direction and end stop
+    Duration stale = 0;         // how long the slowest input may be silent
+    bool watched = true;        // a speed that stands still would show
+    Conditions conditions;
+  };
+  // Every sample outside an experiment.
+  void step(const Now& now) noexcept;
+  void reset() noexcept { held_ = false; }
+
+  bool triggered() const noexcept { return (inhibits_ & ~kClearance) == 0; }
+  bool settled() const noexcept { return settled_; }
+  bool cleared() const noexcept { return cleared_ && inhibits_ == 0; }
+  std::uint32_t inhibits() const noexcept { return inhibits_; }
+  // What of these ends an experiment that has begun; kNone: nothing. A little more is allowed than
+  // at its start.
+  Stop ended_by(const Conditions& now) const noexcept;
+  const Ramp& ramp() const noexcept { return ramp_; }
+  // Mean since the trigger holds, of the last half second.
+  double slip_percent() const noexcept { return slip_percent_; }
+
+  // The force below which no request goes, at this secondary speed.
+  double floor_N(double omega_s_rad_s) const noexcept;
+  bool at_end_stop(double ratio) const noexcept;
+
+ private:
+  static constexpr std::uint32_t kClearance =
+      inhibit_bit(Inhibit::kUnreachable) | inhibit_bit(Inhibit::kRamp) |
+      inhibit_bit(Inhibit::kTime) | inhibit_bit(Inhibit::kGrip) | inhibit_bit(Inhibit::kForce) |
+      inhibit_bit(Inhibit::kQuiet);
+  std::uint32_t preconditions(const Now& now) const noexcept;
+  void look(const Now& now) noexcept;
+  std::uint32_t clearance(const Now& now) const noexcept;
+  bool steady(const Now& now) const noexcept;
+  void follow_force(const Now& now) noexcept;
+  double force_noise_N() const noexcept;
+  bool force_at_rest() const noexcept;
+
+  Trigger trigger_;
+  Control control_;
+  estimator::VariatorParameters variator_;
+  estimator::RatioChoice choice_;
+  ExperimentSettings settings_;
+  double inertia_kg_m2_;
+  double rate_max_N_per_s_;
+  double cosine_;
+  std::uint32_t inhibits_ = inhibit_bit(Inhibit::kInputs);
+  bool held_ = false;
+  bool settled_ = false;
+  bool looked_ = false;   // since the trigger holds
+  bool cleared_ = false;  // as found by the last look
+  std::uint32_t unclear_ = 0;
+  MonoTime held_since_ = 0;
+  MonoTime next_look_ = 0;
+  double ratio_since_ = 0.0;
+  double torque_since_ = 0.0;
+  double omega_p_since_ = 0.0;
+  double slip_percent_ = 0.0;
+  double slip_samples_ = 0.0;
+  MonoTime last_ = 0;  // sample while the trigger holds
+  // Means of the own force over kForceBlock each since the trigger holds, newest at count - 1.
+  static constexpr std::size_t kForceBlocks = 10;
+  static constexpr Duration kForceBlock = 100 * kMillisecond;
+  std::array<double, kForceBlocks> force_means_N_{};
+  std::size_t force_count_ = 0;
+  bool force_rests_ = false;  // as the last of them was complete
+  double force_step_N_;       // least change that the pressure's signal can show
+  MonoTime block_since_ = 0;
+  double block_sum_N_ = 0.0, block_samples_ = 0.0;
+  RampSearch search_;
+  Ramp ramp_;  // found by the last search
+};
+
+}  // namespace beltgrip::daemon

@@ -1,0 +1,133 @@
+// The request for clamping force, from the first newton less to the force being back: the falling
+// ramp, the backup stops that the estimator does not know of, whether the controller follows, and
+// the cool-down. SI. Real-time thread; no allocation.
+//
+// Backup stops while a request stands (strict):
+//   Slip         the speed ratio has moved by more than kRequestSlip since the start
+//   SlipRate     it moves faster than kRequestSlipRate_1_s, over 80 ms
+//   SlipEnergy   dissipated beyond kSlipCounted
+//   ForceFloor   the ramp has arrived at the floor
+//   Time         the request has stood for kRequestLongest
+//   EngineSpeed  the primary has left the band around the speed that the secondary gives it at the
+//                start's ratio, or has fallen below its least speed: macro slip pulls the engine
+//                down in overrun, lets it flare up in drive
+//   Torque       the torque has left the band around that of the start
+//   InputFrozen  the speed ratio has moved against the direction in which the torque slips the belt
+//                (slip falls while the force does), and one shaft alone says so: its speed has left
+//                that of the engine or of the wheels as well, and is not true
+//   Ratio        the same, and no shaft alone: the transmission shifts
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "daemon/core/base/limits.h"
+#include "daemon/core/base/mono_time.h"
+#include "daemon/core/config/config.h"
+#include "daemon/core/experiment/arming.h"
+#include "estimator/method/slip_curve_estimator.h"
+
+namespace beltgrip::daemon {
+
+class ClampRequest {
+ public:
+  static constexpr double kSpeedBand = 0.06;   // share of the speed
+  static constexpr double kTorqueBand = 0.35;  // share of the torque
+  static constexpr double kTorqueBand_Nm = 5.0;
+  static constexpr double kRatioBand = 0.015;  // share of the ratio, the wrong way
+  static constexpr double kFollowBand = 0.05;  // share of the force
+  static constexpr double kFollowBand_N = 80.0;
+  static constexpr Duration kFollowTime = 100 * kMillisecond;
+  static constexpr Duration kReleaseTime = 1500 * kMillisecond;  // then the force must be back
+  static constexpr double kRestored = 0.85;                      // of the force before the request
+
+  explicit ClampRequest(const Config& config);
+
+  struct Now {
+    MonoTime t = 0;
+    double omega_p_rad_s = 0.0;
+    double omega_s_rad_s = 0.0;
+    double torque_Nm = 0.0;  // on the belt, signed
+    double clamp_force_N = 0.0;
+    double mu_star = 0.0;
+    double omega_e_rad_s = 0.0;  // engine, lock-up closed; 0: not known
+    double speed_m_s = 0.0;      // of the vehicle; 0: not known
+  };
+  void begin(const Now& now, double rate_N_per_s, double floor_N) noexcept;
+  // Every sample while it stands and the inputs are usable.
+  void step(const Now& now, double floor_N) noexcept;
+  // And while they are not: the force stays.
+  void hold(MonoTime t) noexcept { last_ = t; }
+  // Also without a request: the cool-down begins.
+  void end(MonoTime t) noexcept;
+
+  bool standing() const noexcept { return standing_; }
+  double force_N() const noexcept { return standing_ ? force_N_ : 0.0; }
+  double rate_N_per_s() const noexcept { return rate_N_per_s_; }
+  estimator::StopReason backup_stop() const noexcept { return stop_.reason; }
+  const StopCause& cause() const noexcept { return stop_.cause; }
+  // False: the clamping force has been off the request for kFollowTime.
+  bool followed() const noexcept { return followed_; }
+  double off_N() const noexcept { return off_N_; }  // at the last sample
+  double follow_band_N() const noexcept { return kFollowBand * force_N_ + kFollowBand_N; }
+  // The force asked for has changed since then by as much as counts as not followed.
+  bool changed_since(MonoTime t) const noexcept;
+  // The largest slip since the start, of the request that stands or was the last.
+  double slip_max() const noexcept { return slip_max_; }
+
+  // After the end.
+  bool released(const Now& now) const noexcept;
+  bool stuck(const Now& now) const noexcept;
+  void follow_release(const Now& now) noexcept;  // every sample
+  MonoTime ended() const noexcept { return ended_; }
+  // From the speeds alone: has the slip of the request gone back? Nothing: it was too small to say.
+  std::optional<bool> held_again() const noexcept;
+
+  // Time and distance since the last request, or since the start of the daemon.
+  void travel(MonoTime t, double speed_m_s) noexcept;
+  bool cooled() const noexcept;
+
+ private:
+  Stop judge(const Now& now, double floor_N) const noexcept;
+  Stop judge_course(const Now& now) const noexcept;
+  std::optional<Role> untrue_speed(const Now& now, double drift) const noexcept;
+  void follow_slip(const Now& now) noexcept;
+
+  ExperimentSettings settings_;
+  bool standing_ = false;
+  bool followed_ = true;
+  bool travelled_ = false;
+  Stop stop_;
+  MonoTime begun_ = 0;
+  MonoTime ended_ = 0;
+  MonoTime last_ = 0;
+  MonoTime off_since_ = 0;
+  MonoTime last_travel_ = 0;
+  double rest_s_ = 0.0;
+  double rest_m_ = 0.0;
+  double force_N_ = 0.0;
+  double off_N_ = 0.0;
+  double rate_N_per_s_ = 0.0;
+  double start_force_N_ = 0.0;
+  double start_torque_Nm_ = 0.0;
+  double start_ratio_ = 0.0;
+  double start_engine_ = 0.0;  // omega_e / omega_p; 0: not known
+  double start_wheels_ = 0.0;  // speed / omega_s; 0: not known
+  double speed_step_m_s_ = 0.0;
+
+  // Slip since the start in the direction of the torque, the last 100 ms; newest at next_ - 1.
+  struct Point {
+    MonoTime t = 0;
+    double slip = 0.0;
+  };
+  static constexpr std::size_t kPoints = 128;  // 80 ms at 1000 Hz, and more
+  std::array<Point, kPoints> points_{};
+  std::size_t count_ = 0;
+  double slip_ = 0.0;  // mean of the last 15 ms
+  double slip_max_ = 0.0;
+  double slip_rate_1_s_ = 0.0;
+  double energy_J_ = 0.0;
+  double slip_after_ = 0.0;  // mean of the last kSlipAfter
+};
+
+}  // namespace beltgrip::daemon

@@ -1,0 +1,130 @@
+#include "daemon/core/guard/safety_monitor.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace beltgrip::daemon {
+
+namespace {
+// Three and six samples at 200 Hz.
+constexpr Duration kDebounce = 10 * kMillisecond;
+constexpr Duration kEngineDebounce = 25 * kMillisecond;
+// A single sample's noise is as large as what is looked for.
+constexpr Duration kNearReference = 80 * kMillisecond;
+constexpr double kNearMean = 4e7;    // ns
+constexpr double kRounding_N = 1.0;  // requests are whole newtons on the wire
+constexpr double kSecondsPerTick = 1e-9;
+}  // namespace
+
+void SafetyMonitor::end(MonoTime t) noexcept {
+  standing_ = false;
+  asked_before_ = true;
+  ended_ = t;
+}
+
+SafetyVerdict SafetyMonitor::check(MonoTime t, const SafetySignals& signals,
+                                   double request_N) noexcept {
+  if (!(request_N > 0.0)) {  // none, or not a number
+    if (standing_) end(t);
+    withdrawn_ = SafetyVerdict::kAllowed;
+    return request_N == 0.0 ? SafetyVerdict::kAllowed : SafetyVerdict::kFloor;
+  }
+  if (withdrawn_ != SafetyVerdict::kAllowed) return withdrawn_;
+  withdrawn_ = judge(t, signals, request_N);
+  if (withdrawn_ != SafetyVerdict::kAllowed && standing_) end(t);
+  last_ = t;
+  return withdrawn_;
+}
+
+SafetyVerdict SafetyMonitor::judge(MonoTime t, const SafetySignals& signals,
+                                   double request_N) noexcept {
+  if (!signals.fresh || !std::isfinite(signals.omega_p_rad_s) ||
+      !std::isfinite(signals.omega_s_rad_s) || !std::isfinite(signals.torque_Nm)) {
+    return SafetyVerdict::kInputs;
+  }
+  if (signals.omega_p_rad_s < limits_.speed_min_rad_s) {
+    return beyond(SafetyVerdict::kSpeed, signals.omega_p_rad_s, limits_.speed_min_rad_s);
+  }
+  if (signals.omega_s_rad_s <= 0.0) {
+    return beyond(SafetyVerdict::kSecondary, signals.omega_s_rad_s, 0.0);
+  }
+  const double floor_N = limits_.spring_force_N + limits_.floor_force_N +
+                         limits_.centrifugal_N_s2 * signals.omega_s_rad_s * signals.omega_s_rad_s;
+  if (!standing_) {
+    if (asked_before_ && t - ended_ < limits_.pause_min) return SafetyVerdict::kPause;
+    if (request_N < floor_N) return beyond(SafetyVerdict::kFloor, request_N, floor_N);
+    standing_ = true;
+    begun_ = t;
+    reference_ratio_ = signals.omega_s_rad_s / signals.omega_p_rad_s;
+    first_request_N_ = last_request_N_ = request_N;
+    energy_J_ = near_sum_ = near_mean_ = 0.0;
+    near_count_ = 0.0;
+    beyond_since_ = engine_beyond_since_ = kNever;
+    reference_engine_ = signals.omega_e_rad_s / signals.omega_p_rad_s;
+    return SafetyVerdict::kAllowed;
+  }
+  const SafetyVerdict motion = judge_motion(t, signals, request_N);
+  return motion != SafetyVerdict::kAllowed ? motion : judge_request(t, request_N, floor_N);
+}
+
+bool SafetyMonitor::slips_near_own_force(MonoTime t, double ratio, double request_N) noexcept {
+  if (t - begun_ <= kNearReference || near_count_ == 0) {
+    near_sum_ += ratio;
+    near_count_ += 1.0;
+    return false;
+  }
+  const double share = (1.0 - request_N / first_request_N_) / (1.0 - limits_.force_near);
+  if (share >= 1.0) return false;
+  const double latest = std::min(1.0, static_cast<double>(t - last_) / kNearMean);
+  near_mean_ += latest * (ratio * near_count_ / near_sum_ - 1.0 - near_mean_);
+  const double most = limits_.slip_nearest + (limits_.slip_near - limits_.slip_nearest) * share;
+  if (std::abs(near_mean_) > most) beyond(SafetyVerdict::kSlip, std::abs(near_mean_), most);
+  return std::abs(near_mean_) > most;
+}
+
+SafetyVerdict SafetyMonitor::judge_motion(MonoTime t, const SafetySignals& signals,
+                                          double request_N) noexcept {
+  const double drift =
+      std::abs(signals.omega_s_rad_s / signals.omega_p_rad_s / reference_ratio_ - 1.0);
+  if (drift <= limits_.slip_debounced) beyond_since_ = kNever;
+  if (drift > limits_.slip_debounced && beyond_since_ == kNever) beyond_since_ = t;
+  if (drift > limits_.slip_max || (beyond_since_ != kNever && t - beyond_since_ >= kDebounce)) {
+    return beyond(SafetyVerdict::kSlip, drift,
+                  drift > limits_.slip_max ? limits_.slip_max : limits_.slip_debounced);
+  }
+  if (slips_near_own_force(t, signals.omega_s_rad_s / signals.omega_p_rad_s, request_N)) {
+    return SafetyVerdict::kSlip;
+  }
+  const double slip_speed_m_s = drift * signals.omega_p_rad_s * signals.primary_radius_m;
+  if (slip_speed_m_s > limits_.slip_speed_max_m_s) {
+    return beyond(SafetyVerdict::kSlipSpeed, slip_speed_m_s, limits_.slip_speed_max_m_s);
+  }
+  if (signals.omega_e_rad_s > 0.0 && reference_engine_ > 0.0) {
+    const double engine =
+        std::abs(signals.omega_e_rad_s / signals.omega_p_rad_s / reference_engine_ - 1.0);
+    if (engine <= limits_.engine_drift) engine_beyond_since_ = kNever;
+    if (engine > limits_.engine_drift && engine_beyond_since_ == kNever) engine_beyond_since_ = t;
+    if (engine_beyond_since_ != kNever && t - engine_beyond_since_ >= kEngineDebounce) {
+      return beyond(SafetyVerdict::kEngine, engine, limits_.engine_drift);
+    }
+  }
+  if (drift > limits_.slip_counted) {
+    energy_J_ += drift * std::abs(signals.torque_Nm) * signals.omega_p_rad_s *
+                 static_cast<double>(t - last_) * kSecondsPerTick;
+  }
+  if (energy_J_ <= limits_.energy_max_J) return SafetyVerdict::kAllowed;
+  return beyond(SafetyVerdict::kEnergy, energy_J_, limits_.energy_max_J);
+}
+
+SafetyVerdict SafetyMonitor::judge_request(MonoTime t, double request_N, double floor_N) noexcept {
+  if (t - begun_ > limits_.duration_max) return SafetyVerdict::kDuration;
+  if (request_N < floor_N) return beyond(SafetyVerdict::kFloor, request_N, floor_N);
+  if (request_N > last_request_N_) return SafetyVerdict::kRise;
+  const double fall_max_N =
+      limits_.rate_max_N_per_s * static_cast<double>(t - last_) * kSecondsPerTick;
+  if (last_request_N_ - request_N > fall_max_N + kRounding_N) return SafetyVerdict::kRate;
+  last_request_N_ = request_N;
+  return SafetyVerdict::kAllowed;
+}
+
+}  // namespace beltgrip::daemon

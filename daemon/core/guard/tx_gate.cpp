@@ -1,0 +1,129 @@
+#include "daemon/core/guard/tx_gate.h"
+
+#include <algorithm>
+
+#include "can_dbc/frame/e2e.h"
+
+namespace beltgrip::daemon {
+
+namespace {
+
+constexpr std::uint8_t kLength = 8;
+constexpr std::array<std::uint16_t, 4> kDataIds{0x6A0, 0x6A1, 0x6A2, 0x6A3};
+enum : std::size_t { kEstimate, kSlip, kClamp, kStatus };
+
+// Codes as laid out in beltgrip.dbc; a test compares. Written out here so that the gate reads the
+// bytes on its own.
+bool content_allowed(std::size_t message, const can::CanFrame& frame) noexcept {
+  const auto& bytes = frame.data;
+  switch (message) {
+    case kEstimate: {
+      const unsigned kind = (bytes[1] >> 4) & 0x3U;
+      const bool valid = (bytes[1] & 0x40U) != 0;
+      return kind <= 2 && (!valid || kind == 1) && (bytes[1] & 0x80U) == 0;
+    }
+    case kSlip:
+      return (bytes[1] & 0x80U) == 0;
+    case kClamp: {
+      const bool active = (bytes[2] & 0x01U) != 0;
+      const bool force = bytes[3] != 0 || bytes[4] != 0;
+      return (bytes[1] & 0xF0U) == 0 && (bytes[2] & 0xFEU) == 0 && active == force &&
+             bytes[5] == 0 && bytes[6] == 0 && bytes[7] == 0;
+    }
+    default: {
+      const unsigned state = bytes[1] >> 4;
+      const unsigned reason = bytes[2] >> 2 & 0x1FU;
+      return state <= 7 && reason <= 20 && (bytes[2] & 0x80U) == 0 && (bytes[5] & 0xF0U) == 0 &&
+             bytes[6] == 0 && bytes[7] == 0;
+    }
+  }
+}
+
+}  // namespace
+
+TxGate::TxGate(const FrameIdentifiers& identifiers, Control control, const ClampLimits& clamp,
+               const PollLimits& poll) noexcept
+    : identifiers_{identifiers.estimate, identifiers.slip, identifiers.clamp, identifiers.status},
+      control_(control),
+      clamp_(clamp),
+      poll_(poll) {
+  expected_counter_.fill(kAnyCounter);
+}
+
+std::size_t TxGate::message_of(const can::CanFrame& frame) const noexcept {
+  if (frame.id.extended || frame.remote || frame.error || frame.fd || frame.length != kLength) {
+    return kMessages;
+  }
+  for (std::size_t i = 0; i < kMessages; ++i) {
+    if (frame.id.value == identifiers_[i]) return i;
+  }
+  return kMessages;
+}
+
+// A request that breaks a limit is over: it takes inactive frames before another may begin.
+bool TxGate::request_allowed(const can::CanFrame& frame) noexcept {
+  const double force_N = frame.data[3] + 256.0 * frame.data[4];
+  if ((frame.data[2] & 0x01U) == 0) {
+    if (inactive_frames_ < clamp_.inactive_before) ++inactive_frames_;
+    active_frames_ = 0;
+    return true;
+  }
+  const bool first = active_frames_ == 0;
+  const bool allowed =
+      force_N >= clamp_.floor_N && active_frames_ < clamp_.frames_max &&
+      (first ? inactive_frames_ >= clamp_.inactive_before
+             : force_N <= last_force_N_ && force_N >= last_force_N_ - clamp_.fall_max_N);
+  inactive_frames_ = 0;
+  if (!allowed) {
+    active_frames_ = 0;
+    return false;
+  }
+  last_force_N_ = force_N;
+  ++active_frames_;
+  return true;
+}
+
+bool TxGate::own_allowed(std::size_t message, const can::CanFrame& frame) noexcept {
+  const auto counter = static_cast<std::uint8_t>(frame.data[1] & 0x0FU);
+  std::uint8_t& expected = expected_counter_[message];
+  const bool allowed =
+      (message != kClamp || control_ == Control::kCommand) && counter <= can::e2e::kCounterMax &&
+      (expected == kAnyCounter || counter == expected) &&
+      can::e2e::crc_profile1(kDataIds[message], frame.payload().subspan(1)) == frame.data[0] &&
+      content_allowed(message, frame) && (message != kClamp || request_allowed(frame));
+  expected = allowed ? can::e2e::next_counter(counter) : kAnyCounter;
+  return allowed;
+}
+
+// Layout of ISO 15765-2 and ISO 14229-1, read here on its own.
+bool TxGate::poll_allowed(const can::CanFrame& frame, std::uint8_t bus, MonoTime t) noexcept {
+  if (frame.remote || frame.error || frame.fd || frame.length != kLength) return false;
+  const auto& bytes = frame.data;
+  const bool flow = (bytes[0] == 0x30 || bytes[0] == 0x32) && bytes[1] == 0 && bytes[2] == 0;
+  const bool read = bytes[0] == 0x03 && bytes[1] == 0x22;
+  for (std::size_t i = 0; i < poll_.size; ++i) {
+    const PollLimits::Request& request = poll_.requests[i];
+    Polled& polled = polled_[i];
+    if (request.bus != bus || request.id != frame.id) continue;
+    if (flow && polled.flow_left) {
+      polled.flow_left = false;
+      return true;
+    }
+    if (!read || (bytes[2] << 8 | bytes[3]) != request.identifier) continue;
+    if (polled.due > t + request.period / 2) return false;
+    polled.due = std::max(polled.due, t) + request.period;
+    polled.flow_left = true;
+    return true;
+  }
+  return false;
+}
+
+bool TxGate::permits(const can::CanFrame& frame, std::uint8_t bus, MonoTime t) noexcept {
+  const std::size_t message = bus == 0 ? message_of(frame) : kMessages;
+  const bool allowed =
+      message != kMessages ? own_allowed(message, frame) : poll_allowed(frame, bus, t);
+  if (!allowed) ++refused_;
+  return allowed;
+}
+
+}  // namespace beltgrip::daemon

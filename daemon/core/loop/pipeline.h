@@ -1,0 +1,97 @@
+// Frames and sample instants in, frames and reports out: everything the daemon decides. No I/O, no
+// clock, no allocation after construction. Real-time thread; replay and simulation use the same
+// object.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "can_dbc/frame/can_frame.h"
+#include "daemon/core/base/faults.h"
+#include "daemon/core/base/outbox.h"
+#include "daemon/core/base/port.h"
+#include "daemon/core/config/config.h"
+#include "daemon/core/experiment/experiment.h"
+#include "daemon/core/input/input_monitor.h"
+#include "estimator/belt/belt_history.h"
+#include "estimator/method/slip_curve_estimator.h"
+
+namespace beltgrip::daemon {
+
+// Everything one sample decided: for log, trace, recorder and tests.
+struct SampleReport {
+  MonoTime t = 0;
+  State state = State::kInhibited;
+  bool in_experiment = false;
+  bool macro_slip_stop = false;
+  estimator::StopReason stop_reason = estimator::StopReason::kNone;  // while macro_slip_stop
+  StopCause stop_cause;                                              // beside it
+  estimator::VariatorSample sample;
+  estimator::CurveEstimate curve;
+  bool new_result = false;               // an experiment has come to its outcome with this sample
+  ExperimentResult result;               // the last one; outcome kNone before the first
+  std::uint32_t faults = 0;              // fault_bit()s of faults.h
+  std::uint32_t foreign_identifier = 0;  // the last one that a foreign sender used
+  std::optional<Role> frozen;    // with fault InputFrozen: which input it is, where that is known
+  std::uint32_t inhibits = 0;    // inhibit_bit()s of arming.h, triggers "coast_down" and "steady"
+  double request_force_N = 0.0;  // as asked for with this sample; 0: no request stands
+  double ramp_N_per_s = 0.0;     // of the request that stands
+};
+
+// The newest value of a role, as received.
+struct SignalObservation {
+  SignalQuality quality = SignalQuality::kUnbound;
+  bool seen = false;
+  double value = 0.0;  // SI
+  MonoTime t = 0;      // its stamp
+};
+
+struct PipelineCounters {
+  std::uint64_t frames = 0;          // offered
+  std::uint64_t frames_decoded = 0;  // of a message that carries a role, taken
+  std::uint64_t frames_bad = 0;      // of such a message, but wrong length, kind or protection
+  std::uint64_t samples = 0;
+  std::uint64_t frames_refused = 0;  // by the transmit gate
+  UdsCounters diagnostics;
+};
+
+class Pipeline {
+ public:
+  explicit Pipeline(const Config& config);
+  ~Pipeline();
+  Pipeline(const Pipeline&) = delete;
+  Pipeline& operator=(const Pipeline&) = delete;
+
+  // Frames in order of arrival. BeltGrip's own identifiers are never inputs; such a frame that is
+  // no echo comes from a foreign sender, which latches a fault.
+  void on_frame(const RxFrame& frame) noexcept;
+  // The link as the Port sees it; the controller's state comes with its error frames.
+  void on_bus_state(BusState state, MonoTime t, std::uint8_t bus = 0) noexcept;
+  // A sample at t was taken late, or (lost) samples before t were not taken at all.
+  void on_late(MonoTime t, bool lost) noexcept;
+  // So many samples at which nothing comes and nothing changes are left out.
+  void on_silence(std::int64_t samples) noexcept;
+  void on_send_failed(const can::CanFrame& frame, MonoTime t, std::uint8_t bus = 0) noexcept;
+  // The sample at t: decides and leaves in outbox what must be sent now.
+  const SampleReport& on_sample(MonoTime t, Outbox& outbox) noexcept;
+  // The end (stop request, end of a log): ends a running experiment and leaves the last frames. Its
+  // report has no sample of its own (sample.usable is false).
+  const SampleReport& on_end(MonoTime t, estimator::StopReason reason, Outbox& outbox) noexcept;
+  // What all experiments together say, from the next sample on: MinClampForce rests on it.
+  void learn(const estimator::LearnedFriction& learned) noexcept;
+  // Between two samples, while no experiment runs: this becomes `next`, which has not been used
+  // yet, and next becomes what this was. Inputs begin anew; the bus, its faults, the counters of
+  // frames, and with `keeps_results` what was found so far, go on.
+  void give_way_to(Pipeline& next, bool keeps_results) noexcept;
+  const PipelineCounters& counters() const noexcept;
+  std::size_t bus_count() const noexcept;  // that it listens to
+  SignalObservation signal(Role role) const noexcept;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace beltgrip::daemon

@@ -1,0 +1,99 @@
+#include "estimator/robust/after_stop.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace beltgrip::estimator {
+namespace {
+
+// A clamp that is told to come back begins to do so within some tenths of a second.
+constexpr double kKeep_s = 0.15;
+// The force is judged in means over this; when it has risen, the group before may have as well.
+constexpr double kGroup_s = 0.02;
+constexpr double kForceDeviations = 3.0;
+// Further away slip moves on too fast for channels that are read one after the other.
+constexpr double kRunAway_percent = 1.0;
+constexpr double kSwingFrom_s = 0.02, kSwingTo_s = 0.08, kSwingShortest_s = 0.03;
+constexpr std::size_t kBeforeCells = 20, kSwingCells = 10;
+constexpr double kSwing_percent = 0.3, kSwingDeviations = 3.0, kSwingShare = 0.4;
+
+std::size_t samples_in(double duration_s, double sample_rate_hz) {
+  return static_cast<std::size_t>(std::max(1.0, std::round(duration_s * sample_rate_hz)));
+}
+
+}  // namespace
+
+AfterStop::AfterStop(double sample_rate_hz)
+    : samples_(samples_in(kKeep_s, sample_rate_hz)),
+      per_group_(samples_in(kGroup_s, sample_rate_hz)) {}
+
+void AfterStop::reset() noexcept {
+  count_ = kept_ = group_begin_ = 0;
+  begun_ = over_ = false;
+  swing_slip_percent_ = 0.0;
+  swing_samples_ = 0;
+}
+
+void AfterStop::begin(const ExperimentRecord& record) noexcept {
+  const History& history = record.history();
+  const Line& force = record.force_line();
+  stop_t_s_ = record.duration_s();
+  begun_ = history.size(0) >= kBeforeCells + kSwingCells && force.valid;
+  over_ = !begun_;
+  if (!begun_) return;
+  stop_slip_percent_ = history.cell(0, 0).slip_percent;
+  slip_before_percent_ = slip_at_end_percent_ = 0.0;
+  for (std::size_t i = 0; i < kSwingCells; ++i) {
+    slip_before_percent_ += history.cell(0, kBeforeCells + i).slip_percent / kSwingCells;
+    slip_at_end_percent_ = std::max(slip_at_end_percent_, history.cell(0, i).slip_percent);
+  }
+  slip_noise_ = record.slip_noise();
+  force_limit_N_ = force.at(stop_t_s_) +
+                   kForceDeviations * std::sqrt(force.variance_at(stop_t_s_) +
+                                                record.force().density(kGroup_s) / kGroup_s);
+}
+
+void AfterStop::step(const Cell& sample) noexcept {
+  if (!begun_) return;
+  if (over_) return;
+  const double after_s = sample.t_s - stop_t_s_;
+  if (after_s >= kSwingFrom_s && after_s <= kSwingTo_s) {
+    swing_slip_percent_ += sample.slip_percent;
+    ++swing_samples_;
+  }
+  samples_[count_++] = sample;
+  if (count_ - group_begin_ == per_group_) judge_group();
+  if (count_ == samples_.size()) over_ = true;
+}
+
+void AfterStop::judge_group() noexcept {
+  double force_N = 0.0, slip_percent = 0.0;
+  for (std::size_t i = group_begin_; i < count_; ++i) {
+    force_N += samples_[i].clamp_force_N;
+    slip_percent += samples_[i].slip_percent;
+  }
+  const double samples = static_cast<double>(per_group_);
+  if (force_N > force_limit_N_ * samples) {
+    over_ = true;
+    kept_ = kept_ > per_group_ ? kept_ - per_group_ : 0;
+    return;
+  }
+  if (slip_percent > (stop_slip_percent_ + kRunAway_percent) * samples) {
+    over_ = true;
+    return;
+  }
+  kept_ = count_;
+  group_begin_ = count_;
+}
+
+bool AfterStop::swung_back() const noexcept {
+  // The force was back too soon: that is no period of a rattle.
+  const double watched_s = kKeep_s * swing_samples_ / static_cast<double>(samples_.size());
+  if (watched_s < kSwingShortest_s) return false;
+  const double gained = slip_at_end_percent_ - slip_before_percent_;
+  const double noise = std::sqrt(slip_noise_ / watched_s);
+  return gained > kSwing_percent + kSwingDeviations * noise &&
+         swing_slip_percent_ / swing_samples_ < slip_before_percent_ + kSwingShare * gained;
+}
+
+}  // namespace beltgrip::estimator

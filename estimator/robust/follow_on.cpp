@@ -1,0 +1,73 @@
+#include "estimator/robust/follow_on.h"
+
+#include <cmath>
+
+namespace beltgrip::estimator {
+namespace {
+
+// Before the stop, in cells of the finest level.
+constexpr std::size_t kBeforeCell = 10, kBeforeCells = 5;
+constexpr double kFewest = 5.0;
+constexpr double kStillCarried = 0.99;  // of mu
+constexpr double kSlower = 2.0;
+constexpr double kDeviations = 3.0;
+
+double square(double x) { return x * x; }
+
+}  // namespace
+
+void FollowOn::Mean::add(double after_s, double slip) noexcept {
+  n += 1.0;
+  t_s += after_s;
+  slip_percent += slip;
+}
+
+void FollowOn::begin(const ExperimentRecord& record) noexcept {
+  const History& history = record.history();
+  if (begun_ || history.size(0) < kBeforeCell + kBeforeCells) return;
+  begun_ = true;
+  stop_t_s_ = record.duration_s();
+  slip_noise_ = record.slip_noise();
+  before_cells_s_ = history.cell_s(0) * static_cast<double>(kBeforeCells);
+  for (std::size_t i = kBeforeCell; i < kBeforeCell + kBeforeCells; ++i) {
+    const Cell& cell = history.cell(0, i);
+    before_.add(cell.t_s - stop_t_s_, cell.slip_percent);
+  }
+}
+
+void FollowOn::step(const Cell& sample) noexcept {
+  after_s_ = sample.t_s - stop_t_s_;
+  if (!begun_ || after_s_ > kTo_s) return;
+  if (std::abs(after_s_ - kMiddle_s) < 0.5 * kMean_s) middle_.add(after_s_, sample.slip_percent);
+  if (after_s_ > kTo_s - kMean_s) late_.add(after_s_, sample.slip_percent);
+  if (after_s_ < kMiddle_s) return;
+  const double t = after_s_ - kMiddle_s;
+  n_ += 1.0;
+  t_ += t;
+  tt_ += t * t;
+  omega_ += sample.omega_p_rad_s;
+  omega_t_ += sample.omega_p_rad_s * t;
+  torque_ += sample.torque_Nm;
+  force_ += sample.clamp_force_N;
+}
+
+double FollowOn::carried(double traction_per_Nm_N, double inertia_kg_m2) const noexcept {
+  const double acceleration = (omega_t_ - omega_ * t_ / n_) / (tt_ - square(t_) / n_);
+  return traction_per_Nm_N * (torque_ - n_ * inertia_kg_m2 * acceleration) / force_;
+}
+
+bool FollowOn::stood_still(double mu, double traction_per_Nm_N,
+                           double inertia_kg_m2) const noexcept {
+  if (middle_.n < kFewest || late_.n < kFewest || !(force_ > 0.0)) return false;
+  if (carried(traction_per_Nm_N, inertia_kg_m2) < kStillCarried * mu) return false;
+  // Slip gained around the stop, less what the later pace, so many times over, would have gained.
+  const double times =
+      kSlower * (middle_.at_s() - before_.at_s()) / (late_.at_s() - middle_.at_s());
+  const double gained = middle_.slip() - before_.slip();
+  const double later = late_.slip() - middle_.slip();
+  const double variance =
+      slip_noise_ * (1.0 / before_cells_s_ + (square(1.0 + times) + square(times)) / kMean_s);
+  return gained - times * later > kDeviations * std::sqrt(variance);
+}
+
+}  // namespace beltgrip::estimator

@@ -1,0 +1,105 @@
+#include "estimator/robust/force_step.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace beltgrip::estimator {
+namespace {
+
+constexpr double kCell_s = 0.05;
+constexpr std::size_t kGapCells = 2;
+constexpr std::size_t kShortest = 2, kLongest = 64;  // cells in each of four groups
+constexpr double kDeviations = 5.0;
+constexpr double kShare = 0.015;    // of the force
+constexpr double kLeastMove = 0.4;  // of what slip would have to move by
+constexpr double kSlipDeviations = 4.0, kSlopeDeviations = 2.0;
+constexpr double kStairs = 1.5;  // steps of a signal that is rounded coarsely are no steps
+double square(double x) { return x * x; }
+
+}  // namespace
+
+ForceStep::ForceStep(double sample_rate_hz, double resolution_N)
+    : stair_N_(kStairs * resolution_N),
+      per_cell_(static_cast<int>(std::max(1.0, std::ceil(kCell_s * sample_rate_hz - 1e-6)))) {}
+
+void ForceStep::reset() noexcept {
+  count_ = 0;
+  filled_ = 0;
+  sum_ = {};
+  sums_[0] = {};
+}
+
+ForceStep::Means ForceStep::means(std::size_t from, std::size_t to) const noexcept {
+  const Means& late = sums_[(count_ - from) % kCells];
+  const Means& early = sums_[(count_ - to) % kCells];
+  const double share = 1.0 / static_cast<double>(to - from);
+  return {share * (late.force_N - early.force_N), share * (late.torque_Nm - early.torque_Nm),
+          share * (late.slip_percent - early.slip_percent)};
+}
+
+bool ForceStep::steps(std::size_t length, double slip_noise, const Trend& force) const noexcept {
+  const double length_s = kCell_s * static_cast<double>(length);
+  const std::size_t before_from = 2 * length + kGapCells;
+  const Means earlier = means(before_from + length, before_from + 2 * length);
+  const Means before = means(before_from, before_from + length);
+  const Means after = means(length, 2 * length);
+  const Means later = means(0, length);
+  // The lines through the two groups on either side, at the middle of the gap.
+  const double on = 0.5 * (1.0 + static_cast<double>(kGapCells) / static_cast<double>(length));
+  const double spread = std::sqrt(2.0 * (square(1.0 + on) + square(on)));
+  const double drift_N = before.force_N - earlier.force_N;
+  const double drift_after_N = later.force_N - after.force_N;
+  const double jump_N = after.force_N - before.force_N - on * (drift_N + drift_after_N);
+  const double force_deviation_N = std::sqrt(force.density(length_s) / length_s);
+  if (std::abs(jump_N) < std::max({kDeviations * spread * force_deviation_N,
+                                   kShare * std::abs(before.force_N), stair_N_})) {
+    return false;
+  }
+  // A corner of the force's course, in one of the groups, looks like a step of less than this.
+  if (std::abs(jump_N) < std::abs(drift_after_N - drift_N)) return false;
+  const double mu_after = after.torque_Nm / after.force_N;
+  // Relative to mu*.
+  const double rise =
+      1.0 - earlier.torque_Nm * before.force_N / (before.torque_Nm * earlier.force_N);
+  const double jump = -jump_N / after.force_N;
+  const double slip_deviation = std::sqrt(slip_noise / length_s);
+  const double surely = kSlopeDeviations * std::sqrt(2.0) * slip_deviation;
+  const double creep = before.slip_percent - earlier.slip_percent;
+  if (!(rise > 0.0) || !(creep > surely)) return false;
+  // The curve is concave: on the way up slip moves by more than along its tangent; on the way down
+  // by what it has moved since mu* was last as low.
+  double expected = (creep - surely) * std::abs(jump) / rise;
+  if (jump < -rise) {
+    expected = creep - surely;
+    const std::size_t reach = std::min(count_, kCells - 1);
+    for (std::size_t from = before_from + 2 * length; from + length <= reach; from += length) {
+      const Means past = means(from, from + length);
+      if (std::abs(past.torque_Nm) < std::abs(mu_after) * past.force_N) break;
+      expected = std::max(expected, before.slip_percent - past.slip_percent - surely);
+    }
+  }
+  const double slip_jump = after.slip_percent - before.slip_percent -
+                           on * (creep + later.slip_percent - after.slip_percent);
+  return std::abs(slip_jump) + kSlipDeviations * spread * slip_deviation < kLeastMove * expected;
+}
+
+bool ForceStep::step(const Cell& sample, double slip_noise, const Trend& force) noexcept {
+  sum_.force_N += sample.clamp_force_N / per_cell_;
+  sum_.torque_Nm += sample.torque_Nm / per_cell_;
+  sum_.slip_percent += sample.slip_percent / per_cell_;
+  if (++filled_ < per_cell_) return false;
+  const Means before_now = sums_[count_ % kCells];
+  ++count_;
+  sums_[count_ % kCells] = {before_now.force_N + sum_.force_N,
+                            before_now.torque_Nm + sum_.torque_Nm,
+                            before_now.slip_percent + sum_.slip_percent};
+  filled_ = 0;
+  sum_ = {};
+  for (std::size_t length = kShortest; length <= kLongest; length *= 2) {
+    if (count_ < 4 * length + kGapCells) break;
+    if (steps(length, slip_noise, force)) return true;
+  }
+  return false;
+}
+
+}  // namespace beltgrip::estimator

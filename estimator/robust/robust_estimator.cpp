@@ -1,0 +1,466 @@
+#include "estimator/robust/robust_estimator.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/method/possible_friction.h"
+#include "estimator/physics/clamp_force.h"
+#include "estimator/physics/sensor_error.h"
+#include "estimator/physics/units.h"
+#include "estimator/reading/frozen_reading.h"
+#include "estimator/reading/glitch_gate.h"
+#include "estimator/record/experiment_record.h"
+#include "estimator/robust/after_stop.h"
+#include "estimator/robust/follow_on.h"
+#include "estimator/robust/force_step.h"
+#include "estimator/robust/peak_fit.h"
+#include "estimator/robust/peak_forecast.h"
+#include "estimator/signal/excitation.h"
+#include "estimator/signal/signal_chain.h"
+
+namespace beltgrip::estimator {
+namespace {
+
+constexpr double kPublished_hz = 8.0;  // low-pass of the published mu* and slip only
+constexpr double kExcitationWindow_s = 1.0;
+// Probability that the data contain the peak: with a stop by the slope, and with any other end.
+// Peaks lie at 1 to 4 percent of slip: beyond the usual, a curve that is level within its noise
+// rather rises on, by a factor e of the odds for each percent.
+constexpr double kInsideAfterStop = 0.5;
+constexpr double kInsideWithoutStop = 0.9;
+constexpr double kUsualPeak_percent = 2.5;
+constexpr double kFallDeviations = 3.0;  // by which mu* must then have fallen
+constexpr double kFormDeviation = 5e-4;  // of mu: what the forms of the fit leave
+constexpr int kNarrowInARow = 4;
+constexpr int kFollowedPerStep = 3;
+constexpr double kClimb = 1.05;    // mu* at the stop, of the first one; or
+constexpr double kLowered = 0.99;  // the clamp force
+// A jump of the reading by more is looked at: of a speed and of the torque, relative; of noise.
+constexpr double kGlitchSlip = 0.005, kGlitchTorque = 0.2, kGlitchDeviations = 5.0;
+constexpr double kNoiseKnown_s = 1.0;
+constexpr double kWidestStd = 0.3;         // of mu: wider is no value
+constexpr double kFittedDeviations = 2.6;  // by which the fit's top is lowered for a bound
+constexpr double kChordDeviations = 5.5;   // beyond these the points lie on no one curve
+constexpr double kInnovation = 5.0;
+constexpr double kRuns = 4.5;
+constexpr double kSlipOfATop_percent = 1.5;  // less of it is that of a belt that grips
+constexpr double kBoundDeviations = 2.33;    // 99 %, one-sided
+
+double inside_needed(double slip_percent) {
+  constexpr double kOdds = kInsideAfterStop / (1.0 - kInsideAfterStop);
+  const double odds = kOdds * std::exp(std::max(0.0, slip_percent - kUsualPeak_percent));
+  return odds / (1.0 + odds);
+}
+
+class RobustEstimator final : public SlipCurveEstimator {
+ public:
+  RobustEstimator(const EstimatorSettings& settings, const VariatorParameters& variator,
+                  const SensorAccuracies& accuracies, const StopThresholds& thresholds)
+      : variator_(variator),
+        accuracies_(accuracies),
+        sample_rate_hz_(settings.sample_rate_hz),
+        reading_reach_(settings.reading_reach),
+        confidence_width_(settings.stop_rule == StopRule::kConfidence ? settings.confidence_width
+                                                                      : 0.0),
+        inertia_kg_m2_(settings.torque_is_engine ? variator.primary_inertia_kg_m2 : 0.0),
+        chain_(settings, variator, kPublished_hz),
+        excitation_(kExcitationWindow_s, settings.sample_rate_hz, 0.0),
+        record_(settings.sample_rate_hz),
+        detector_(thresholds),
+        after_stop_(settings.sample_rate_hz),
+        force_step_(settings.sample_rate_hz,
+                    variator.secondary_piston_area_m2 * settings.pressure_step_Pa),
+        peak_forecast_(settings.sample_rate_hz),
+        pressure_reading_(settings.sample_rate_hz),
+        torque_reading_(settings.sample_rate_hz),
+        omega_p_reading_(settings.sample_rate_hz),
+        omega_s_reading_(settings.sample_rate_hz),
+        omega_p_gate_(settings.sample_rate_hz),
+        omega_s_gate_(settings.sample_rate_hz),
+        torque_gate_(settings.sample_rate_hz),
+        torque_is_sensor_(!settings.torque_is_engine) {
+    RobustEstimator::reset();
+  }
+
+  void reset() noexcept override {
+    chain_.reset();
+    excitation_.reset();
+    record_.reset();
+    force_step_.reset();
+    pressure_reading_.reset();
+    torque_reading_.reset();
+    omega_p_reading_.reset();
+    omega_s_reading_.reset();
+    omega_p_gate_.reset();
+    omega_s_gate_.reset();
+    torque_gate_.reset();
+    out_ = {};
+    peak_ = {};
+    first_t_ns_ = 0;
+    after_stop_.reset();
+    follow_on_.reset();
+    next_after_ = 0;
+    narrow_ = 0;
+    first_mu_ = first_force_N_ = 0.0;
+    started_ = concluding_ = concluded_ = false;
+    waiting_ = refitting_ = stepped_ = force_stepped_ = speed_jumped_ = false;
+  }
+
+  const CurveEstimate& step(const VariatorSample& read) noexcept override {
+    const bool ended = out_.stop != StopReason::kNone || concluding_ || concluded_;
+    const VariatorSample sample = ended ? read : without_glitches(read);
+    const Measurement& now = chain_.step(sample);
+    out_.t_ns = sample.t_ns;
+    out_.usable = now.usable;
+    if (out_.stop == StopReason::kNone) out_.stop = now.stop;
+    if (!now.usable) return out_;
+    publish(now);
+    if (ended) {
+      if (started_) {
+        after_stop_.step(cell_of(sample));
+        follow_on_.step(cell_of(sample));
+      }
+      stepped_ = true;
+      return out_;
+    }
+    if (!started_) {
+      started_ = true;
+      first_t_ns_ = sample.t_ns;
+      traction_ = traction_coefficient(variator_, chain_.point(), chain_.point().sign, 1.0);
+      detector_.reset(traction_, inertia_kg_m2_);
+      peak_forecast_.reset(traction_, inertia_kg_m2_);
+    }
+    pressure_reading_.step(read.secondary_pressure_Pa);
+    torque_reading_.step(read.torque_Nm);
+    omega_p_reading_.step(read.omega_p_rad_s);
+    omega_s_reading_.step(read.omega_s_rad_s);
+    const Cell cell = cell_of(sample);
+    force_stepped_ |= force_step_.step(cell, record_.slip_noise(), record_.force());
+    if (record_.step(cell)) decide();
+    if (peak_forecast_.step()) expect();
+    return out_;
+  }
+
+  bool conclude() noexcept override {
+    if (concluded_ || !started_) return true;
+    if (!concluding_) {
+      concluding_ = true;
+      peak_ = {};
+      if (out_.stop == StopReason::kConfidence) {
+        take_expected();
+        refuse_impossible(peak_, reading_reach_);
+        concluded_ = true;
+        return true;
+      }
+      if (out_.stop == StopReason::kNone) after_stop_.begin(record_);  // ended by the caller
+      fit_.begin(record_, traction_, inertia_kg_m2_);
+    }
+    const bool stepped = stepped_;
+    stepped_ = false;
+    if (waiting_) return (after_stop_.over() || !stepped) && join_what_followed();
+    if (!fit_.step()) return false;
+    if (stepped && follow_on_.waits()) return false;
+    judge();
+    refuse_impossible(peak_, reading_reach_);
+    // What the belt did next may tell what the curve up to the stop leaves open.
+    waiting_ = !refitting_ && out_.stop == StopReason::kSlope && peak_.kind != PeakKind::kValue &&
+               !peak_.contradictory && !peak_.impossible;
+    concluded_ = !waiting_;
+    return concluded_;
+  }
+
+  const PeakEstimate& peak() const noexcept override { return peak_; }
+
+ private:
+  Cell cell_of(const VariatorSample& sample) const noexcept {
+    const double sign = chain_.point().sign;
+    return {
+        .t_s = static_cast<double>(sample.t_ns - first_t_ns_) * kNanosecond_s,
+        .slip_percent = slip_percent(chain_.point(), sample.omega_p_rad_s, sample.omega_s_rad_s),
+        .torque_Nm = sign * sample.torque_Nm,
+        .clamp_force_N =
+            secondary_clamp_force_N(variator_, sample.secondary_pressure_Pa, sample.omega_s_rad_s),
+        .omega_p_rad_s = sign * sample.omega_p_rad_s};
+  }
+
+  void publish(const Measurement& now) noexcept {
+    excitation_.step(now.slip_percent);
+    out_.mu_star = now.mu_star;
+    out_.sigma_star_percent = now.slip_percent;
+    out_.slip_variance = excitation_.variance();
+    out_.clamp_force_N = now.clamp_force_N;
+    out_.torque_p_Nm = now.torque_p_Nm;
+    out_.slip_energy_J += std::max(0.0, now.slip_percent / kPercent) * std::abs(now.torque_p_Nm) *
+                          now.omega_p_rad_s / sample_rate_hz_;
+    out_.direction = chain_.point().direction;
+    out_.end_stop = chain_.point().end_stop;
+    omega_s_rad_s_ = now.omega_s_rad_s;
+  }
+
+  // Noise is taken as if every sample had its own, which is more than there is.
+  VariatorSample without_glitches(const VariatorSample& sample) noexcept {
+    if (!sample.usable || record_.duration_s() < kNoiseKnown_s) return sample;
+    for (const double value : {sample.omega_p_rad_s, sample.omega_s_rad_s, sample.torque_Nm}) {
+      if (!std::isfinite(value)) return sample;
+    }
+    const auto least = [this](double density) {
+      return kGlitchDeviations * std::sqrt(density * sample_rate_hz_);
+    };
+    const double slip = std::max(kGlitchSlip, least(record_.slip_noise()) / kPercent);
+    VariatorSample clean = sample;
+    clean.omega_p_rad_s = omega_p_gate_.step(sample.omega_p_rad_s, slip, 0.0);
+    clean.omega_s_rad_s = omega_s_gate_.step(sample.omega_s_rad_s, slip, 0.0);
+    clean.torque_Nm =
+        torque_gate_.step(sample.torque_Nm, kGlitchTorque, least(record_.torque_noise()));
+    speed_jumped_ |= omega_p_gate_.jumped() || omega_s_gate_.jumped();
+    return clean;
+  }
+
+  // Some of the samples after the stop join the record; after the last one the curve is fitted
+  // again.
+  bool join_what_followed() noexcept {
+    for (int i = 0; i < kFollowedPerStep && next_after_ < after_stop_.size(); ++i) {
+      record_.step(after_stop_[next_after_++]);
+    }
+    if (next_after_ < after_stop_.size()) return false;
+    waiting_ = false;
+    concluded_ = next_after_ == 0;
+    refitting_ = !concluded_;
+    if (refitting_) fit_.begin(record_, traction_, inertia_kg_m2_);
+    return concluded_;
+  }
+
+  void decide() noexcept {
+    out_.stop = detector_.step(record_);
+    if (first_mu_ <= 0.0) first_mu_ = out_.mu_star;
+    if (first_force_N_ <= 0.0) first_force_N_ = out_.clamp_force_N;
+    // Slip that grows while neither the force is lowered nor mu* climbs: a channel stands still.
+    const bool still =
+        pressure_reading_.frozen() ||
+        (out_.mu_star < kClimb * first_mu_ && out_.clamp_force_N > kLowered * first_force_N_);
+    if ((out_.stop == StopReason::kSlope && still) ||
+        (out_.stop != StopReason::kNone &&
+         (torque_frozen() || speed_frozen() || !is_possible(out_.mu_star, reading_reach_)))) {
+      out_.stop = StopReason::kInputs;
+    }
+    out_.friction_slope = detector_.slope();
+    if (out_.stop != StopReason::kNone) {
+      after_stop_.begin(record_);
+      follow_on_.begin(record_);
+      out_.phase = Phase::kMacroSlip;
+    } else if (detector_.level()) {
+      out_.phase = Phase::kPeak;
+    } else {
+      out_.phase = detector_.rising() ? Phase::kExcited : Phase::kQuiet;
+    }
+    peak_forecast_.collect(record_);
+  }
+
+  // What an engine's controller computes may stand still, a sensor's torque does not.
+  bool torque_frozen() const noexcept {
+    return torque_is_sensor_ && (torque_reading_.frozen() ||
+                                 (torque_reading_.never_moved() && omega_p_reading_.moves()));
+  }
+  // Slip and inertia torque that are not there, in their place.
+  bool speed_frozen() const noexcept {
+    return omega_p_reading_.frozen() || omega_s_reading_.frozen();
+  }
+
+  // What the curve so far says of its top, with the sensors' constant errors; enough for a stop?
+  void expect() noexcept {
+    const Forecast& forecast = peak_forecast_.forecast();
+    if (!forecast.valid) {
+      out_.mu_max_expected = out_.mu_max_low = out_.mu_max_high = 0.0;
+      narrow_ = 0;
+      return;
+    }
+    const double mu = forecast.mu_max;
+    const double alike = alike_variance(record_.duration_s(), 1.0);
+    const double F = record_.force_line().at(record_.duration_s());
+    const double common = kNormal95 * mu * std::sqrt(alike + sensor_variance(mu, F));
+    const double noise = kNormal95 * mu * std::sqrt(alike);
+    expected_noise_low_ = mu - std::hypot(mu - forecast.low, noise);
+    expected_noise_high_ = mu + std::hypot(forecast.high - mu, noise);
+    out_.mu_max_expected = mu;
+    out_.mu_max_low = mu - std::hypot(mu - forecast.low, common);
+    out_.mu_max_high = mu + std::hypot(forecast.high - mu, common);
+    // A single narrow interval may be a matter of luck.
+    narrow_ = out_.mu_max_high - out_.mu_max_low < confidence_width_ * mu ? narrow_ + 1 : 0;
+    if (out_.stop == StopReason::kNone && narrow_ >= kNarrowInARow) {
+      out_.stop = StopReason::kConfidence;
+    }
+  }
+
+  // Ended before the peak: what was to be expected then is the result.
+  void take_expected() noexcept {
+    peak_.kind = PeakKind::kValue;
+    peak_.mu_max = out_.mu_max_expected;
+    peak_.ci95_low = out_.mu_max_low;
+    peak_.ci95_high = out_.mu_max_high;
+    peak_.mu_max_std = (out_.mu_max_high - out_.mu_max_low) / (2.0 * kNormal95);
+    peak_.noise_low = expected_noise_low_;
+    peak_.noise_high = expected_noise_high_;
+    peak_.clamp_force_N = traction_ * std::abs(out_.torque_p_Nm) / out_.mu_max_expected;
+    peak_.omega_s_rad_s = omega_s_rad_s_;
+    peak_.sigma_peak_percent = peak_forecast_.forecast().slip_peak_percent;
+    peak_.samples = std::lround(record_.duration_s() * sample_rate_hz_);
+  }
+
+  // What turning oil adds to the clamp force goes with its square: a belt that slips on after its
+  // peak takes the shaft with it, or leaves it.
+  double omega_s_at(double t_s) const noexcept {
+    const History& history = record_.history();
+    for (std::size_t level = 0; level < History::kLevels; ++level) {
+      for (std::size_t age = 0; age < history.size(level); ++age) {
+        const Cell& cell = history.cell(level, age);
+        if (cell.t_s > t_s) continue;
+        const OperatingPoint& point = chain_.point();
+        const double ratio = point.ratio_g0 * (1.0 - point.sign * cell.slip_percent / kPercent);
+        return std::abs(cell.omega_p_rad_s) * ratio;
+      }
+    }
+    return omega_s_rad_s_;
+  }
+
+  // Relative variance of mu* that all samples near t share, the sensors' constant errors left out:
+  // the lines of force and torque, and the form of the curve.
+  double alike_variance(double t_s, double held_share) const noexcept {
+    const Line& force = record_.force_line();
+    const double F = force.at(t_s);
+    double relative = force.variance_at(t_s) / (F * F);
+    if (inertia_kg_m2_ > 0.0) {
+      const Line& torque = record_.torque_line();
+      relative +=
+          held_share * held_share * torque.variance_at(t_s) / (torque.at(t_s) * torque.at(t_s));
+    }
+    return relative + kFormDeviation * kFormDeviation;
+  }
+
+  // And of those errors.
+  double sensor_variance(double mu, double F) const noexcept {
+    const double sensors =
+        relative_sensor_deviation(variator_, accuracies_, mu * F / traction_, F, omega_s_rad_s_);
+    return sensors * sensors;
+  }
+
+  void judge() noexcept {
+    if (out_.stop == StopReason::kRatio || torque_frozen() || speed_frozen()) return;
+    if (out_.stop == StopReason::kInputs) {
+      peak_.impossible = !is_possible(out_.mu_star, reading_reach_);
+      peak_.mu_refused = peak_.impossible ? out_.mu_star : 0.0;
+      return;
+    }
+    const PeakFitResult& fit = fit_.result();
+    peak_ = {};
+    // Torque that fades is no friction that falls.
+    const bool seen = out_.stop == StopReason::kSlope
+                          ? fit.inside >= inside_needed(fit.slip)
+                          : out_.stop != StopReason::kTorque && fit.inside >= kInsideWithoutStop &&
+                                fit.passed &&
+                                fit.fall > kFallDeviations * std::sqrt(fit.fall_variance);
+    peak_.samples = std::lround(fit.duration_s * sample_rate_hz_);
+    peak_.contradictory = contradictory(fit);
+    if (peak_.contradictory) {
+      // What its top would be, if it is one: no belt's friction is the likelier cause then.
+      if (fit.valid && fit.inside >= kInsideWithoutStop && fit.slip > kSlipOfATop_percent) {
+        peak_.mu_refused = fit.mu;
+        peak_.clamp_force_N = record_.force_line().at(fit.t_s);
+        peak_.omega_s_rad_s = omega_s_at(fit.t_s);
+      }
+      return;
+    }
+    const double F = record_.force_line().at(fit.t_s);
+    const double square = fit.mu * fit.mu;
+    const double noise_variance = fit.variance + square * alike_variance(fit.t_s, fit.held_share);
+    const double std = std::sqrt(noise_variance + square * sensor_variance(fit.mu, F));
+    if (fit.valid && seen && std < kWidestStd * reading_reach_ * fit.mu) {
+      peak_.kind = PeakKind::kValue;
+      peak_.mu_max = fit.mu;
+      peak_.mu_max_std = std::max(std, kSmallestStd);
+      peak_.ci95_low = fit.mu - kNormal95 * peak_.mu_max_std;
+      peak_.ci95_high = fit.mu + kNormal95 * peak_.mu_max_std;
+      const double noise = std::max(std::sqrt(noise_variance), kSmallestStd);
+      peak_.noise_low = fit.mu - kNormal95 * noise;
+      peak_.noise_high = fit.mu + kNormal95 * noise;
+      peak_.clamp_force_N = F;
+      peak_.omega_s_rad_s = omega_s_at(fit.t_s);
+      peak_.sigma_peak_percent = fit.slip;
+    } else if (fit.reached > 0.0) {
+      take_lower_bound(fit);
+    }
+  }
+
+  // Surely reached in some window; or the fit, which leans on all of the curve. The larger.
+  void take_lower_bound(const PeakFitResult& fit) noexcept {
+    const double F = record_.force_line().at(record_.duration_s());
+    const double sensors = relative_sensor_deviation(
+        variator_, accuracies_, fit.reached * F / traction_, F, omega_s_rad_s_);
+    const double surely =
+        fit.reached *
+        (1.0 - std::hypot(kReachedDeviations * fit.reached_deviation, kBoundDeviations * sensors));
+    const double fit_variance =
+        fit.variance + fit.mu * fit.mu *
+                           (alike_variance(fit.t_s, fit.held_share) +
+                            sensor_variance(fit.mu, record_.force_line().at(fit.t_s)));
+    const double fitted = fit.valid ? fit.mu - kFittedDeviations * std::sqrt(fit_variance) : 0.0;
+    const bool better = fitted > surely;
+    peak_.kind = PeakKind::kLowerBound;
+    peak_.mu_max = better ? fitted : surely;
+    peak_.sigma_peak_percent = better ? fit.slip : fit.reached_slip;
+    peak_.clamp_force_N = F;
+    peak_.omega_s_rad_s = omega_s_at(record_.duration_s());
+  }
+
+  bool contradictory(const PeakFitResult& fit) const noexcept {
+    return record_.torque_stepped() || force_stepped_ || speed_jumped_ ||
+           after_stop_.swung_back() ||
+           (fit.valid && follow_on_.stood_still(fit.mu, traction_, inertia_kg_m2_)) ||
+           fit.below_chord > kChordDeviations || fit.residuals.innovation > kInnovation ||
+           fit.residuals.runs > kRuns;
+  }
+
+  VariatorParameters variator_;
+  SensorAccuracies accuracies_;
+  double sample_rate_hz_;
+  double reading_reach_;
+  double confidence_width_;  // 0: never
+  double inertia_kg_m2_;
+  SignalChain chain_;
+  SlipExcitation excitation_;
+  ExperimentRecord record_;
+  StopDetector detector_;
+  AfterStop after_stop_;
+  ForceStep force_step_;
+  FollowOn follow_on_;
+  std::size_t next_after_ = 0;  // to join the record
+  PeakFit fit_;
+  PeakForecast peak_forecast_;
+  FrozenReading pressure_reading_, torque_reading_, omega_p_reading_, omega_s_reading_;
+  GlitchGate omega_p_gate_, omega_s_gate_, torque_gate_;
+  bool torque_is_sensor_;
+  CurveEstimate out_;
+  PeakEstimate peak_;
+  double traction_ = 0.0;  // mu* = traction T_p / F_s
+  double omega_s_rad_s_ = 0.0;
+  std::int64_t first_t_ns_ = 0;
+  double first_mu_ = 0.0, first_force_N_ = 0.0;
+  double expected_noise_low_ = 0.0, expected_noise_high_ = 0.0;
+  int narrow_ = 0;  // forecasts in a row within confidence_width
+  bool started_ = false, concluding_ = false, concluded_ = false;
+  bool waiting_ = false;        // for what comes after the stop
+  bool refitting_ = false;      // with it
+  bool stepped_ = false;        // since the last conclude()
+  bool force_stepped_ = false;  // its reading
+  bool speed_jumped_ = false;   // the reading of one
+};
+
+}  // namespace
+
+std::unique_ptr<SlipCurveEstimator> make_robust_estimator(const EstimatorSettings& settings,
+                                                          const VariatorParameters& variator,
+                                                          const SensorAccuracies& accuracies,
+                                                          const StopThresholds& thresholds) {
+  return std::make_unique<RobustEstimator>(settings, variator, accuracies, thresholds);
+}
+
+}  // namespace beltgrip::estimator

@@ -1,0 +1,303 @@
+#include "estimator/robust/stop_detector.h"
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace beltgrip::estimator {
+namespace {
+
+constexpr double kShortestWindow_s = 0.12;
+constexpr double kWindowFactor = 1.3;
+constexpr double kSmallestLevelSlip = 0.5;  // percent: slip taken for elasticity at least
+constexpr double kQuietDeviation = 0.05;    // percent: noise of the smallest slip at most
+constexpr double kSettle_s = 1.2;           // load is being taken up: no slope before
+constexpr double kTiny = 1e-12;
+
+double square(double x) { return x * x; }
+
+// Weighted over tau = 0..1, the window from begin to end.
+struct Weights {
+  Eigen::Vector2d value;
+  Eigen::Vector2d derivative;  // by tau
+};
+
+Weights sensor_weights(double tau) { return {{1.0, tau * tau}, {0.0, 0.0}}; }
+
+Weights engine_weights(double tau) {
+  const double rest = 1.0 - tau;
+  return {{tau * rest * rest, tau * tau * rest},
+          {1.0 - 4.0 * tau + 3.0 * tau * tau, 2.0 * tau - 3.0 * tau * tau}};
+}
+
+struct Known {
+  double value, variance;
+};
+
+// Torque on the belt as the window begins: of the readings just before it and of the line that the
+// torque had run along until then, by their variances. How far the two are apart counts as
+// uncertainty: a line that has begun to bend shows in the readings first.
+Known torque_at_begin(const ExperimentRecord& record, double begin_s, const Known& readings,
+                      double variation) {
+  const ExperimentRecord::Held line = record.torque_held_at(begin_s);
+  if (!line.valid) return readings;
+  const double line_variance = line.variance + variation;
+  const double share = readings.variance / (readings.variance + line_variance + kTiny);
+  const double apart = line.torque_Nm - readings.value;
+  return {readings.value + share * apart, square(share) * (line_variance + square(apart)) +
+                                              square(1.0 - share) * readings.variance};
+}
+
+}  // namespace
+
+StopDetector::StopDetector(const StopThresholds& limits) : limits_(limits) {
+  const auto fill = [](MomentTable& table, Weights (*weights)(double)) {
+    for (std::size_t n = 1; n < table.size(); ++n) {
+      for (std::size_t i = 0; i < n; ++i) {
+        const Weights w = weights((static_cast<double>(i) + 0.5) / static_cast<double>(n));
+        table[n].sum += w.value;
+        table[n].value += w.value * w.value.transpose();
+        table[n].derivative += w.derivative * w.derivative.transpose();
+      }
+    }
+  };
+  fill(sensor_moments_, sensor_weights);
+  fill(engine_moments_, engine_weights);
+}
+
+void StopDetector::reset(double traction_per_Nm_N, double inertia_kg_m2) noexcept {
+  c_ = traction_per_Nm_N;
+  inertia_ = inertia_kg_m2;
+  double window = kShortestWindow_s;
+  for (double& w : window_s_) {
+    w = window;
+    window *= kWindowFactor;
+  }
+  turn_ = 0;
+  smallest_slip_ = 1e9;
+  slope_ = 0.0;
+  seen_ = level_ = false;
+  level_slip_ = level_until_s_ = 0.0;
+}
+
+StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
+                                             double window_s) const noexcept {
+  Slope out;
+  const History& history = record.history();
+  std::size_t level = 0;
+  while (level + 1 < History::kLevels &&
+         history.cell_s(level) * static_cast<double>(kMostCells) < window_s) {
+    ++level;
+  }
+  const double cell_s = history.cell_s(level);
+  const auto cells = static_cast<std::size_t>(window_s / cell_s);
+  if (cells < 4 || history.size(level) < 2 * cells + 1) return out;
+  const double n = static_cast<double>(cells);
+  const double W = cell_s * n;
+
+  // Slip around the window's begin and over its last quarter.
+  const std::size_t quarter = std::max<std::size_t>(1, cells / 4);
+  const double per_quarter = 1.0 / static_cast<double>(quarter);
+  double s_1 = 0.0, s_2 = 0.0, force_before = 0.0, force_after = 0.0;
+  for (std::size_t i = 0; i < quarter; ++i) {
+    const Cell& begin = history.cell(level, cells - quarter / 2 + i);
+    s_1 += begin.slip_percent * per_quarter;
+    force_before += begin.clamp_force_N * per_quarter;
+    s_2 += history.cell(level, i).slip_percent * per_quarter;
+    force_after += record.clamp_force_N(history.cell(level, i)) * per_quarter;
+  }
+  out.gained = s_2 - s_1;
+  const double gained_variance = 2.0 * record.slip_noise() * per_quarter / cell_s;
+  const double deformation =
+      limits_.deformation_percent_per_N * std::abs(force_before - force_after);
+  // In a Gaussian's far tail: twice the logarithm of how much less often the window is a new one.
+  // While the noise itself is known from few data, Student's tail is as much longer (Wallace).
+  const double freedom = std::max(1.0, record.slip_noise_freedom());
+  const double normal_squared =
+      square(limits_.gain_deviations) - 2.0 * std::log(W / kShortestWindow_s);
+  const double gain_deviations_squared = freedom * std::expm1(normal_squared / freedom);
+  if (out.gained < limits_.smallest_gain_percent + deformation ||
+      square(out.gained) < gain_deviations_squared * gained_variance) {
+    return out;
+  }
+
+  // What was before: torque and its turn over as long a time as the window, speed's slope.
+  const Cell& begin = history.cell(level, cells);
+  const double t_1 = begin.t_s + 0.5 * cell_s;
+  double torque_before = 0.0, torque_turn = 0.0;
+  for (std::size_t i = cells; i < 2 * cells; ++i) {
+    const double torque = history.cell(level, i).torque_Nm;
+    torque_before += torque / n;
+    torque_turn += (2 * i + 1 < 3 * cells ? torque : -torque) / (0.5 * n);
+  }
+  const Line& force = record.force_line();
+  const Line& held = record.torque_line();
+  const double F_1 = t_1 >= force.begin_s ? force.at(t_1) : force_before;
+  const double noise = record.torque_noise();
+  const double density = std::max(noise, record.torque().density(W));
+  const double variation = density - noise;  // of the true torque, at this time scale
+  // Torque if it is held: of the line, of the readings, or between, by their variances.
+  const double line_variance = variation / W + held.variance_at(record.duration_s()) + kTiny;
+  const double readings_variance = noise / W + kTiny;
+  const double line_share =
+      t_1 >= held.begin_s ? readings_variance / (readings_variance + line_variance) : 0.0;
+  const double hold_variance =
+      square(line_share) * line_variance + square(1.0 - line_share) * readings_variance;
+  const double T_1 = line_share * held.at(t_1) + (1.0 - line_share) * torque_before;
+
+  Eigen::Matrix2d A = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d y = Eigen::Vector2d::Zero();
+  double hold_top = 0.0, hold_bottom = 0.0;
+  const bool engine = inertia_ > 0.0;
+  const double omega_reference = history.cell(level, cells / 2).omega_p_rad_s;
+  for (std::size_t i = 0; i < cells; ++i) {
+    const Cell& cell = history.cell(level, cells - 1 - i);
+    const double tau = (static_cast<double>(i) + 0.5) / n;
+    const double F = record.clamp_force_N(cell);
+    const double x = cell.slip_percent - s_1;
+    const Weights w = engine ? engine_weights(tau) : sensor_weights(tau);
+    if (engine) {
+      // - integral of w domega/dt = integral of dw/dt omega.
+      const double T = line_share * held.at(cell.t_s) + (1.0 - line_share) * cell.torque_Nm;
+      y += w.value * T + w.derivative * (inertia_ / W * (cell.omega_p_rad_s - omega_reference));
+    } else {
+      y += w.value * cell.torque_Nm;
+    }
+    A.col(0) += w.value * F;
+    A.col(1) += w.value * (F * x);
+    hold_top += square(tau) * (1.0 - F / F_1);
+    hold_bottom += square(tau) * F * x;
+  }
+  y *= c_;
+  const Moments& moments = engine ? engine_moments_[cells] : sensor_moments_[cells];
+  Eigen::Matrix2d N = moments.value * noise;
+  if (engine) {
+    N = moments.derivative * (square(inertia_ / W) * record.omega_noise()) +
+        moments.value * (square(line_share) * variation + square(1.0 - line_share) * noise);
+  }
+  N *= square(c_) / cell_s;
+  // What is known of m_1 from before.
+  double m_1 = c_ * T_1 / F_1;
+  double m_1_variance = hold_variance;
+  if (engine) {
+    N += square(c_ * line_share) * held.variance_at(record.duration_s()) * moments.sum *
+         moments.sum.transpose();
+    const double span = W - cell_s;
+    const double rate_before =
+        (begin.omega_p_rad_s - history.cell(level, 2 * cells - 1).omega_p_rad_s) / span;
+    const double rate_after = (history.cell(level, 0).omega_p_rad_s - begin.omega_p_rad_s) / W;
+    m_1 -= c_ * inertia_ * rate_before / F_1;
+    m_1_variance += square(inertia_) *
+                    (square(rate_after - rate_before) + 12.0 * record.omega_noise() / (W * W * W));
+  } else {
+    const Known torque = torque_at_begin(record, t_1, {torque_before, density / W}, variation / W);
+    m_1 = c_ * torque.value / F_1;
+    m_1_variance = torque.variance + std::max(0.0, square(torque_turn) - 4.0 * density / W);
+  }
+  m_1_variance = m_1_variance * square(c_ / F_1) + kTiny * square(m_1);
+  N.diagonal() += kTiny * (y.cwiseAbs2() + Eigen::Vector2d::Constant(kTiny));
+  const Eigen::Matrix2d weighted = A.transpose() * N.inverse();
+  Eigen::Matrix2d information = weighted * A;
+  Eigen::Vector2d right = weighted * y;
+  information(0, 0) += 1.0 / m_1_variance;
+  right(0) += m_1 / m_1_variance;
+  const Eigen::Matrix2d covariance = information.inverse();
+  out.k = (covariance * right)(1);
+
+  const double mu_1 = c_ * T_1 / F_1;
+  const double gain_variance = gained_variance / square(out.gained);  // relative
+  const double force_variance = square(mu_1 * W / (F_1 * out.gained)) * force.slope_variance;
+  out.k_deviation = std::sqrt(covariance(1, 1) + square(out.k) * gain_variance + force_variance);
+  out.hold = mu_1 * F_1 * hold_top / hold_bottom;
+  out.hold_deviation = std::sqrt(square(out.hold) * gain_variance + force_variance +
+                                 square(c_ / (F_1 * out.gained)) * hold_variance);
+  out.slip = s_2;
+  out.level = limits_.level_elasticity * mu_1 / std::max(s_2 - smallest_slip_, kSmallestLevelSlip);
+  out.duration_s = W;
+  out.valid = std::isfinite(out.k) && std::isfinite(out.k_deviation) && out.level > 0.0;
+  return out;
+}
+
+void StopDetector::update_smallest_slip(const ExperimentRecord& record) noexcept {
+  const History& history = record.history();
+  std::size_t level = 3;
+  while (level + 1 < History::kLevels &&
+         record.slip_noise() > square(kQuietDeviation) * history.cell_s(level)) {
+    ++level;
+  }
+  if (history.size(level) > 0) {
+    smallest_slip_ = std::min(smallest_slip_, history.cell(level, 0).slip_percent);
+  }
+}
+
+StopReason StopDetector::backup(const ExperimentRecord& record) const noexcept {
+  // A straight line through the last tenth of a second of slip.
+  const History& history = record.history();
+  const auto cells = static_cast<std::size_t>(std::max(4.0, std::round(0.1 / history.cell_s(0))));
+  if (history.size(0) < cells) return StopReason::kNone;
+  const double n = static_cast<double>(cells);
+  double s = 0.0, st = 0.0;
+  const double middle = 0.5 * (n - 1.0);
+  for (std::size_t i = 0; i < cells; ++i) {
+    const double slip = history.cell(0, i).slip_percent;
+    s += slip / n;
+    st += slip * (middle - static_cast<double>(i));
+  }
+  const double moment = n * (n * n - 1.0) / 12.0;
+  const double cell_s = history.cell_s(0);
+  const double rate = st / moment / cell_s;
+  const double rate_deviation = std::sqrt(record.slip_noise() / cell_s / moment) / cell_s;
+  const double now = s + rate * middle * cell_s;
+  if (s - smallest_slip_ > limits_.backup_slip_percent) return StopReason::kSlip;
+  if (now + (rate - 4.0 * rate_deviation) * limits_.backup_ahead_s > limits_.backup_ahead_percent) {
+    return StopReason::kSlipRate;
+  }
+  return StopReason::kNone;
+}
+
+StopReason StopDetector::step(const ExperimentRecord& record) noexcept {
+  if (!record.force_line().valid || !record.torque_line().valid) return StopReason::kNone;
+  update_smallest_slip(record);
+  if (smallest_slip_ > 1e8) return StopReason::kNone;
+  ++turn_;
+  const double now_s = record.duration_s();
+  if (now_s > level_until_s_) level_ = false;
+  StopReason stop = StopReason::kNone;
+  if (now_s < kSettle_s) return backup(record);
+  seen_ = false;
+  double nearest = 1e9;
+  for (std::size_t i = 0; i < window_s_.size() && window_s_[i] < 0.5 * now_s; ++i) {
+    // Long windows change slowly: each in its turn.
+    const std::size_t every = window_s_[i] < 0.4 ? 1 : window_s_[i] < 1.6 ? 4 : 16;
+    if ((turn_ + i) % every != 0) continue;
+    const Slope slope = slope_over(record, window_s_[i]);
+    if (!slope.valid) continue;
+    seen_ = true;
+    if (std::abs(slope.gained - 0.5) < nearest) {
+      nearest = std::abs(slope.gained - 0.5);
+      slope_ = slope.k;
+    }
+    const double hold_most = std::max(slope.level, slope.hold + 2.0 * slope.hold_deviation);
+    const double evidence =
+        std::min(limits_.most_deviations,
+                 limits_.base_deviations +
+                     limits_.deviations_per_e * std::log(hold_most / slope.level)) /
+        std::max(1.0, slope.gained / limits_.large_gain_percent);
+    if (slope.k + evidence * slope.k_deviation < slope.level ||
+        slope.hold + 2.0 * slope.hold_deviation < slope.level) {
+      if (!level_) level_slip_ = slope.slip - slope.gained;
+      level_ = true;
+      level_until_s_ = std::max(level_until_s_, now_s + slope.duration_s);
+    }
+    const bool falling =
+        slope.k + std::max(limits_.falling_deviations, evidence) * slope.k_deviation < 0.0;
+    if (falling || (level_ && slope.slip + limits_.ahead_s * 2.0 * slope.gained / slope.duration_s >
+                                  level_slip_ + limits_.follow_percent)) {
+      stop = StopReason::kSlope;
+    }
+  }
+  return stop != StopReason::kNone ? stop : backup(record);
+}
+
+}  // namespace beltgrip::estimator

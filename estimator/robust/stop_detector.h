@@ -1,0 +1,114 @@
+// When has the friction curve been seen past its top? Slope of mu* over slip in windows of many
+// lengths up to now, its uncertainty, and the decision to stop. Slip in percent, slopes in
+// 1/percent. Real-time thread; no allocation after construction.
+//
+// In a window that began at slip s_1 with mu* = m_1, the torque that the belt carries is
+//   c T_b = F (m_1 + k x),   x = s - s_1,   c = cos(theta) / (2 R_p)                 (equation 5)
+// T_b is measured; or it is the engine torque less J domega_p/dt. Two weighted moments over the
+// window and what is known of m_1 from before give m_1, k and their covariance. Before the peak the
+// belt carries what it is loaded with: the line that the torque had run along until the window
+// began says more about m_1 than the readings just before it. The weights do not
+// depend on the noisy slip: noise in the regressor does not flatten the slope (instrumental
+// variables). With an engine torque they vanish at both ends, so that integration by parts moves
+// the derivative from the speed to the weights.
+//
+// From the clamp force alone comes a second slope, k_hold: what k would be if the belt still
+// carried the torque of before. Past the peak it carries less, so k <= k_hold. k_hold is nearly
+// free of noise and says whether "no longer rising" is a small step from what is seen, or a large
+// one that needs more evidence.
+//
+// Slopes are judged by their elasticity, k s / mu. Curves that saturate (tanh, magic formula,
+// brush, exponential) have come within half a percent of their top when it falls to 0.03-0.07.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+
+#include "estimator/method/slip_curve_estimator.h"
+#include "estimator/record/experiment_record.h"
+
+namespace beltgrip::estimator {
+
+struct StopThresholds {
+  // Elasticity below which the curve counts as level.
+  double level_elasticity = 0.03;
+  // Evidence for "level", in standard deviations of k: base, more for each factor e by which
+  // k_hold lies above level, at most; less in proportion where slip has grown by more than
+  // large_gain within the window.
+  double base_deviations = 1.0;
+  double deviations_per_e = 0.8;
+  double most_deviations = 3.5;
+  double large_gain_percent = 0.4;
+  // For "falling" never less than:
+  double falling_deviations = 3.0;
+  // Slip by which a level curve is followed on, in search of its fall, from where the window that
+  // showed it begins; where slip runs away, by what it will gain this much later.
+  double follow_percent = 1.1;
+  double ahead_s = 0.07;
+  // A window is looked at where slip has grown by this much, and by so many deviations that noise
+  // alone does so in one look of three million: an experiment has thousands of looks at the
+  // shortest windows. A longer one is new less often in proportion, and may err more often in
+  // proportion. Deformation moves the slip by itself as the clamp force falls: by so much at most,
+  // which counts for nothing.
+  double smallest_gain_percent = 0.2;
+  double deformation_percent_per_N = 4e-4;
+  double gain_deviations = 5.0;
+  // Backups: slip above its smallest value; slip that will be reached this much later.
+  double backup_slip_percent = 7.5;
+  double backup_ahead_s = 0.15;
+  double backup_ahead_percent = 9.0;
+};
+
+class StopDetector {
+ public:
+  // c: cos(theta) / (2 R_p); inertia 0 where the torque of the belt is measured.
+  explicit StopDetector(const StopThresholds& limits);
+  void reset(double traction_per_Nm_N, double inertia_kg_m2) noexcept;
+  // After each cell of the record. First reason wins; the caller keeps it.
+  StopReason step(const ExperimentRecord& record) noexcept;
+
+  double slope() const noexcept { return slope_; }
+  bool rising() const noexcept { return seen_ && !level_; }  // slip grows, mu* with it
+  bool level() const noexcept { return level_; }
+  double smallest_slip_percent() const noexcept { return smallest_slip_; }
+
+ private:
+  static constexpr int kWindows = 30;            // 0.12 s * 1.3^n: up to 4 min
+  static constexpr std::size_t kMostCells = 40;  // in a window
+  // Sums over the cells of a window: of the weights, of their products, of those of their
+  // derivatives by tau. They depend on the number of cells only.
+  struct Moments {
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    Eigen::Matrix2d value = Eigen::Matrix2d::Zero();
+    Eigen::Matrix2d derivative = Eigen::Matrix2d::Zero();
+  };
+  using MomentTable = std::array<Moments, kMostCells + 1>;
+  struct Slope {
+    bool valid = false;
+    double gained = 0.0;
+    double slip = 0.0;  // at the end
+    double k = 0.0, k_deviation = 0.0;
+    double hold = 0.0, hold_deviation = 0.0;  // k_hold
+    double level = 0.0;                       // slope that counts as level
+    double duration_s = 0.0;
+  };
+  Slope slope_over(const ExperimentRecord& record, double window_s) const noexcept;
+  void update_smallest_slip(const ExperimentRecord& record) noexcept;
+  StopReason backup(const ExperimentRecord& record) const noexcept;
+
+  StopThresholds limits_;
+  MomentTable sensor_moments_, engine_moments_;
+  double c_ = 0.0;
+  double inertia_ = 0.0;
+  std::array<double, kWindows> window_s_{};
+  std::size_t turn_ = 0;
+  double smallest_slip_ = 0.0;
+  double slope_ = 0.0;
+  bool seen_ = false;
+  bool level_ = false;
+  double level_slip_ = 0.0;
+  double level_until_s_ = 0.0;
+};
+
+}  // namespace beltgrip::estimator

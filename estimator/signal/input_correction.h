@@ -1,0 +1,63 @@
+// Takes out of the inputs what a model file says is wrong with them: afterwards a sample is what an
+// ideal machine with the configured [variator] would have shown. Real-time thread; all memory is
+// taken at construction.
+//
+//   T     = (T_measured - bias) / (1 + gain), less the losses between shaft and belt and J d(w)/dt
+//   p     = such that A p + spring + c w_s^2 is the force on the belt: offset, gain, lag, further
+//           forces and the play of the cylinder counted
+//   w_s   = such that w_s / (w_p r_g0) is 1 - slip: scales, end stop, deformation and tilt counted
+// A channel that comes late makes all others wait for it: the corrected sample is as old as the
+// largest delay of the model (latency_s), and so is every decision on it.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "estimator/physics/machine_effects.h"
+#include "estimator/physics/parameters.h"
+#include "estimator/physics/variator_sample.h"
+
+namespace beltgrip::estimator {
+
+class InputCorrection {
+ public:
+  InputCorrection(const MachineEffects& effects, const VariatorParameters& variator,
+                  double sample_rate_hz);
+  // Unusable samples pass as they are and begin the histories anew.
+  const VariatorSample& correct(const VariatorSample& measured) noexcept;
+  // Force on the belt less the force as measured, at the last sample: what a force in the
+  // transmission's own measure lacks.
+  double force_error_N() const noexcept { return force_error_N_; }
+  double latency_s() const noexcept { return latency_s_; }
+
+ private:
+  // One channel's last samples, read between them.
+  class Delay {
+   public:
+    Delay(double delay_s, double sample_rate_hz);
+    void reset(double value) noexcept;
+    double step(double value) noexcept;
+
+   private:
+    std::vector<double> past_;  // a ring
+    std::size_t now_ = 0;
+    std::size_t whole_ = 0;
+    double share_ = 0.0;
+  };
+  void begin(const VariatorSample& measured) noexcept;
+
+  MachineEffects effects_;
+  VariatorParameters variator_;
+  double rate_hz_;
+  double keep_;  // of the lag, per sample
+  double latency_s_;
+  std::array<Delay, 4> delays_;  // omega_p, omega_s, pressure, torque
+  VariatorSample out_;
+  double acting_Pa_ = 0.0, input_Pa_ = 0.0;
+  double play_N_ = 0.0;
+  double omega_p_ = 0.0, acceleration_ = 0.0;
+  double force_error_N_ = 0.0;
+  bool started_ = false;
+};
+
+}  // namespace beltgrip::estimator

@@ -1,0 +1,170 @@
+#include "estimator/signal/trend.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace beltgrip::estimator {
+namespace {
+
+constexpr double kCell_s = 0.05;
+constexpr double kContradiction = 3.0;      // deviations by which a part may leave the line
+constexpr double kLineNoiseScale_s = 0.4;   // longer means scatter by what is not noise
+constexpr double kQuietSlip_percent = 0.2;  // slip that moves less does not move the value
+constexpr std::size_t kShortest = 4;        // cells in the first line
+constexpr double kEnough = 6.0;             // squares before a scale is believed
+constexpr double kLargestSquare = 9.0;      // of their mean
+constexpr int kCuts = 6;
+constexpr double kSettled = 0.99;
+constexpr int kLowestBin = -30;  // of the squares, by powers of two
+constexpr double kUnbounded = 1e100;
+
+}  // namespace
+
+Trend::Trend(double sample_rate_hz, std::size_t cells)
+    : sums_(cells + 1),
+      per_cell_(static_cast<int>(std::max(1.0, std::ceil(kCell_s * sample_rate_hz - 1e-6)))),
+      cell_s_(per_cell_ / sample_rate_hz) {}
+
+void Trend::reset() noexcept {
+  cells_ = 0;
+  filled_ = 0;
+  sum_t_ = sum_y_ = sum_slip_ = 0.0;
+  scales_ = {};
+}
+
+bool Trend::step(double t_s, double value, double slip_percent) noexcept {
+  sum_t_ += t_s;
+  sum_y_ += value;
+  sum_slip_ += slip_percent;
+  if (++filled_ < per_cell_) return false;
+  const double share = 1.0 / per_cell_;
+  add(sum_t_ * share, sum_y_ * share, sum_slip_ * share);
+  filled_ = 0;
+  sum_t_ = sum_y_ = sum_slip_ = 0.0;
+  return true;
+}
+
+void Trend::add(double t_s, double value, double slip_percent) noexcept {
+  if (cells_ == 0) {
+    origin_t_ = t_s;
+    origin_y_ = value;
+    sums_[0] = {};
+  }
+  const double t = t_s - origin_t_;
+  const double y = value - origin_y_;
+  const Sums& before = sums(cells_);
+  sums_[(cells_ + 1) % sums_.size()] = {before.t + t, before.y + y, before.tt + t * t,
+                                        before.ty + t * y};
+  ++cells_;
+  for (int i = 0; i < kScales; ++i) {
+    Scale& scale = scales_[static_cast<std::size_t>(i)];
+    scale.sum += y;
+    scale.slip_sum += slip_percent;
+    if (++scale.filled < (1 << i)) continue;
+    scale.means = {scale.means[1], scale.means[2], scale.sum / scale.filled};
+    scale.slips = {scale.slips[1], scale.slips[2], scale.slip_sum / scale.filled};
+    scale.sum = scale.slip_sum = 0.0;
+    scale.filled = 0;
+    const bool quiet = std::abs(scale.slips[2] - scale.slips[0]) < kQuietSlip_percent;
+    if (++scale.count < 3 || (scale.squares_count > kEnough && !quiet)) continue;
+    // Of white noise the second difference has six times the variance of a mean.
+    const double second = scale.means[0] - 2.0 * scale.means[1] + scale.means[2];
+    scale.take(second * second / 6.0);
+  }
+}
+
+void Trend::Scale::take(double square) noexcept {
+  const int highest_bin = kLowestBin + static_cast<int>(bins.size()) - 1;
+  const int bin = std::clamp(std::ilogb(square), kLowestBin, highest_bin) - kLowestBin;
+  first_bin = squares_count > 0.0 ? std::min(first_bin, bin) : bin;
+  last_bin = squares_count > 0.0 ? std::max(last_bin, bin) : bin;
+  bins[static_cast<std::size_t>(bin)].count += 1.0;
+  bins[static_cast<std::size_t>(bin)].sum += square;
+  squares_count += 1.0;
+  // A corner of the course or a step (the load is taken up, a ramp begins or ends) is no noise:
+  // what lies beyond kLargestSquare times the mean counts for no more, and the mean is without it.
+  mean_square = kUnbounded;
+  for (int i = 0; i < kCuts; ++i) {
+    const double cut = kLargestSquare * mean_square;
+    double cut_sum = 0.0;
+    for (int k = first_bin; k <= last_bin; ++k) {
+      const Bin& each = bins[static_cast<std::size_t>(k)];
+      cut_sum += std::min(each.sum, each.count * cut);
+    }
+    const double before = mean_square;
+    mean_square = cut_sum / squares_count;
+    if (mean_square > kSettled * before) return;
+  }
+}
+
+double Trend::density(double over_s) const noexcept {
+  double largest = 0.0;
+  for (int i = 0; i < kScales; ++i) {
+    const Scale& scale = scales_[static_cast<std::size_t>(i)];
+    const double length_s = cell_s_ * (1 << i);
+    if (scale.squares_count < (i == 0 ? 1.0 : kEnough) || (i > 0 && length_s > over_s)) break;
+    largest = std::max(largest, scale.mean_square * length_s);
+  }
+  return largest;
+}
+
+double Trend::squares(double over_s) const noexcept {
+  std::size_t i = 0;
+  while (i + 1 < kScales && cell_s_ * static_cast<double>(std::size_t{1} << i) < over_s - 1e-9) ++i;
+  return scales_[i].squares_count;
+}
+
+Line Trend::through(std::size_t begin, std::size_t end, double cell_variance) const noexcept {
+  const Sums& a = sums(begin);
+  const Sums& b = sums(end);
+  const double n = static_cast<double>(end - begin);
+  const double t = (b.t - a.t) / n;
+  const double y = (b.y - a.y) / n;
+  const double tt = std::max(1e-12, (b.tt - a.tt) - n * t * t);
+  const double ty = (b.ty - a.ty) - n * t * y;
+  return {.t_s = origin_t_ + t,
+          .value = origin_y_ + y,
+          .slope = ty / tt,
+          .value_variance = cell_variance / n,
+          .slope_variance = cell_variance / tt,
+          .begin_s = origin_t_ + sums(begin + 1).t - a.t - 0.5 * cell_s_,
+          .valid = true};
+}
+
+double Trend::mean_deviation(const Line& line, std::size_t begin, std::size_t end) const noexcept {
+  const Sums& a = sums(begin);
+  const Sums& b = sums(end);
+  const double n = static_cast<double>(end - begin);
+  return origin_y_ + (b.y - a.y) / n - line.at(origin_t_ + (b.t - a.t) / n);
+}
+
+bool Trend::fits(const Line& line, std::size_t begin, std::size_t end,
+                 double cell_variance) const noexcept {
+  const std::size_t length = end - begin;
+  const auto within = [&](std::size_t from, std::size_t to) {
+    const double bound = kContradiction * std::sqrt(cell_variance / static_cast<double>(to - from));
+    return std::abs(mean_deviation(line, from, to)) <= bound + 1e-12;
+  };
+  for (std::size_t part = kShortest; part < length; part *= 2) {
+    if (!within(end - part, end) || !within(begin, begin + part)) return false;
+  }
+  const std::size_t third = length / 3;
+  return third == 0 || within(end - 2 * third, end - third);
+}
+
+Line Trend::line() const noexcept {
+  const std::size_t oldest = cells_ >= sums_.size() ? cells_ - sums_.size() + 1 : 0;
+  if (cells_ < oldest + kShortest) return {};
+  const double cell_variance = density(kLineNoiseScale_s) / cell_s_;
+  std::size_t length = kShortest;
+  Line best = through(cells_ - length, cells_, cell_variance);
+  while (length < cells_ - oldest) {
+    length = std::min(cells_ - oldest, length + std::max<std::size_t>(2, length / 2));
+    const Line candidate = through(cells_ - length, cells_, cell_variance);
+    if (!fits(candidate, cells_ - length, cells_, cell_variance)) break;
+    best = candidate;
+  }
+  return best;
+}
+
+}  // namespace beltgrip::estimator

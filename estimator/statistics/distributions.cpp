@@ -1,0 +1,40 @@
+#include "estimator/statistics/distributions.h"
+
+#include <unsupported/Eigen/SpecialFunctions>
+
+namespace beltgrip::estimator {
+
+double student_cdf(double x, double degrees) {
+  const double tail = 0.5 * student_p(x, degrees);
+  return x > 0.0 ? 1.0 - tail : tail;
+}
+
+double student_p(double t, double degrees) {
+  return Eigen::numext::betainc(0.5 * degrees, 0.5, degrees / (degrees + t * t));
+}
+
+double student_quantile(double probability, double degrees) {
+  double low = -1.0;
+  double high = 1.0;
+  while (student_cdf(low, degrees) > probability) low *= 2.0;
+  while (student_cdf(high, degrees) < probability) high *= 2.0;
+  constexpr int kHalvings = 80;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = 0.5 * (low + high);
+    (student_cdf(middle, degrees) < probability ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+double f_p(double f, double numerator_degrees, double denominator_degrees) {
+  return Eigen::numext::betainc(
+      0.5 * denominator_degrees, 0.5 * numerator_degrees,
+      denominator_degrees / (denominator_degrees + numerator_degrees * f));
+}
+
+double chi2_p(double chi2, int degrees) {
+  if (degrees <= 0 || !(chi2 > 0.0)) return 1.0;
+  return Eigen::numext::igammac(0.5 * degrees, 0.5 * chi2);
+}
+
+}  // namespace beltgrip::estimator

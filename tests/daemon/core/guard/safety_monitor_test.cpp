@@ -1,0 +1,233 @@
+// The safety monitor: every limit alone, just inside and just outside; what it withdraws stays
+// withdrawn until the request has ended.
+#include "daemon/core/guard/safety_monitor.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace beltgrip::daemon {
+namespace {
+
+constexpr Duration kSample = 5 * kMillisecond;
+
+class Monitor : public testing::Test {
+ protected:
+  Monitor() {
+    limits_.spring_force_N = 500.0;
+    limits_.centrifugal_N_s2 = 0.01;
+    limits_.floor_force_N = 200.0;  // floor at 300 rad/s: 1600 N
+  }
+  void SetUp() override { monitor_ = SafetyMonitor(limits_); }
+
+  // One sample later with this drift of the speed ratio (primary slower: overrun).
+  SafetyVerdict sample(double request_N, double drift = 0.0) {
+    t_ += kSample;
+    SafetySignals now = signals_;
+    now.omega_s_rad_s *= 1.0 + drift;
+    return monitor_.check(t_, now, request_N);
+  }
+  SafetyVerdict begin(double request_N = 3000.0) {
+    t_ += 20 * kSecond;
+    return sample(request_N);
+  }
+
+  // A request that has come down to 2500 N, below what is still near the first.
+  void begin_and_lower() {
+    EXPECT_EQ(begin(), SafetyVerdict::kAllowed);
+    for (double request_N = 3000.0; request_N > 2500.0; request_N -= 1.0) {
+      EXPECT_EQ(sample(request_N), SafetyVerdict::kAllowed);
+    }
+  }
+
+  SafetyLimits limits_;
+  SafetyMonitor monitor_{limits_};
+  SafetySignals signals_{true, 140.0, 300.0, -30.0, 0.0784};
+  MonoTime t_ = 0;
+};
+
+TEST_F(Monitor, AllowsAQuietRamp) {
+  EXPECT_EQ(begin(), SafetyVerdict::kAllowed);
+  for (int i = 1; i <= 900; ++i) EXPECT_EQ(sample(3000.0 - 1.5 * i), SafetyVerdict::kAllowed) << i;
+}
+
+TEST_F(Monitor, InputsMustBeFreshAndNumbers) {
+  signals_.fresh = false;
+  EXPECT_EQ(begin(), SafetyVerdict::kInputs);
+  for (double SafetySignals::*field :
+       {&SafetySignals::omega_p_rad_s, &SafetySignals::omega_s_rad_s, &SafetySignals::torque_Nm}) {
+    for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity()}) {
+      SetUp();
+      signals_ = {true, 140.0, 300.0, -30.0, 0.0784};
+      EXPECT_EQ(begin(), SafetyVerdict::kAllowed);
+      signals_.*field = bad;
+      EXPECT_EQ(sample(3000.0), SafetyVerdict::kInputs);
+    }
+  }
+}
+
+TEST_F(Monitor, SpeedAtItsMinimum) {
+  signals_.omega_p_rad_s = 85.0;
+  EXPECT_EQ(begin(), SafetyVerdict::kAllowed);
+  signals_.omega_p_rad_s = std::nextafter(85.0, 0.0);
+  EXPECT_EQ(sample(3000.0), SafetyVerdict::kSpeed);
+  SetUp();
+  signals_.omega_p_rad_s = 140.0;
+  signals_.omega_s_rad_s = 0.0;
+  EXPECT_EQ(begin(), SafetyVerdict::kSecondary);
+}
+
+TEST_F(Monitor, SlipAtOnceAndDebouncedInEitherDirection) {
+  for (const double sign : {1.0, -1.0}) {
+    signals_.omega_p_rad_s = 100.0;  // slip speed stays inside
+    SetUp();
+    begin_and_lower();
+    EXPECT_EQ(sample(2500.0, sign * 0.0799), SafetyVerdict::kAllowed);
+    EXPECT_EQ(sample(2500.0, sign * 0.0801), SafetyVerdict::kSlip);
+    SetUp();
+    begin_and_lower();
+    for (int i = 0; i < 2; ++i) {
+      EXPECT_EQ(sample(2500.0, sign * 0.056), SafetyVerdict::kAllowed);
+    }
+    EXPECT_EQ(sample(2500.0, sign * 0.054), SafetyVerdict::kAllowed);  // counts anew
+    for (int i = 0; i < 2; ++i) {
+      EXPECT_EQ(sample(2500.0, sign * 0.056), SafetyVerdict::kAllowed);
+    }
+    EXPECT_EQ(sample(2500.0, sign * 0.056), SafetyVerdict::kSlip);
+  }
+}
+
+// Near the force it began with, and so near the controller's own, slip means a belt that has lost
+// friction, which that force would not catch beyond the peak. Limit: 0.15 % there, 0.48 % at 84 %.
+TEST_F(Monitor, SlipWhileTheForceIsStillNearItsFirst) {
+  struct Case {
+    double request_N, limit;
+  };
+  for (const double sign : {1.0, -1.0}) {
+    for (const Case& c : {Case{3000.0, 0.0015}, Case{2760.0, 0.00315}, Case{2521.0, 0.00479}}) {
+      SetUp();
+      begin();
+      for (double N = 3000.0; N > c.request_N; N -= 1.0) {
+        ASSERT_EQ(sample(N, sign * 0.0014), SafetyVerdict::kAllowed);
+      }
+      const double at = c.request_N == 3000.0 ? 0.0 : sign * 0.0014;  // where it began to count
+      for (int i = 0; i < 100; ++i) {
+        ASSERT_EQ(sample(c.request_N, at + sign * 0.97 * (c.limit - 0.0001)),
+                  SafetyVerdict::kAllowed);
+      }
+      SafetyVerdict last = SafetyVerdict::kAllowed;
+      int samples = 0;
+      while (last == SafetyVerdict::kAllowed && samples < 100) {
+        last = sample(c.request_N, at + sign * (c.limit + 0.002));
+        ++samples;
+      }
+      EXPECT_EQ(last, SafetyVerdict::kSlip) << c.request_N;
+      EXPECT_LE(samples, 20) << "within 0.1 s";
+    }
+    SetUp();
+    begin();
+    for (int i = 0; i < 16; ++i) sample(3000.0);
+    EXPECT_EQ(sample(3000.0, sign * 0.008), SafetyVerdict::kAllowed) << "one sample is noise";
+    SetUp();
+    begin_and_lower();
+    for (int i = 0; i < 100; ++i) {
+      EXPECT_EQ(sample(2500.0, sign * 0.0199), SafetyVerdict::kAllowed);
+    }
+  }
+}
+
+TEST_F(Monitor, SlipSpeed) {
+  signals_.omega_p_rad_s = 250.0;
+  signals_.omega_s_rad_s = 560.0;
+  limits_.floor_force_N = -2000.0;
+  SetUp();
+  begin();
+  const double limit = 0.70 / (250.0 * 0.0784);
+  EXPECT_EQ(sample(3000.0, 0.999 * limit), SafetyVerdict::kAllowed);
+  EXPECT_EQ(sample(3000.0, 1.001 * limit), SafetyVerdict::kSlipSpeed);
+}
+
+TEST_F(Monitor, EngineSpeedThatLeavesThePrimarys) {
+  for (const double sign : {1.0, -1.0}) {
+    SetUp();
+    signals_.omega_e_rad_s = 141.0;  // the lock-up clutch slips a little all the time
+    begin();
+    const auto engine = [&](double drift, int samples) {
+      signals_.omega_e_rad_s = 141.0 * (1.0 + sign * drift);
+      SafetyVerdict last{};
+      for (int i = 0; i < samples; ++i) last = sample(3000.0);
+      return last;
+    };
+    EXPECT_EQ(engine(0.0249, 100), SafetyVerdict::kAllowed);
+    EXPECT_EQ(engine(0.0251, 5), SafetyVerdict::kAllowed);
+    EXPECT_EQ(engine(0.0249, 1), SafetyVerdict::kAllowed);  // counts anew
+    EXPECT_EQ(engine(0.0251, 5), SafetyVerdict::kAllowed);
+    EXPECT_EQ(engine(0.0251, 1), SafetyVerdict::kEngine);
+  }
+  SetUp();
+  signals_.omega_e_rad_s = 0.0;  // not known: not judged
+  begin();
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(sample(3000.0), SafetyVerdict::kAllowed);
+}
+
+TEST_F(Monitor, EnergyCountsBeyondTwoPercentOnly) {
+  begin_and_lower();
+  for (int i = 0; i < 2000; ++i) ASSERT_EQ(sample(2500.0, 0.0199), SafetyVerdict::kAllowed);
+  // 30 Nm * 140 rad/s * 4 % * 5 ms = 0.84 J a sample.
+  int samples = 0;
+  while (sample(2500.0, 0.04) == SafetyVerdict::kAllowed) ++samples;
+  EXPECT_EQ(samples, static_cast<int>(80.0 / 0.84));
+  EXPECT_EQ(sample(2500.0), SafetyVerdict::kEnergy);
+}
+
+TEST_F(Monitor, FloorMovesWithTheSpeed) {
+  EXPECT_EQ(begin(1599.0), SafetyVerdict::kFloor);
+  SetUp();
+  EXPECT_EQ(begin(1600.0), SafetyVerdict::kAllowed);
+  EXPECT_EQ(sample(1599.9), SafetyVerdict::kFloor);
+}
+
+TEST_F(Monitor, NeverRisesAndFallsNoFasterThanItMay) {
+  begin();
+  EXPECT_EQ(sample(3000.0), SafetyVerdict::kAllowed);
+  EXPECT_EQ(sample(3000.1), SafetyVerdict::kRise);
+  SetUp();
+  begin();
+  EXPECT_EQ(sample(3000.0 - 2.5), SafetyVerdict::kAllowed);  // 1.5 N and 1 N of rounding
+  EXPECT_EQ(sample(3000.0 - 2.5 - 2.51), SafetyVerdict::kRate);
+}
+
+TEST_F(Monitor, DurationAndPause) {
+  begin();
+  const MonoTime begun = t_;
+  while (t_ < begun + limits_.duration_max - kSample) {
+    ASSERT_EQ(sample(3000.0), SafetyVerdict::kAllowed);
+  }
+  EXPECT_EQ(sample(3000.0), SafetyVerdict::kAllowed);  // exactly the maximum
+  EXPECT_EQ(sample(3000.0), SafetyVerdict::kDuration);
+  const MonoTime ended = t_;
+  EXPECT_EQ(sample(0.0), SafetyVerdict::kAllowed);
+  while (t_ < ended + limits_.pause_min - 2 * kSample) sample(0.0);
+  EXPECT_EQ(sample(3000.0), SafetyVerdict::kPause);
+  sample(0.0);
+  EXPECT_EQ(sample(3000.0), SafetyVerdict::kAllowed);
+}
+
+TEST_F(Monitor, WhatIsWithdrawnStaysWithdrawnUntilTheRequestHasEnded) {
+  begin();
+  signals_.fresh = false;
+  EXPECT_EQ(sample(3000.0), SafetyVerdict::kInputs);
+  signals_.fresh = true;
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(sample(2990.0), SafetyVerdict::kInputs);
+  EXPECT_EQ(sample(0.0), SafetyVerdict::kAllowed);
+  EXPECT_EQ(sample(2990.0), SafetyVerdict::kPause);
+}
+
+TEST_F(Monitor, ARequestThatIsNoNumberIsNone) {
+  EXPECT_EQ(begin(std::nan("")), SafetyVerdict::kFloor);
+  EXPECT_EQ(sample(-1.0), SafetyVerdict::kFloor);
+}
+
+}  // namespace
+}  // namespace beltgrip::daemon

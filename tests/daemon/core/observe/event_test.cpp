@@ -1,0 +1,198 @@
+// Events between reports, their text, and the ring they cross.
+#include "daemon/core/observe/event.h"
+#include "daemon/core/publish/names.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "daemon/core/experiment/arming.h"
+
+namespace beltgrip::daemon {
+namespace {
+
+using estimator::PeakKind;
+using estimator::StopReason;
+
+struct Bench {
+  std::vector<std::string> report() {
+    sink.on_report(now);
+    now.new_result = false;
+    std::vector<std::string> texts;
+    Event event;
+    while (ring->pop(event)) texts.push_back(text_of(event));
+    return texts;
+  }
+  std::unique_ptr<EventRing> ring = std::make_unique<EventRing>();
+  EventSink sink{*ring};
+  SampleReport now;
+};
+
+TEST(EventSink, OneEventForEachChange) {
+  Bench bench;
+  EXPECT_TRUE(bench.report().empty());
+  bench.now.state = State::kRamping;
+  EXPECT_EQ(bench.report(), std::vector<std::string>{"state Inhibited -> Ramping"});
+  EXPECT_TRUE(bench.report().empty());
+  bench.now.faults = fault_bit(Fault::kInputStale) | fault_bit(Fault::kFrameRefused);
+  EXPECT_EQ(bench.report(), (std::vector<std::string>{"fault InputStale", "fault FrameRefused"}));
+  bench.now.faults = fault_bit(Fault::kFrameRefused);
+  EXPECT_EQ(bench.report(), std::vector<std::string>{"fault InputStale gone"});
+  bench.now.faults |= fault_bit(Fault::kForeignSender);
+  bench.now.foreign_identifier = 0x6A3;
+  EXPECT_EQ(bench.report(), std::vector<std::string>{"fault ForeignSender (0x6A3)"});
+}
+
+TEST(EventSink, WhatAloneKeepsAnExperimentFromBeginning) {
+  Bench bench;
+  const auto after = [&](Duration duration, std::uint32_t inhibits) {
+    bench.now.t += duration;
+    bench.now.inhibits = inhibits;
+    return bench.report();
+  };
+  const std::uint32_t brake = inhibit_bit(Inhibit::kBrake), pedal = inhibit_bit(Inhibit::kPedal);
+  EXPECT_TRUE(after(kSecond, brake).empty());
+  EXPECT_TRUE(after(kSecond - 1, brake).empty());
+  EXPECT_EQ(after(1, brake), std::vector<std::string>{"no experiment: brake"});
+  EXPECT_TRUE(after(kSecond, brake).empty());
+  EXPECT_TRUE(after(kSecond, brake | pedal).empty());
+  EXPECT_TRUE(after(2 * kSecond, brake | pedal).empty());
+  EXPECT_TRUE(after(kSecond, inhibit_bit(Inhibit::kUnreachable)).empty());
+  EXPECT_EQ(after(kSecond, inhibit_bit(Inhibit::kUnreachable)),
+            std::vector<std::string>{"no experiment: unreachable"});
+  bench.now.in_experiment = true;
+  EXPECT_TRUE(after(5 * kSecond, inhibit_bit(Inhibit::kUnreachable)).empty());
+}
+
+TEST(EventSink, StopAndResult) {
+  Bench bench;
+  bench.now.macro_slip_stop = true;
+  bench.now.stop_reason = StopReason::kSlope;
+  bench.now.stop_cause = {
+      .what = "friction no longer rises with slip: slope", .figure = -0.0021, .unit = "1/%"};
+  bench.now.curve.sigma_star_percent = 3.456;
+  bench.now.curve.mu_star = 0.10451;
+  EXPECT_EQ(bench.report(), std::vector<std::string>{
+                                "MacroSlipStop, reason Slope (friction no longer rises with slip: "
+                                "slope -0.0021 1/%), slip 3.46 %, mu* 0.1045"});
+  bench.now.new_result = true;
+  bench.now.result.outcome = Outcome::kCompleted;
+  bench.now.result.stop_reason = StopReason::kSlope;
+  bench.now.result.peak.kind = PeakKind::kValue;
+  bench.now.result.peak.mu_max = 0.1049;
+  bench.now.result.peak.mu_max_std = 0.0003;
+  EXPECT_EQ(bench.report(),
+            std::vector<std::string>{"experiment Completed, stop reason Slope (friction no longer "
+                                     "rises with slip), mu_max 0.1049 +- 0.0003"});
+  bench.now.new_result = true;
+  bench.now.result.outcome = Outcome::kInconclusive;
+  bench.now.result.stop_reason = StopReason::kTraceEnd;
+  bench.now.result.peak.kind = PeakKind::kLowerBound;
+  EXPECT_EQ(
+      bench.report(),
+      std::vector<std::string>{
+          "experiment Inconclusive, stop reason TraceEnd (the log ended), mu_max above 0.1049"});
+}
+
+TEST(EventSink, AnAbortNamesItsOwnReason) {
+  Bench bench;
+  bench.now.macro_slip_stop = true;
+  bench.now.stop_reason = StopReason::kInputs;
+  bench.now.new_result = true;
+  bench.now.result.outcome = Outcome::kAborted;
+  bench.now.result.stop_reason = StopReason::kInputs;
+  bench.now.result.cause = {.what = "silent for",
+                            .figure = 0.055,
+                            .limit = 0.05,
+                            .unit = "s",
+                            .role = Role::kSecondaryPressure};
+  const auto texts = bench.report();
+  ASSERT_EQ(texts.size(), 2U);
+  EXPECT_TRUE(texts[0].starts_with("MacroSlipStop, reason Inputs"));
+  EXPECT_EQ(texts[1],
+            "experiment Aborted, stop reason Inputs (secondary_pressure: silent for 0.055 s, limit "
+            "0.05 s)");
+}
+
+TEST(SpscRing, DropsAndCountsWhenFull) {
+  SpscRing<int, 4> ring;
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(ring.push(i), i < 4);
+  EXPECT_EQ(ring.dropped(), 2U);
+  int value = 0;
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_TRUE(ring.pop(value));
+    EXPECT_EQ(value, i);
+  }
+  EXPECT_FALSE(ring.pop(value));
+  EXPECT_TRUE(ring.push(9));
+  EXPECT_TRUE(ring.pop(value));
+  EXPECT_EQ(value, 9);
+}
+
+TEST(SpscRing, ElementsCrossInOrder) {
+  constexpr std::uint64_t kCount = 200'000;
+  SpscRing<std::uint64_t, 64> ring;
+  std::thread producer([&] {
+    for (std::uint64_t i = 0; i < kCount;) i += ring.push(i) ? 1 : 0;
+  });
+  std::uint64_t value = 0;
+  for (std::uint64_t i = 0; i < kCount;) {
+    if (!ring.pop(value)) continue;
+    ASSERT_EQ(value, i);
+    ++i;
+  }
+  producer.join();
+}
+
+TEST(LineBudget, TenLinesASecondAndWhatWasLeftOut) {
+  LineBudget budget;
+  int lines = 0;
+  unsigned more = 0;
+  for (int i = 0; i < 100; ++i) {
+    Event event;
+    event.t = 10 * kSecond + i * 5 * kMillisecond;
+    event.id = EventId::kFaultRaised;
+    lines += budget.take(event) ? 1 : 0;
+    more += budget.left_out(event.t);
+  }
+  EXPECT_EQ(lines, static_cast<int>(LineBudget::kMost));
+  Event stop;
+  stop.t = 10 * kSecond + 500 * kMillisecond;
+  stop.id = EventId::kStop;
+  EXPECT_TRUE(budget.take(stop));
+  Event later;
+  later.t = 12 * kSecond;
+  EXPECT_TRUE(budget.take(later));
+  more += budget.left_out(later.t);
+  EXPECT_EQ(more, 100U - LineBudget::kMost);
+}
+
+// What the program says, the document explains: a row for every inhibit, stop reason and fault.
+TEST(NoResult, EveryReasonHasItsRow) {
+  std::ifstream in(std::string(BELTGRIP_SOURCE_DIR) + "/tools/NO_RESULT.md");
+  const std::string text((std::istreambuf_iterator<char>(in)), {});
+  ASSERT_FALSE(text.empty());
+  // First cells, which may name several.
+  std::string cells;
+  for (std::size_t at = text.find("\n| "); at != std::string::npos;
+       at = text.find("\n| ", at + 1)) {
+    cells += ", " + text.substr(at + 3, text.find(" |", at + 3) - at - 3);
+  }
+  cells += ",";
+  const auto expect_row = [&](std::string_view name) {
+    EXPECT_NE(cells.find(", " + std::string(name) + ","), std::string::npos) << name;
+  };
+  for (const std::string_view name : kInhibitNames) expect_row(name);
+  for (const std::string_view name : kFaultNames) expect_row(name);
+  for (std::size_t i = 0; i < estimator::kStopReasonCount; ++i) {
+    expect_row(stop_reason_name(static_cast<StopReason>(i)));
+  }
+}
+
+}  // namespace
+}  // namespace beltgrip::daemon

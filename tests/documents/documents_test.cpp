@@ -1,0 +1,161 @@
+// Documents whose content stands in a table of the code: frames, configuration, commands. They are
+// generated, and compared here; BELTGRIP_WRITE_DOCUMENTS=1 writes them instead.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <sstream>
+#include <vector>
+
+#include "can_dbc/dbc/parser.h"
+#include "daemon/core/publish/own_frames.h"
+#include "tests/support/program.h"
+
+namespace beltgrip::test {
+namespace {
+
+constexpr Milliseconds kLimit{10'000};
+constexpr std::string_view kGenerated =
+    "\nGenerated from the code, compared by `build/tests/documents_test`; "
+    "`BELTGRIP_WRITE_DOCUMENTS=1` before it writes it anew.\n";
+
+std::string read_file(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+// In a cell of a table.
+std::string cell(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '|') out += '\\';
+    out += c == '\n' ? ' ' : c;
+  }
+  return out;
+}
+
+std::string number(double value) {
+  std::ostringstream text;
+  text.precision(12);
+  text << value;
+  return text.str();
+}
+
+std::string values_of(const can::SignalDef& signal) {
+  std::string text;
+  for (const auto& [raw, name] : signal.values) {
+    text += (text.empty() ? "" : ", ") + can::value_key_text(signal, raw) + " " + name;
+  }
+  return text;
+}
+
+std::string frames() {
+  const can::DbcParseResult parsed = can::parse_dbc(daemon::beltgrip_dbc_text());
+  std::ostringstream out;
+  out << "# The frames of BeltGrip\n"
+      << parsed.database.comment << " The file is `can_dbc/beltgrip.dbc`; what a receiver of clamp "
+      << "requests keeps to is `daemon/CLAMP_CONTRACT.md`.\n"
+      << kGenerated;
+  for (const can::MessageDef& message : parsed.database.messages) {
+    out << "\n## " << message.name << ", 0x" << std::hex << std::uppercase << message.id.value
+        << std::dec << "\n"
+        << message.comment << "\n\n| signal | bit, length | factor | range | unit | meaning |\n"
+        << "|---|---|---|---|---|---|\n";
+    for (const can::SignalDef& each : message.signals) {
+      const std::string values = values_of(each);
+      out << "| " << each.name << " | " << each.start_bit << ", " << each.length << " | "
+          << number(each.scale) << " | " << number(each.minimum) << " to " << number(each.maximum)
+          << " | " << each.unit << " | " << cell(each.comment)
+          << (each.comment.empty() || values.empty() ? "" : " ") << cell(values) << " |\n";
+    }
+  }
+  return out.str();
+}
+
+// The commented default file, section by section.
+std::string configuration() {
+  const RunResult printed =
+      run({program_path("beltgripd"), "--print-default-config"}, kLimit, "/dev/null");
+  std::istringstream in(printed.out);
+  std::ostringstream out;
+  out << "# The configuration\n"
+      << "Every key of `beltgripd.toml` with its default, unit and range, section by section. What "
+      << "is left out has its default; a key that is not here is refused. `systemd/beltgripd.toml` "
+      << "is the same as a file to fill in, `beltgrip init` writes one for your car, "
+      << "`include = [\"calibrated.toml\"]` at the top takes what `beltgrip calibrate` found.\n"
+      << kGenerated;
+  std::string line;
+  bool open = false;
+  while (std::getline(in, line)) {
+    if (line.starts_with("[")) {
+      out << (open ? "```\n" : "") << "\n## " << line.substr(1, line.size() - 2) << "\n```toml\n";
+      open = true;
+    }
+    if (open) out << line << "\n";
+  }
+  out << "```\n";
+  return out.str();
+}
+
+constexpr std::string_view kCommandsBegin = "\n## Every command\n";
+
+// The command's help, and that of the commands below it, whose names stand behind "Subcommands:".
+void add_command(const std::vector<std::string>& command, std::ostream& out) {
+  std::vector<std::string> arguments = command;
+  arguments.push_back("--help");
+  const std::string help = beltgrip(arguments).out;
+  if (!command.empty()) {
+    out << "\n### beltgrip";
+    for (const std::string& word : command) out << ' ' << word;
+    out << "\n```\n" << help.substr(0, help.find_last_not_of('\n') + 1) << "\n```\n";
+  }
+  std::istringstream in(help);
+  std::string line;
+  bool listed = false;
+  while (std::getline(in, line)) {
+    if (line.starts_with("Subcommands:")) {
+      listed = true;
+    } else if (listed && line.starts_with("  ") && line.size() > 2 && line[2] != ' ') {
+      std::vector<std::string> below = command;
+      below.push_back(line.substr(2, line.find(' ', 2) - 2));
+      add_command(below, out);
+    }
+  }
+}
+
+std::string commands() {
+  const std::string path = BELTGRIP_SOURCE_DIR "/tools/COMMANDS.md";
+  std::string text = read_file(path);
+  const std::size_t begin = text.find(kCommandsBegin);
+  std::ostringstream out;
+  out << text.substr(0, begin) << kCommandsBegin << kGenerated;
+  add_command({}, out);
+  return out.str();
+}
+
+struct Document {
+  std::string path;
+  std::function<std::string()> text;
+};
+
+void PrintTo(const Document& document, std::ostream* out) { *out << document.path; }
+
+class Documents : public testing::TestWithParam<Document> {};
+
+TEST_P(Documents, SayWhatTheCodeSays) {
+  const std::string path = BELTGRIP_SOURCE_DIR "/" + GetParam().path;
+  const std::string text = GetParam().text();
+  ASSERT_GT(lines(text), 40) << text;
+  if (std::getenv("BELTGRIP_WRITE_DOCUMENTS") != nullptr) std::ofstream(path) << text;
+  EXPECT_EQ(read_file(path), text) << "BELTGRIP_WRITE_DOCUMENTS=1 build/tests/documents_test";
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Documents,
+                         testing::Values(Document{"can_dbc/FRAMES.md", frames},
+                                         Document{"systemd/CONFIGURATION.md", configuration},
+                                         Document{"tools/COMMANDS.md", commands}));
+
+}  // namespace
+}  // namespace beltgrip::test

@@ -1,0 +1,211 @@
+// Points on one curve and points that are not, against curves written down here; and a reading that
+// steps.
+#include "estimator/robust/curve_health.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "estimator/reading/step_watch.h"
+#include "estimator/robust/follow_on.h"
+#include "estimator/robust/force_step.h"
+#include "estimator/signal/trend.h"
+
+namespace beltgrip::estimator {
+namespace {
+
+constexpr double kNoise = 2e-4;
+
+std::vector<CurveSums> sums_of(double (*curve)(double), std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<CurveSums> sums(1);
+  for (int i = 0; i < 100; ++i) {
+    const double slip = 0.02 * i;
+    const double mu = curve(slip) + kNoise * normal(random);
+    const double weight = 1.0 / (kNoise * kNoise);
+    const CurveSums& before = sums.back();
+    sums.push_back({before.weight + weight, before.slip + weight * slip, before.mu + weight * mu,
+                    before.force_N + weight * 3000.0, before.duration_s + 0.05});
+  }
+  return sums;
+}
+
+double largest(double (*curve)(double), std::uint64_t seed) {
+  double out = 0.0;
+  const std::vector<CurveSums> sums = sums_of(curve, seed);
+  for (std::size_t length = 1; length <= 16; length *= 2) {
+    out = std::max(out, below_chord(sums, length, 1e-8));
+  }
+  return out;
+}
+
+TEST(CurveHealth, ConcaveCurvesAreWhole) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    EXPECT_LT(largest([](double slip) { return 0.1 * std::tanh(slip); }, seed), 5.5);
+    EXPECT_LT(largest([](double slip) { return 0.05 * std::min(slip, 1.5); }, seed), 5.5);
+  }
+}
+
+TEST(CurveHealth, AStepOfTorqueOrSlipIsNot) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    EXPECT_GT(largest([](double slip) { return 0.1 * std::tanh(slip) * (slip < 1.0 ? 1.0 : 1.05); },
+                      seed),
+              5.5);
+    EXPECT_GT(
+        largest([](double slip) { return 0.1 * std::tanh(slip < 1.0 ? slip : slip - 0.3); }, seed),
+        5.5);
+  }
+}
+
+TEST(CurveHealth, ResidualsOfNoiseAreNoneOfACurve) {
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  int rejected = 0;
+  for (int i = 0; i < 1000; ++i) {
+    std::vector<double> residuals(64);
+    for (double& each : residuals) each = normal(random);
+    const ResidualTests tests = test_residuals(residuals);
+    rejected += tests.innovation > 5.0 || tests.runs > 4.5;
+    for (std::size_t k = 0; k < residuals.size(); ++k) residuals[k] += k < 32 ? 1.5 : -1.5;
+    EXPECT_GT(test_residuals(residuals).innovation, 5.0);
+    EXPECT_GT(test_residuals(residuals).runs, 1.0);
+  }
+  EXPECT_LE(rejected, 3);
+}
+
+TEST(StepWatch, SeesAStepAndNoDriftAndNoneWhereSlipMoves) {
+  const auto steps = [](double (*torque)(double), double (*slip)(double)) {
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal;
+    StepWatch watch(200.0);
+    Trend trend(200.0, 4096);
+    bool seen = false;
+    for (int i = 0; i < 4000; ++i) {
+      const double t = i / 200.0;
+      const double value = torque(t) + 0.3 * normal(random);
+      trend.step(t, value, slip(t));
+      seen |= watch.step(value, slip(t), 1e-6, trend);
+    }
+    return seen;
+  };
+  const auto still = [](double) { return 0.3; };
+  const auto up = [](double t) { return t < 10.0 ? 50.0 : 53.0; };
+  EXPECT_TRUE(steps(up, still));
+  EXPECT_TRUE(steps([](double t) { return t < 10.0 ? -50.0 : -47.0; }, still));
+  EXPECT_FALSE(steps([](double t) { return t < 10.0 ? 50.0 : 51.0; }, still));
+  EXPECT_FALSE(steps([](double t) { return 50.0 - 2.0 * t; }, still));
+  EXPECT_FALSE(steps([](double t) { return 50.0 + 0.5 * std::sin(4.0 * t); }, still));
+  EXPECT_FALSE(steps(up, [](double t) { return 2.0 * t; }));
+  // A torque that falls as slip begins to grow speeds some inertia up; one that rises does not.
+  const auto down = [](double t) { return t < 10.0 ? 50.0 : 47.0; };
+  const auto creeps = [](double t) { return 0.3 + 0.2 * std::max(0.0, t - 9.7); };
+  EXPECT_TRUE(steps(down, still));
+  EXPECT_FALSE(steps(down, creeps));
+  EXPECT_TRUE(steps(up, creeps));
+}
+
+// mu* is T / F, the curve a straight line of slip over mu*: a belt follows the true force.
+TEST(ForceStep, SeesAReadingThatStepsWhereSlipStaysAndNoForceThatSlipFollows) {
+  using Force = double (*)(double);
+  // rounded_to_N: what the signal shows changes by; known_N: by what it is known to.
+  const auto steps = [](Force truth, Force read_of_truth, double rounded_to_N = 0.0,
+                        double known_N = 0.0) {
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal;
+    ForceStep watch(200.0, known_N);
+    Trend trend(200.0, 4096);
+    bool seen = false;
+    for (int i = 0; i < 4000; ++i) {
+      const double t = i / 200.0;
+      double force_N = truth(t) * read_of_truth(t) + 10.0 * normal(random);
+      if (rounded_to_N > 0.0) force_N = std::round(force_N / rounded_to_N) * rounded_to_N;
+      const Cell cell{.t_s = t,
+                      .slip_percent = 8000.0 / truth(t) - 1.0 + 0.02 * normal(random),
+                      .torque_Nm = 50.0,
+                      .clamp_force_N = force_N,
+                      .omega_p_rad_s = 100.0};
+      seen |= watch.step(cell, 0.02 * 0.02 / 200.0, trend);
+      trend.step(t, force_N, 0.0);
+    }
+    return seen;
+  };
+  const auto ramp = [](double t) { return 5000.0 - 100.0 * t; };
+  const auto right = [](double) { return 1.0; };
+  EXPECT_FALSE(steps(ramp, right));
+  EXPECT_TRUE(steps(ramp, [](double t) { return t < 10.0 ? 1.0 : 0.9; }));
+  EXPECT_TRUE(steps(ramp, [](double t) { return t < 10.0 ? 1.0 : 1.1; }));
+  EXPECT_FALSE(steps(ramp, [](double t) { return t < 10.0 ? 1.0 : 1.005; }));
+  EXPECT_FALSE(
+      steps([](double t) { return (t < 10.0 ? 1.0 : 0.9) * (5000.0 - 100.0 * t); }, right));
+  EXPECT_FALSE(steps([](double t) { return 5000.0 - 200.0 * std::max(0.0, t - 5.0); }, right));
+  // The end of a ramp, with a reading that falls a little too fast before it.
+  const auto ends = [](double t) {
+    return 1.0 - 0.02 * std::clamp(t - 9.0, 0.0, 1.0) * std::clamp(51.0 - 5.0 * t, 0.0, 1.0);
+  };
+  EXPECT_FALSE(steps([](double t) { return 5000.0 - 300.0 * std::min(t, 10.0); }, ends));
+  // Rounded to steps larger than its noise: its stairs are none.
+  const auto slow = [](double t) { return 5000.0 - 50.0 * t; };
+  EXPECT_TRUE(steps(slow, right, 150.0, 0.0));
+  EXPECT_FALSE(steps(slow, right, 150.0, 150.0));
+  EXPECT_TRUE(steps(
+      slow, [](double t) { return t < 10.0 ? 1.0 : 1.15; }, 150.0, 150.0));
+}
+
+TEST(Trend, LearnsTheNoiseBesideAStepAndACorner) {
+  const auto density = [](double (*course)(double)) {
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal;
+    Trend trend(200.0, 4096);
+    for (int i = 0; i < 4000; ++i) {
+      const double t = i / 200.0;
+      trend.step(t, course(t) + 0.3 * normal(random), 0.0);
+    }
+    return trend.density(0.2);
+  };
+  constexpr double kTruth = 0.09 / 200.0;
+  EXPECT_NEAR(density([](double) { return 50.0; }), kTruth, 0.5 * kTruth);
+  EXPECT_LT(density([](double t) { return 50.0 * std::min(1.0, t); }), 2.0 * kTruth);
+  EXPECT_LT(density([](double t) { return t < 10.0 ? 50.0 : 53.0; }), 2.0 * kTruth);
+}
+
+// Slip runs from 10 s on and is stopped 0.1 s later; mu* is c T / F with c = 6.
+TEST(FollowOn, TellsSlipThatComesToAStandFromSlipThatGoesOn) {
+  constexpr double kStop_s = 10.1;
+  const auto stood = [](double (*slip)(double), double (*force_N)(double)) {
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal;
+    ExperimentRecord record(200.0);
+    FollowOn follow_on;
+    for (int i = 0; i < 2200; ++i) {
+      const double t = i / 200.0;
+      const Cell sample{.t_s = t,
+                        .slip_percent = slip(t) + 0.02 * normal(random),
+                        .torque_Nm = 50.0 + 0.3 * normal(random),
+                        .clamp_force_N = force_N(t) + 30.0 * normal(random),
+                        .omega_p_rad_s = 105.0 + 0.02 * normal(random)};
+      if (t < kStop_s) {
+        record.step(sample);
+      } else {
+        follow_on.begin(record);
+        follow_on.step(sample);
+      }
+    }
+    EXPECT_FALSE(follow_on.waits());
+    return follow_on.stood_still(0.1, 6.0, 0.0);
+  };
+  const auto lowered = [](double t) { return 3300.0 - 30.0 * t; };  // 2997 N at the stop
+  const auto drift = [](double t) { return 1.0 + 2.5 * std::clamp(t - 10.0, 0.0, 0.3); };
+  const auto slipping = [](double t) { return 1.0 + 2.5 * std::max(t - 10.0, 0.0); };
+  EXPECT_TRUE(stood(drift, lowered));
+  EXPECT_FALSE(stood(slipping, lowered));
+  // Clamped again it comes to a stand as well.
+  EXPECT_FALSE(stood(drift, [](double t) {
+    return 3300.0 - 30.0 * t + 2000.0 * std::clamp(t - 10.15, 0.0, 0.3);
+  }));
+}
+
+}  // namespace
+}  // namespace beltgrip::estimator

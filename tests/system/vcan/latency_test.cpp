@@ -1,0 +1,111 @@
+// From the instant of a sample to its frame on the bus: beltgripd against the least that a program
+// can do with the same timer and one write, both in the same run on one vcan, stamped by the
+// kernel. Prints the delays and their ratio; what they are is the machine's business.
+// tests/latency.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+
+#include "can_dbc/log/can_log.h"
+#include "tests/system/vcan/rig.h"
+
+namespace beltgrip::test {
+namespace {
+
+constexpr std::int64_t kPeriod_ns = 5'000'000;
+constexpr canid_t kSlip = 0x6A1, kMinimal = 0x555;
+
+// "(1700000000.123456789) start"
+std::int64_t start_of(const std::string& record) {
+  const auto log = can::LogReader::open(record, true);
+  can::LogRecord line;
+  while (log->next(line)) {
+    const std::string note(line.note);
+    const std::size_t point = note.find('.');
+    if (!note.ends_with(" start") || point == std::string::npos) continue;
+    return std::stoll(note.substr(1, point - 1)) * 1'000'000'000 +
+           std::stoll(note.substr(point + 1, 9));
+  }
+  return 0;
+}
+
+struct Delays {
+  std::vector<double> us;  // sorted
+  double at(double share) const {
+    return us[std::min(us.size() - 1,
+                       static_cast<std::size_t>(share * static_cast<double>(us.size())))];
+  }
+};
+
+// What is later than a period counts as what it is late by in its own period.
+Delays delays(const std::vector<std::int64_t>& stamps_ns, std::int64_t start_ns) {
+  Delays found;
+  for (const std::int64_t stamp_ns : stamps_ns) {
+    found.us.push_back(static_cast<double>((stamp_ns - start_ns) % kPeriod_ns) * 1e-3);
+  }
+  std::sort(found.us.begin(), found.us.end());
+  return found;
+}
+
+class Latency : public Vcan, public testing::WithParamInterface<bool> {};
+
+TEST_P(Latency, FromSampleToFrame) {
+  const char* given = std::getenv("LATENCY_FRAMES");
+  const std::size_t wanted = given == nullptr ? 1000 : std::stoul(given);
+  std::vector<std::string> before;
+  if (GetParam()) before = {"chrt", "-f", "60"};
+  const auto with = [&](std::vector<std::string> argv) {
+    argv.insert(argv.begin(), before.begin(), before.end());
+    return argv;
+  };
+  const BusSocket bus("vcan0");
+  const Process player(canplayer(write_steady_log(folder()), "vcan0", true));
+  Process daemon(with({program("beltgripd"), "--config", write_rig_config(folder(), "vcan0"),
+                       "--record", folder() + "/record"}));
+  ASSERT_TRUE(daemon.wait_for_error("-> Ramping", kLimit)) << daemon.err();
+  Process minimal(with({BELTGRIP_BIN_DIR "/../tests/minimal_sender", "vcan0",
+                        std::to_string(kMinimal), std::to_string(kPeriod_ns)}));
+  ASSERT_TRUE(minimal.wait_for_output("start ", kLimit));
+  std::vector<std::int64_t> ours_ns, theirs_ns;
+  const auto seen = bus.receive_until(
+      [&](const SeenFrame& frame) {
+        if (frame.frame.can_id == kSlip && !theirs_ns.empty()) ours_ns.push_back(frame.t_ns);
+        if (frame.frame.can_id == kMinimal) theirs_ns.push_back(frame.t_ns);
+        return ours_ns.size() >= wanted;
+      },
+      Milliseconds(static_cast<int>(wanted) * 40));
+  ASSERT_TRUE(seen.has_value()) << daemon.err();
+  minimal.signal(SIGTERM);
+  minimal.wait(kLimit);
+  daemon.signal(SIGTERM);
+  ASSERT_EQ(daemon.wait(kLimit), 0) << daemon.err();
+  std::string record;
+  for (const auto& each : std::filesystem::directory_iterator(folder() + "/record")) {
+    if (record.empty() || each.path().string() < record) record = each.path();
+  }
+  const Delays ours = delays(ours_ns, start_of(record));
+  const Delays theirs = delays(theirs_ns, std::stoll(minimal.out().substr(6)));
+  std::printf("%-22s %8s %8s %8s %8s\n", GetParam() ? "FIFO 60, us" : "ordinary, us", "p50", "p90",
+              "p99", "frames");
+  for (const auto& [name, each] : {std::pair{"beltgripd", &ours}, {"timer and write", &theirs}}) {
+    std::printf("%-22s %8.0f %8.0f %8.0f %8zu\n", name, each->at(0.5), each->at(0.9),
+                each->at(0.99), each->us.size());
+  }
+  std::printf("%-22s %8.2f %8.2f %8.2f\n", "ratio", ours.at(0.5) / theirs.at(0.5),
+              ours.at(0.9) / theirs.at(0.9), ours.at(0.99) / theirs.at(0.99));
+  const std::size_t own = daemon.err().find("latency: ");
+  std::printf("of itself beltgripd says: %s\n",
+              daemon.err().substr(own, daemon.err().find('\n', own) - own).c_str());
+}
+
+INSTANTIATE_TEST_SUITE_P(, Latency, testing::Bool(),
+                         [](const auto& test) { return test.param ? "Fifo" : "Ordinary"; });
+
+}  // namespace
+}  // namespace beltgrip::test

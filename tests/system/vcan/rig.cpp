@@ -1,0 +1,56 @@
+#include "tests/system/vcan/rig.h"
+
+#include <cstdio>
+#include <fstream>
+
+namespace beltgrip::test {
+
+std::string program(const std::string& name) { return BELTGRIP_BIN_DIR "/" + name; }
+
+std::string write_rig_config(const std::string& folder, const std::string& interface,
+                             const std::string& more) {
+  const std::string path = folder + "/" + interface + ".toml";
+  std::ofstream(path) << "[bus]\ninterface = \"" << interface
+                      << "\"\ndbc = [\"" BELTGRIP_SOURCE_DIR "/tools/scenarios/paper-rig.dbc\"]\n"
+                         "[signals]\n"
+                         "primary_speed = \"RIG_Speed.PrimarySpeed\"\n"
+                         "secondary_speed = \"RIG_Speed.SecondarySpeed\"\n"
+                         "secondary_pressure = \"RIG_Pressure.SecondaryPressure\"\n"
+                         "primary_torque = \"RIG_Torque.PrimaryTorque\"\n"
+                         "[experiment]\n"
+                         "trigger = \"always\"\n"
+                      << more;
+  return path;
+}
+
+std::string write_steady_log(const std::string& folder) {
+  const std::string path = folder + "/steady.log";
+  std::ofstream log(path);
+  char stamp[32];
+  for (int i = 0; i < 200; ++i) {
+    std::snprintf(stamp, sizeof stamp, "(%d.%06d) vcan0 ", i / 200, i * 5000 % 1'000'000);
+    // 1000 and 2230 rpm (ratio 2.23), 50 Nm, 4 bar.
+    log << stamp << "110#3E808B6000000000\n"
+        << stamp << "120#C40900000000\n"
+        << stamp << "130#A00FA00F0000\n";
+  }
+  return path;
+}
+
+std::vector<std::string> canplayer(const std::string& log, const std::string& interface,
+                                   bool for_ever) {
+  std::vector<std::string> argv{"canplayer", "-I", log};
+  if (for_ever) argv.insert(argv.end(), {"-l", "i"});
+  argv.push_back(interface + "=vcan0");
+  return argv;
+}
+
+bool listen(const BusSocket& bus, PublishedFrames& published,
+            const std::function<bool(const PublishedFrames&)>& done, Milliseconds limit) {
+  return bus
+      .receive_until([&](const SeenFrame& seen) { return published.take(seen) && done(published); },
+                     limit)
+      .has_value();
+}
+
+}  // namespace beltgrip::test

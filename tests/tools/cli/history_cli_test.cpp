@@ -1,0 +1,159 @@
+// beltgrip history as users call it: a table, JSON lines, CSV, on a file that it leaves as it is,
+// and one line for every file that is none.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "daemon/io/history_db.h"
+#include "tests/support/program.h"
+
+namespace beltgrip::test {
+namespace {
+
+using daemon::HistoryDb;
+using daemon::HistoryRow;
+
+HistoryRow row(int number, double mu) {
+  HistoryRow each;
+  each.time_s = 1.7e9 + 3600.0 * number;
+  each.fingerprint = "00000000deadbeef";
+  each.result.end = 12'500'000'000;
+  each.result.outcome = daemon::Outcome::kCompleted;
+  each.result.stop_reason = estimator::StopReason::kSlope;
+  each.result.peak = {estimator::PeakKind::kValue, mu, 3e-4, mu - 6e-4, mu + 6e-4, 2.5, 900};
+  each.result.sigma_stop_percent = 2.9;
+  each.result.samples = 2500;
+  each.result.omega_p_rad_s = 150.0;
+  each.result.omega_s_rad_s = 330.0;
+  each.result.torque_Nm = 40.0;
+  each.result.clamp_force_N = 2400.0;
+  return each;
+}
+
+class History : public testing::Test {
+ protected:
+  // Ten experiments of one belt that has lost 4 % on the way, one without a value, one of another
+  // configuration.
+  void fill() {
+    const auto opened = HistoryDb::open(place.path("history.db"));
+    std::vector<HistoryRow> rows;
+    rows.push_back(row(0, 0.12));
+    rows.back().fingerprint = "other";
+    for (int i = 1; i <= 10; ++i) {
+      rows.push_back(row(i, (i <= 5 ? 0.105 : 0.1008) + 1e-4 * (i % 3)));
+    }
+    rows.push_back(row(11, 0.09));
+    rows.back().result.outcome = daemon::Outcome::kInconclusive;
+    rows.back().result.peak.kind = estimator::PeakKind::kLowerBound;
+    rows.back().notes = 1;
+    std::string why;
+    for (HistoryRow& each : rows) ASSERT_TRUE(opened.db->append(each, why)) << why;
+  }
+  Workplace place;
+};
+
+TEST_F(History, Table) {
+  fill();
+  const RunResult result = beltgrip({"history", place.path("")});
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_EQ(result.err, "");
+  EXPECT_NE(result.out.find("2023-11-14T23:13:20Z  completed     slope"), std::string::npos)
+      << result.out;
+  EXPECT_NE(result.out.find(">0.0900"), std::string::npos);
+  EXPECT_NE(result.out.find("outlier"), std::string::npos);
+  EXPECT_NE(result.out.find("WEAR"), std::string::npos);
+  EXPECT_NE(result.out.find("1 experiments under other configurations"), std::string::npos);
+}
+
+TEST_F(History, JsonLines) {
+  fill();
+  const RunResult result = beltgrip({"history", place.path("history.db"), "--json", "-"});
+  EXPECT_EQ(result.status, 0) << result.err;
+  std::istringstream in(result.out);
+  std::vector<nlohmann::json> all;
+  for (std::string line; std::getline(in, line);) all.push_back(nlohmann::json::parse(line));
+  ASSERT_EQ(all.size(), 14U);
+  EXPECT_EQ(all[1]["type"], "experiment");
+  EXPECT_EQ(all[1]["outcome"], "completed");
+  EXPECT_EQ(all[1]["mu_max"], 0.1051);
+  EXPECT_EQ(all[1]["torque_Nm"], 40.0);
+  EXPECT_TRUE(all[1]["oil_degC"].is_null());
+  EXPECT_TRUE(all[1]["mu_max_lower_bound"].is_null());
+  EXPECT_TRUE(all[11]["mu_max"].is_null());
+  EXPECT_EQ(all[11]["mu_max_lower_bound"], 0.09);
+  EXPECT_EQ(all[11]["notes"], "outlier");
+  const nlohmann::json& fused = all[12];
+  EXPECT_EQ(fused["type"], "fused");
+  EXPECT_EQ(fused["experiments"], 10);
+  EXPECT_NEAR(fused["mu_max"].get<double>(), 0.1009, 3e-4);
+  EXPECT_EQ(fused["wear"]["found"], true);
+  EXPECT_NEAR(fused["wear"]["change_percent"].get<double>(), -4.0, 0.2);
+  EXPECT_EQ(all[13]["experiments"], 12);
+  EXPECT_EQ(all[13]["comparable"], 11);
+}
+
+TEST_F(History, CsvAndTheFileStaysAsItIs) {
+  fill();
+  const std::string before = place.read("history.db");
+  const RunResult result =
+      beltgrip({"history", place.path("history.db"), "--csv", place.path("out.csv")});
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_NE(result.out, "");
+  const std::string csv = place.read("out.csv");
+  EXPECT_EQ(lines(csv), 13);
+  EXPECT_TRUE(csv.starts_with("id,time_s,time_utc,outcome,stop_reason,mu_max,")) << csv;
+  std::istringstream in(csv);
+  for (std::string line; std::getline(in, line);) {
+    EXPECT_EQ(std::count(line.begin(), line.end(), ','), 23) << line;
+  }
+  EXPECT_EQ(place.read("history.db"), before);
+  EXPECT_FALSE(std::filesystem::exists(place.path("history.db-wal")));
+}
+
+TEST_F(History, OneFolderForEachInterface) {
+  fill();
+  std::filesystem::create_directories(place.path("can0"));
+  std::filesystem::rename(place.path("history.db"), place.path("can0/history.db"));
+  EXPECT_EQ(lines(beltgrip({"history", place.path(""), "--csv", "-"}).out), 13);
+  std::filesystem::create_directories(place.path("can1"));
+  std::filesystem::copy(place.path("can0/history.db"), place.path("can1/history.db"));
+  const RunResult several = beltgrip({"history", place.path("")});
+  EXPECT_EQ(several.status, 64);
+  EXPECT_NE(several.err.find("can0/history.db, "), std::string::npos) << several.err;
+}
+
+TEST_F(History, WhatIsNone) {
+  const auto fails = [&](const std::vector<std::string>& arguments, int status,
+                         const std::string& text) {
+    const RunResult result = beltgrip(arguments);
+    EXPECT_EQ(result.status, status) << result.err;
+    EXPECT_EQ(lines(result.err), 1) << result.err;
+    EXPECT_EQ(result.out, "");
+    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
+  };
+  fails({"history", place.path("")}, 66, "history.db: found no readable history");
+  place.write("history.db", "");
+  fails({"history", place.path("")}, 65, "it is empty");
+  place.write("history.db", std::string(5000, 'x'));
+  fails({"history", place.path("")}, 65, "file is not a database");
+  std::filesystem::remove(place.path("history.db"));
+  fill();
+  fails({"history", place.path(""), "--json", "-", "--csv", "-"}, 64, "only one of");
+  const std::string whole = place.read("history.db");
+  place.write("history.db", whole.substr(0, 5000));
+  fails({"history", place.path("")}, 65, "found no history");
+  place.write("history.db", whole);
+  std::string damaged = whole;
+  const std::size_t at = damaged.find("deadbeef");
+  damaged[at] = 'x';
+  place.write("history.db", damaged);
+  const RunResult result = beltgrip({"history", place.path(""), "--csv", "-"});
+  EXPECT_EQ(result.status, 0);
+  EXPECT_EQ(lines(result.out), 12);
+  EXPECT_NE(result.err.find("1 rows damaged or missing"), std::string::npos) << result.err;
+}
+
+}  // namespace
+}  // namespace beltgrip::test

@@ -1,0 +1,208 @@
+// beltgrip init: names of signals as real cars have them are split into words, roles found by word
+// and unit, every guess marked; the proposal for a fitting DBC can be used as it is.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "can_dbc/dbc/parser.h"
+#include "daemon/core/config/config.h"
+#include "tests/support/program.h"
+#include "tools/cli/role_guess.h"
+
+namespace beltgrip {
+namespace {
+
+using Words = std::vector<std::string>;
+
+TEST(Words, OfNamesInEveryStyle) {
+  EXPECT_EQ(cli::words_of("PrimaryPulleySpeed"), (Words{"primary", "pulley", "speed"}));
+  EXPECT_EQ(cli::words_of("N_PrimSpd2"), (Words{"n", "prim", "spd"}));
+  EXPECT_EQ(cli::words_of("CVTOilTemp"), (Words{"cvt", "oil", "temp"}));
+  EXPECT_EQ(cli::words_of("ENGINE_RPM"), (Words{"engine", "rpm"}));
+  EXPECT_EQ(cli::words_of("__1"), Words{});
+}
+
+constexpr const char* kCar = R"(VERSION ""
+BO_ 256 ENGINE_DATA: 8 ECU
+ SG_ ENGINE_RPM : 0|16@1+ (0.25,0) [0|16000] "rpm" X
+ SG_ EngTrqActual : 16|16@1- (0.1,0) [-500|500] "Nm" X
+ SG_ EngTrqRequest : 32|16@1- (0.1,0) [-500|500] "Nm" X
+BO_ 257 CVT_1: 8 TCU
+ SG_ InputShaftSpeed : 0|16@1+ (1,0) [0|16000] "1/min" X
+ SG_ OutputShaftSpeed : 16|16@1+ (1,0) [0|16000] "1/min" X
+ SG_ SecPressTarget : 32|16@1+ (1,0) [0|8000] "kPa" X
+ SG_ SecPress : 48|16@1+ (1,0) [0|8000] "kPa" X
+BO_ 258 CVT_2: 8 TCU
+ SG_ CvtOilTemp : 0|8@1+ (1,-40) [-40|215] "degC" X
+ SG_ LockUpEngaged : 8|1@1+ (1,0) [0|1] "" X
+ SG_ BrakeSwitch : 9|1@1+ (1,0) [0|1] "" X
+ SG_ VehicleSpeed : 16|16@1+ (0.01,0) [0|300] "km/h" X
+ SG_ AccelPedalPos : 32|8@1+ (0.4,0) [0|100] "%" X
+ SG_ WheelSpeedFL : 40|16@1+ (0.01,0) [0|300] "km/h" X
+)";
+
+std::string guess(daemon::Role role) {
+  static const std::vector<can::Database> databases = {can::parse_dbc(kCar).database};
+  const auto candidates = cli::guess_role(role, databases);
+  return candidates.empty() ? "" : candidates.front().signal->name;
+}
+
+TEST(Roles, AreFoundByWordAndUnit) {
+  using daemon::Role;
+  EXPECT_EQ(guess(Role::kPrimarySpeed), "InputShaftSpeed");
+  EXPECT_EQ(guess(Role::kSecondarySpeed), "OutputShaftSpeed");
+  EXPECT_EQ(guess(Role::kSecondaryPressure), "SecPress");
+  EXPECT_EQ(guess(Role::kSecondaryPressureCommand), "SecPressTarget");
+  EXPECT_EQ(guess(Role::kEngineTorque), "EngTrqActual");
+  EXPECT_EQ(guess(Role::kEngineSpeed), "ENGINE_RPM");
+  EXPECT_EQ(guess(Role::kOilTemperature), "CvtOilTemp");
+  EXPECT_EQ(guess(Role::kVehicleSpeed), "VehicleSpeed");
+  EXPECT_EQ(guess(Role::kAcceleratorPedal), "AccelPedalPos");
+  EXPECT_EQ(guess(Role::kBrakePressed), "BrakeSwitch");
+  EXPECT_EQ(guess(Role::kLockupClosed), "LockUpEngaged");
+  EXPECT_EQ(guess(Role::kPrimaryTorque), "");
+  EXPECT_EQ(guess(Role::kPrimaryPressure), "");
+}
+
+// A flag as an enumeration: the value is chosen by its name, and the proposal loads as it is.
+TEST(Init, AFlagWithNamedValuesSaysWhenItIsTrue) {
+  const auto proposed = [](const std::string& values, int bits = 3) {
+    const test::Workplace place;
+    std::string dbc = kCar;
+    const std::string one = "LockUpEngaged : 8|1@1+ (1,0) [0|1]";
+    dbc.replace(dbc.find(one), one.size(),
+                "LockUpEngaged : 40|" + std::to_string(bits) + "@1+ (1,0) [0|" +
+                    std::to_string((1 << bits) - 1) + "]");
+    place.write("car.dbc", dbc + "VAL_ 258 LockUpEngaged " + values + " ;\n");
+    const std::string config = place.path("car.toml");
+    EXPECT_EQ(test::beltgrip({"init", place.path("car.dbc"), "--out", config}).status, 0);
+    const daemon::ConfigResult loaded = daemon::load_config(config);
+    EXPECT_TRUE(loaded.config.has_value())
+        << values << ": " << (loaded.errors.empty() ? "" : loaded.errors[0].text);
+    const std::string text = place.read("car.toml");
+    const std::size_t at = text.find("\nlockup_closed ");
+    if (at == std::string::npos) return std::string();
+    const std::string line = text.substr(at + 1, text.find('\n', at + 1) - at - 1);
+    const std::size_t when = line.find("true_when = ");
+    return when == std::string::npos ? "plain"
+                                     : line.substr(when + 12, line.find(" }") - when - 12);
+  };
+  EXPECT_EQ(proposed(R"(0 "Open" 1 "Slipping" 2 "Locked" 3 "SNA")"), "\"Locked\"");
+  EXPECT_EQ(proposed(R"(0 "TCC_OPEN" 1 "TCC_PARTLY_CLOSED" 2 "TCC_CLOSED")"), "\"TCC_CLOSED\"");
+  EXPECT_EQ(proposed(R"(0 "Unlocked" 1 "NotLocked" 5 "LockUpActive" 7 "Error, locked")"),
+            "\"LockUpActive\"");
+  EXPECT_EQ(proposed(R"(0 "Off" 1 "Slip" 4 "On")"), "\"On\"");
+  EXPECT_EQ(proposed(R"(0 "A" 1 "B" 2 "C")"), "1");
+  EXPECT_EQ(proposed(R"(0 "Inactive" 1 "Active" 3 "SNA")", 2), "\"Active\"");
+  // Two values, the other way round.
+  EXPECT_EQ(proposed(R"(0 "Locked" 1 "Open")", 1), "\"Locked\"");
+  EXPECT_EQ(proposed(R"(0 "Open" 1 "Closed")", 1), "plain");
+  EXPECT_EQ(proposed(R"(0 "say \o/" 1 "x")", 1), "plain");
+  // No name tells, and no value is 1.
+  EXPECT_EQ(proposed(R"(0 "A" 2 "C")"), "");
+}
+
+// A comment for each, with a place where the number is found; replay lists what stays a comment.
+TEST(Init, WhatIsAssumedStandsThereToFillIn) {
+  test::Workplace place;
+  place.write("car.dbc", kCar);
+  const auto made = test::beltgrip({"init", place.path("car.dbc")});
+  ASSERT_EQ(made.status, 0) << made.err;
+  for (const char* key :
+       {"primary_radius_overdrive_m", "primary_radius_low_m", "secondary_piston_area_m2",
+        "secondary_spring_force_N", "secondary_centrifugal_N_s2", "primary_inertia_kg_m2",
+        "primary_speed = { bias_rad_s", "secondary_speed = { bias_rad_s",
+        "secondary_pressure = { bias_Pa", "engine_torque = { bias_Nm"}) {
+    const std::size_t at = made.out.find(std::string("\n# ") + key);
+    ASSERT_NE(at, std::string::npos) << key << "\n" << made.out;
+    const std::size_t next = made.out.find('\n', at + 1);
+    EXPECT_TRUE(std::string_view(made.out).substr(next + 1).starts_with("#   found: ")) << key;
+  }
+}
+
+// The commands of the README on the simulated car, whose centrifugal term nobody knows: what is not
+// stated must not make a result that is surely wrong.
+TEST(Init, OnTheSimulatedCarTheTruthIsInTheInterval) {
+  test::Workplace place;
+  ASSERT_EQ(
+      test::beltgrip({"simulate", "--scenario", "coast-overdrive", "--out-dir", place.path("d")})
+          .status,
+      0);
+  const std::string log = place.path("d/trace.log"), config = place.path("d/mine.toml");
+  ASSERT_EQ(test::beltgrip({"init", place.path("d/vehicle.dbc"), "--out", config}).status, 0);
+  ASSERT_EQ(
+      test::beltgrip({"calibrate", log, "--config", config, "--out", place.path("d/keys.toml")})
+          .status,
+      0);
+  const std::string proposed = place.read("d/mine.toml");
+  // What calibrate finds on longer drives; a right area and spring; a spring and an area that are
+  // not the car's.
+  struct Case {
+    const char* variator;
+    bool has_value;
+  };
+  for (const Case& each :
+       {Case{"", true}, Case{"primary_inertia_kg_m2 = 0.18\n", true},
+        Case{"primary_inertia_kg_m2 = 0.18\nsecondary_piston_area_m2 = 0.0113\n"
+             "secondary_spring_force_N = 500.0\nprimary_radius_overdrive_m = 0.0784\n",
+             true},
+        Case{"secondary_spring_force_N = 800.0\n", true},
+        Case{"primary_inertia_kg_m2 = 0.18\nsecondary_piston_area_m2 = 0.113\n", false}}) {
+    place.write("d/mine.toml", proposed + "\n[variator]\n" + each.variator);
+    const auto replayed = test::beltgrip({"replay", log, "--config", config, "--json", "-"});
+    ASSERT_EQ(replayed.status, 0) << replayed.err;
+    const auto experiment = nlohmann::json::parse(replayed.out.substr(0, replayed.out.find('\n')));
+    EXPECT_FALSE(experiment.at("assumed").empty());
+    EXPECT_EQ(experiment.at("outcome"), each.has_value ? "completed" : "inconclusive")
+        << each.variator << replayed.out;
+    if (!each.has_value) {
+      EXPECT_NE(experiment.at("reason").get<std::string>().find("piston area"), std::string::npos)
+          << replayed.out;
+      continue;
+    }
+    EXPECT_LE(experiment.at("mu_max_ci95")[0], 0.105) << each.variator << replayed.out;
+    EXPECT_GE(experiment.at("mu_max_ci95")[1], 0.105) << each.variator << replayed.out;
+  }
+}
+
+TEST(Init, ProposalForTheRigCanBeUsedAsItIs) {
+  test::Workplace place;
+  ASSERT_EQ(test::beltgrip({"simulate", "--start", "80", "--out-dir", place.path("")}).status, 0);
+  const auto made = test::beltgrip({"init", place.path("vehicle.dbc"), "--interface", "can3",
+                                    "--out", place.path("proposed.toml")});
+  ASSERT_EQ(made.status, 0) << made.err;
+  std::string text = place.read("proposed.toml");
+  EXPECT_NE(text.find("interface = \"can3\""), std::string::npos);
+  EXPECT_NE(text.find("primary_torque     = \"RIG_Torque.PrimaryTorque\"   # guessed, Nm"),
+            std::string::npos)
+      << text;
+  place.write("proposed.toml", text + "\n[experiment]\ntrigger = \"always\"\n");
+  const auto replayed =
+      test::beltgrip({"replay", place.path("trace.log"), "--config", place.path("proposed.toml")});
+  EXPECT_EQ(replayed.status, 0) << replayed.err;
+  EXPECT_NE(replayed.out.find("completed"), std::string::npos) << replayed.out;
+}
+
+TEST(Init, WhatIsMissingIsSaid) {
+  test::Workplace place;
+  place.write("small.dbc",
+              "BO_ 1 M: 8 X\n SG_ PrimarySpeed : 0|16@1+ (1,0) [0|1] \"\" X\n"
+              " SG_ SecondarySpeed : 16|16@1+ (1,0) [0|1] \"rpm\" X\n");
+  const auto result = test::beltgrip({"init", place.path("small.dbc")});
+  ASSERT_EQ(result.status, 0) << result.err;
+  EXPECT_NE(result.out.find("\n# primary_speed      = { signal = \"M.PrimarySpeed\", unit = "),
+            std::string::npos)
+      << result.out;
+  EXPECT_NE(result.out.find("\nsecondary_speed    = \"M.SecondarySpeed\""), std::string::npos);
+  EXPECT_NE(result.out.find("\n# secondary_pressure = \"Message.Signal\"   # NOT FOUND"),
+            std::string::npos);
+  EXPECT_NE(result.out.find("\n# engine_torque      = \"Message.Signal\"   # NOT FOUND"),
+            std::string::npos);
+
+  EXPECT_EQ(test::beltgrip({"init", place.path("none.dbc")}).status, 66);
+  place.write("empty.dbc", "VERSION \"\"\n");
+  EXPECT_EQ(test::beltgrip({"init", place.path("empty.dbc")}).status, 65);
+}
+
+}  // namespace
+}  // namespace beltgrip

@@ -1,0 +1,66 @@
+// beltgrip report: what the page holds, read by hand from its text; and bad input.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/support/program.h"
+
+namespace beltgrip::test {
+namespace {
+
+long count(const std::string& text, const std::string& what) {
+  long n = 0;
+  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++n;
+  return n;
+}
+
+class Report : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(
+        beltgrip({"simulate", "--scenario", "demo", "--out-dir", place_.path("drive")}).status, 0);
+  }
+  RunResult report(const std::string& log) {
+    return beltgrip({"report", place_.path(log), "--config", place_.path("drive/beltgrip.toml"),
+                     "--out", place_.path("page.html")});
+  }
+  Workplace place_;
+};
+
+// The demo coasts down twice; its log holds both.
+TEST_F(Report, ShowsEveryExperimentOfTheLog) {
+  const RunResult run = report("drive/trace.log");
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_EQ(run.out, "2 experiments: " + place_.path("page.html") + "\n");
+  const std::string page = place_.read("page.html");
+  EXPECT_EQ(count(page, "<h2>trace.log, from "), 2);
+  EXPECT_EQ(count(page, "<td>completed, slope</td>"), 2);
+  EXPECT_EQ(count(page, "<canvas "), 8);
+  for (const char* name : {"Quiet", "Excited", "Peak", "MacroSlip", "mu_max", "stop"}) {
+    EXPECT_NE(page.find("[\"" + std::string(name) + "\","), std::string::npos) << name;
+  }
+  EXPECT_EQ(page.find("http"), page.find("https://www.chartjs.org"));  // asks no network
+}
+
+TEST_F(Report, SaysWhyThereIsNoExperiment) {
+  const std::string log = place_.read("drive/trace.log");
+  place_.write("short.log", log.substr(0, log.find('\n', 20'000) + 1));
+  const RunResult run = report("short.log");
+  ASSERT_EQ(run.status, 0) << run.err;
+  EXPECT_TRUE(run.out.starts_with("0 experiments: ")) << run.out;
+  EXPECT_NE(place_.read("page.html").find("no experiment: "), std::string::npos);
+}
+
+TEST_F(Report, BadInputIsOneLineAndItsExitCode) {
+  place_.write("empty.log", "");
+  EXPECT_EQ(report("empty.log").status, 65);
+  EXPECT_EQ(report("missing.log").status, 66);
+  const RunResult nowhere =
+      beltgrip({"report", place_.path("drive/trace.log"), "--config",
+                place_.path("drive/beltgrip.toml"), "--out", place_.path("no/such/folder.html")});
+  EXPECT_EQ(nowhere.status, 73);
+  EXPECT_EQ(lines(nowhere.err), 1) << nowhere.err;
+}
+
+}  // namespace
+}  // namespace beltgrip::test

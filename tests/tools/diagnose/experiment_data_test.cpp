@@ -1,0 +1,152 @@
+// What is taken from the samples before any model: slow copies and the rounding that stays.
+#include "tools/diagnose/data/experiment_data.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace beltgrip::diagnose {
+namespace {
+
+using Eigen::ArrayXd;
+
+// The same noise every time; one sigma is 1.
+class Noise {
+ public:
+  double operator()() {
+    double sum = 0.0;
+    for (int i = 0; i < 12; ++i) {
+      state_ = state_ * 6364136223846793005ULL + 1442695040888963407ULL;
+      sum += static_cast<double>(state_ >> 11U) * 0x1p-53;
+    }
+    return sum - 6.0;
+  }
+
+ private:
+  std::uint64_t state_ = 1;
+};
+
+constexpr double kStep_s = 0.1;
+
+struct Copies {
+  double slow = 0.0, wide = 0.0;  // rms of what is left of the noise
+  double slow_slope = 0.0, wide_slope = 0.0;
+  double largest = 0.0;  // departure of the wide copy from the truth
+  double sharp = 0.0, slow_at_turn = 0.0, sharp_at_turn = 0.0;
+};
+
+// A signal that falls on a straight line and rises again, twenty times as fast or in a step.
+Copies copies_of(bool with_step) {
+  constexpr int kCount = 600, kFrom = 300;
+  constexpr double kNoise = 30.0;
+  const auto truth = [&](int k) {
+    const double falling = 3000.0 - 8.0 * std::min(k, kFrom);
+    if (k <= kFrom) return falling;
+    return with_step ? 3000.0 : std::min(3000.0, falling + 160.0 * (k - kFrom));
+  };
+  Noise noise;
+  GridSignal signal;
+  signal.value = ArrayXd(kCount);
+  signal.slope = ArrayXd::Zero(kCount);
+  for (int k = 0; k < kCount; ++k) signal.value[k] = truth(k) + kNoise * noise();
+  add_slow(signal, kStep_s);
+  const GridSignal before = signal;
+  widen_slow(signal, kStep_s);
+  Copies out;
+  const auto square = [](double v) { return v * v; };
+  for (int k = 100; k < 250; ++k) {
+    out.slow += square(before.slow[k] - truth(k)) / 150.0;
+    out.wide += square(signal.slow[k] - truth(k)) / 150.0;
+    out.sharp += square(signal.sharp[k] - truth(k)) / 150.0;
+    out.slow_slope += square(before.slow_slope[k] + 80.0) / 150.0;
+    out.wide_slope += square(signal.slow_slope[k] + 80.0) / 150.0;
+  }
+  for (int k = 0; k < kCount; ++k) {
+    // Next to the corner the slow copy itself is off; the wide one may not be off by more.
+    const double off = std::abs(before.slow[k] - truth(k));
+    out.largest = std::max(out.largest, std::abs(signal.slow[k] - truth(k)) - off);
+    out.slow_at_turn = std::max(out.slow_at_turn, off);
+    out.sharp_at_turn = std::max(out.sharp_at_turn, std::abs(signal.sharp[k] - truth(k)));
+  }
+  return out;
+}
+
+TEST(SlowCopy, LosesItsNoiseOnStraightLinesAndKeepsWhatMovesFast) {
+  for (const bool with_step : {false, true}) {
+    const Copies out = copies_of(with_step);
+    EXPECT_LT(out.wide, 0.3 * out.slow);
+    EXPECT_LT(out.wide_slope, 0.1 * out.slow_slope);
+    EXPECT_LT(out.largest, 60.0);
+  }
+}
+
+TEST(SharpCopy, LosesItsNoiseOnStraightLinesAndIsNotRoundedWhereTheSignalTurns) {
+  const Copies step = copies_of(true), turn = copies_of(false);
+  for (const Copies& out : {step, turn}) EXPECT_LT(out.sharp, 0.4 * out.slow);
+  EXPECT_LT(step.sharp_at_turn, 0.2 * step.slow_at_turn);
+  EXPECT_LT(turn.sharp_at_turn, 0.6 * turn.slow_at_turn);
+}
+
+// Two shafts in overdrive; rounded to the step, with noise before the rounding.
+ExperimentData shafts(double step_rad_s, double noise_rad_s) {
+  SignalTable table;
+  Noise noise;
+  const auto rounded = [&](double value) {
+    return std::round((value + noise_rad_s * noise()) / step_rad_s) * step_rad_s;
+  };
+  for (int i = 0; i < 4000; ++i) {
+    const double t_s = 0.01 * i;
+    const auto add = [&](Role role, double value) {
+      table[role].t_s.push_back(t_s);
+      table[role].value.push_back(value);
+    };
+    add(Role::kPrimarySpeed, rounded(100.03 + 0.2 * std::sin(0.1 * t_s)));
+    add(Role::kSecondarySpeed, rounded(222.0 - 0.5 * std::sin(0.1 * t_s)));
+    add(Role::kSecondaryPressure, 3e5);
+    add(Role::kPrimaryTorque, 50.0);
+  }
+  return prepare(table, estimator::VariatorParameters{});
+}
+
+TEST(Rounding, StaysWhereNoNoiseCarriesTheSamplesFromStepToStep) {
+  const double held = 0.1 / std::sqrt(12.0) * std::hypot(1.0 / 100.0, 1.0 / 222.0);
+  EXPECT_NEAR(shafts(0.1, 0.0).rounding_slip, held, 0.1 * held);
+  EXPECT_LT(shafts(0.1, 0.1).rounding_slip, 0.4 * held);
+  EXPECT_LT(shafts(1e-4, 0.02).rounding_slip, 0.001 * held);
+}
+
+// A pressure that comes down in steps, each a tenth of a second long.
+TEST(Staircase, KeepsThePlateausAndNotTheSteps) {
+  constexpr double kPlateau_s = 1.3, kHeight_Pa = 5e4;
+  const auto pressure_Pa = [](double t_s) {
+    const double steps = std::floor(t_s / kPlateau_s);
+    const double into_s = t_s - steps * kPlateau_s;
+    return 5e5 - kHeight_Pa * (steps - std::max(0.0, 1.0 - into_s / 0.1));
+  };
+  SignalTable table;
+  for (int i = 0; i < 650; ++i) {
+    const auto add = [&](Role role, double value) {
+      table[role].t_s.push_back(0.01 * i);
+      table[role].value.push_back(value);
+    };
+    add(Role::kPrimarySpeed, 100.0);
+    add(Role::kSecondarySpeed, 222.0);
+    add(Role::kSecondaryPressure, pressure_Pa(0.01 * i));
+    add(Role::kPrimaryTorque, 50.0);
+  }
+  const ExperimentData data = prepare(table, estimator::VariatorParameters{});
+  int kept = 0;
+  for (int k = 0; k < data.size(); ++k) {
+    if (!data.valid[static_cast<std::size_t>(k)]) continue;
+    ++kept;
+    EXPECT_NEAR(data.pressure.value[k], pressure_Pa(data.t_s[k]), 0.1 * kHeight_Pa) << k;
+    EXPECT_NEAR(data.pressure.slow[k], pressure_Pa(data.t_s[k]), 0.4 * kHeight_Pa) << k;
+  }
+  EXPECT_EQ(kept, data.valid_count);
+  EXPECT_GE(kept, 3 * 6);  // of 13 samples of a whole plateau, half a second and more
+  // The first and the last plateau are cut short by the ends of the data.
+  EXPECT_EQ(data.start_of_segment.size(), 3U);
+}
+
+}  // namespace
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,49 @@
+// Play between the measured pressure and the clamp force: found in its true size, whatever went
+// before the recording.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/statistics/blind/generator.h"
+#include "tools/diagnose/decide/namer.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+constexpr double kForce_N = 240.0;
+
+// A machine and a plan; before: where the clamp force comes from, 0 to 2 (the generator's).
+blind::Recording recording(std::uint64_t machine, std::uint64_t before) {
+  blind::Random random(machine);
+  blind::Trial trial;
+  trial.machine = blind::draw_machine(random);
+  trial.plan = blind::draw_plan(random, trial.machine.setting, 12);
+  trial.planted.push_back({"clamp_hysteresis", {{"force_N", kForce_N}}, {}});
+  trial.seed = 3 * machine + before;
+  return blind::record(trial);
+}
+
+TEST(Hysteresis, IsFoundInItsSizeWhateverWentBefore) {
+  const char* const kRole[] = {"raised", "", "lowered"};
+  for (std::uint64_t before = 0; before < 3; ++before) {
+    SCOPED_TRACE(kRole[before]);
+    const blind::Recording recorded = recording(1, before);
+    estimator::VariatorParameters variator;
+    variator.primary_inertia_kg_m2 = 0.18;
+    std::vector<ExperimentData> runs;
+    for (const std::string& text : recorded.csv) {
+      runs.push_back(prepare(parse_csv(text, "run.csv"), variator));
+    }
+    Engine engine(make_campaign(std::move(runs), nominal_model(variator)));
+    const Naming naming = name_effects(engine, [] { return false; });
+    ASSERT_EQ(naming.accepted.size(), 1U);
+    const Accepted& found = naming.accepted.front();
+    const Slot& slot = engine.campaign().slots[static_cast<std::size_t>(found.slot)];
+    EXPECT_EQ(slot.row->id, "clamp_hysteresis");
+    EXPECT_EQ(slot.role, kRole[before]);
+    EXPECT_NEAR(naming.hypothesis.state.effects[found.slot], kForce_N, 0.03 * kForce_N);
+  }
+}
+
+}  // namespace
+}  // namespace beltgrip::diagnose

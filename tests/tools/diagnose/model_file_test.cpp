@@ -1,0 +1,84 @@
+// The model file: what is written reads back; errors name file, line and key.
+#include "tools/diagnose/model/model_file.h"
+
+#include <gtest/gtest.h>
+
+#include <string_view>
+#include <vector>
+
+#include "tools/diagnose/model/effects/effect.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+std::string error_of(const std::string& text) {
+  try {
+    parse_model(text, "m.toml", nominal_model({}));
+  } catch (const ModelError& error) {
+    return error.text;
+  }
+  return "no error";
+}
+
+TEST(ModelFile, ReadsBackWhatItWrites) {
+  ModelFile model = nominal_model({});
+  model.variator.ratio_low = 0.41;
+  model.friction["mu_max"] = 0.0937;
+  model.driveline["deformation_per_kN"] = 1.25e-3;
+  model.effects["wear"].parameters = {{"step", 0.05}, {"at", 4.0}};
+  model.effects["channel_skew"].parameters = {{"delay_s", -0.012}};
+  model.effects["channel_skew"].role = "secondary_speed";
+  const ModelFile read = parse_model(model_text(model), "m.toml", nominal_model({}));
+  EXPECT_EQ(model_text(read), model_text(model));
+  EXPECT_EQ(read.effects.at("channel_skew").role, "secondary_speed");
+}
+
+TEST(ModelFile, NominalMachineSurvivesTheWayThroughTheFile) {
+  const NuisanceTable direct = default_nuisances();
+  const NuisanceTable through = nuisances_of(nominal_model({}));
+  for (std::size_t i = 0; i < direct.size(); ++i) {
+    EXPECT_NEAR(through[i].nominal, direct[i].nominal, 1e-12) << direct[i].name;
+  }
+}
+
+// Instances of one effect: a role takes the value to the one that has it alone; one that these data
+// do not have, or none, to the one without.
+TEST(ModelFile, ARoleSaysWhichInstanceIsMeant) {
+  const auto row = [](std::string_view id) -> const EffectRow* {
+    for (const EffectRow& each : effect_rows()) {
+      if (each.id == id) return &each;
+    }
+    return nullptr;
+  };
+  const EffectRow* hysteresis = row("clamp_hysteresis");
+  const std::vector<Slot> slots{{hysteresis, 0, ""},
+                                {hysteresis, 0, "raised"},
+                                {hysteresis, 0, "lowered"},
+                                {row("hydraulic_lag"), 0, ""}};
+  const auto values = [&](const std::string& role, const std::string& lag_role) {
+    ModelFile model = nominal_model({});
+    model.effects["clamp_hysteresis"].parameters = {{"force_N", 150.0}};
+    model.effects["clamp_hysteresis"].role = role;
+    model.effects["hydraulic_lag"].parameters = {{"time_constant_s", 0.1}};
+    model.effects["hydraulic_lag"].role = lag_role;
+    const Eigen::VectorXd out = slot_values(model, slots);
+    return std::vector<double>(out.begin(), out.end());
+  };
+  EXPECT_EQ(values("", ""), (std::vector<double>{150.0, 0.0, 0.0, 0.1}));
+  EXPECT_EQ(values("lowered", "command"), (std::vector<double>{0.0, 0.0, 150.0, 0.1}));
+}
+
+TEST(ModelFile, ErrorsNameFileLineAndKey) {
+  EXPECT_EQ(error_of("[effects.magic]\nsize = 1\n"),
+            "m.toml:1: effects.magic: found an unknown effect");
+  EXPECT_EQ(error_of("[effects.wear]\nsteps = 1\n"),
+            "m.toml:2: effects.wear.steps: found an unknown key, expected one of step, at, "
+            "per_experiment");
+  EXPECT_EQ(error_of("[variator]\nratio_low = \"a\"\n"),
+            "m.toml:2: variator.ratio_low: found \"a\", expected a number");
+  EXPECT_EQ(error_of("[variator]\nratio_low = 99.0\n"),
+            "m.toml:2: variator.ratio_low: found 99, expected a number from 0.1 to 10.0");
+}
+
+}  // namespace
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,81 @@
+// CSV tables: roles, units, gaps, and what is refused with line and reason.
+#include "tools/diagnose/data/signal_table.h"
+
+#include <gtest/gtest.h>
+
+namespace beltgrip::diagnose {
+namespace {
+
+std::string error_of(const std::string& text) {
+  try {
+    parse_csv(text, "a.csv");
+  } catch (const TableError& error) {
+    return error.text;
+  }
+  return "no error";
+}
+
+TEST(Csv, ReadsRolesInTheirUnits) {
+  const SignalTable table = parse_csv(
+      "t[s],primary_speed[rpm],oil_temperature[K],secondary_pressure[bar]\r\n"
+      "10.0,3000,353.15,20\r\n10.5,,353.15,21\r\n11.0,3000,nan,22\r\n",
+      "a.csv");
+  ASSERT_EQ(table[Role::kPrimarySpeed].t_s.size(), 2U);
+  EXPECT_NEAR(table[Role::kPrimarySpeed].value[0], 314.159265, 1e-6);
+  EXPECT_DOUBLE_EQ(table[Role::kPrimarySpeed].t_s[1], 11.0);
+  ASSERT_EQ(table[Role::kOilTemperature].value.size(), 2U);
+  EXPECT_NEAR(table[Role::kOilTemperature].value[0], 80.0, 1e-9);
+  EXPECT_DOUBLE_EQ(table[Role::kSecondaryPressure].value[2], 22e5);
+  EXPECT_TRUE(table.notes.empty());
+}
+
+TEST(Csv, TakesSemicolonsTabsAndMarks) {
+  EXPECT_EQ(parse_csv("\xEF\xBB\xBFt[s];primary_speed[rad/s]\n0;1\n1;2\n", "a")[Role::kPrimarySpeed]
+                .value.size(),
+            2U);
+  EXPECT_EQ(parse_csv("# rig 3\nt[s]\tprimary_speed[rad/s]\n0\t1\n# pause\n1\t2\n",
+                      "a")[Role::kPrimarySpeed]
+                .value.size(),
+            2U);
+}
+
+TEST(Csv, CountsWhatItLeavesOut) {
+  const SignalTable table =
+      parse_csv("t[s],primary_speed[rad/s],colour[]\n0,1,2\n1,x,2\n1,2,2\n0.5,3,2\n", "a.csv");
+  EXPECT_EQ(table[Role::kPrimarySpeed].value.size(), 2U);
+  ASSERT_EQ(table.notes.size(), 3U);
+  EXPECT_EQ(table.notes[0], "a.csv:1: column 'colour[]' names no role, ignored");
+  EXPECT_EQ(table.notes[1], "a.csv:3: 1 lines that are not numbers, ignored");
+  EXPECT_EQ(table.notes[2], "a.csv:5: 1 lines whose time does not increase, ignored");
+}
+
+TEST(Csv, RefusesWithLineAndReason) {
+  EXPECT_EQ(error_of("t[s],primary_speed[bar]\n0,1\n"),
+            "a.csv:1: column 'primary_speed[bar]': expected a unit of angular speed, e.g. "
+            "primary_speed[rad/s]");
+  EXPECT_EQ(error_of("t[s],primary_speed\n0,1\n"),
+            "a.csv:1: column 'primary_speed': expected a unit of angular speed, e.g. "
+            "primary_speed[rad/s]");
+  EXPECT_EQ(error_of("primary_speed[rad/s]\n1\n"),
+            "a.csv:1: no column t[s]; expected a header such as t[s],primary_speed[rad/s],...");
+  EXPECT_EQ(error_of("t[s],primary_speed[rad/s]\n"),
+            "a.csv:1: no line with numbers after the header");
+  EXPECT_EQ(error_of("t[s],primary_speed[rad/s],primary_speed[rpm]\n0,1,2\n"),
+            "a.csv:1: role 'primary_speed' stands twice");
+  EXPECT_EQ(error_of(""),
+            "a.csv:0: no column t[s]; expected a header such as "
+            "t[s],primary_speed[rad/s],...");
+}
+
+TEST(Csv, MissingFileIsNamed) {
+  try {
+    read_csv("/nowhere/a.csv");
+    FAIL();
+  } catch (const TableError& error) {
+    EXPECT_TRUE(error.missing_file);
+    EXPECT_EQ(error.text, "/nowhere/a.csv: cannot be opened");
+  }
+}
+
+}  // namespace
+}  // namespace beltgrip::diagnose

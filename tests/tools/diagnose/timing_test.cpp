@@ -1,0 +1,75 @@
+// A channel that comes late: all that follows from it is put back to its time.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tools/diagnose/model/effects/effect.h"
+#include "tools/diagnose/model/model_file.h"
+#include "tools/diagnose/model/variator_model.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+constexpr double kDelay_s = 0.08;
+constexpr double kInertia_kgm2 = 0.3, kTorque_Nm = 60.0;
+
+// A rig in overdrive without loss and slip, its speed swept; the secondary speed comes late.
+ExperimentData swept(const estimator::VariatorParameters& variator) {
+  SignalTable table;
+  for (int i = 0; i < 6000; ++i) {
+    const double t_s = 0.01 * i;
+    const auto add = [&](Role role, double value) {
+      table[role].t_s.push_back(t_s);
+      table[role].value.push_back(value);
+    };
+    const auto speed = [](double at_s) { return 120.0 + 30.0 * std::sin(0.7 * at_s); };
+    const double ratio = variator.ratio_overdrive;
+    const double acceleration = ratio * 30.0 * 0.7 * std::cos(0.7 * t_s);
+    add(Role::kPrimarySpeed, speed(t_s));
+    add(Role::kSecondarySpeed, ratio * speed(t_s - kDelay_s));
+    add(Role::kSecondaryPressure, 5e5);
+    add(Role::kPrimaryTorque, kTorque_Nm);
+    add(Role::kSecondaryTorque, kTorque_Nm / ratio - kInertia_kgm2 * acceleration);
+  }
+  return prepare(table, variator);
+}
+
+TEST(Timing, TheAccelerationOfALateSpeedIsLateToo) {
+  const estimator::VariatorParameters variator;
+  const ExperimentData run = swept(variator);
+  ASSERT_GT(run.valid_count, 400);
+  const NuisanceTable table = nuisances_of(nominal_model(variator));
+  Eigen::VectorXd machine(kNuisanceCount);
+  for (int i = 0; i < kNuisanceCount; ++i) {
+    machine[i] = table[static_cast<std::size_t>(i)].nominal;
+  }
+  machine[kSecondaryInertia_kgm2] = kInertia_kgm2;
+  machine[kLossConstant_Nm] = machine[kLossPerSpeed_Nms] = machine[kDeformationPerkN] = 0.0;
+  const std::vector<Slot> slots = make_slots({run});
+  Eigen::VectorXd late = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(slots.size()));
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    if (slots[i].label() == "channel_skew.delay_s@secondary_speed") {
+      late[static_cast<Eigen::Index>(i)] = kDelay_s;
+    }
+  }
+  ASSERT_NE(late.sum(), 0.0);
+  const auto largest = [&](const Eigen::VectorXd& effects) {
+    const Quantities q = evaluate(run, 0, variator, machine, {&slots, effects});
+    double balance_Nm = 0.0, slip = 0.0;
+    for (int k = 20; k + 20 < run.size(); ++k) {  // the ends have neighbours on one side only
+      if (!run.valid[static_cast<std::size_t>(k)]) continue;
+      balance_Nm = std::max(balance_Nm, std::abs(q.balance[k]));
+      slip = std::max(slip, std::abs(q.slip[k]));
+    }
+    return std::pair{balance_Nm, slip};
+  };
+  const auto [on_time_Nm, on_time_slip] = largest(late);
+  const auto [late_Nm, late_slip] = largest(Eigen::VectorXd::Zero(late.size()));
+  EXPECT_GT(late_slip, 0.01);
+  EXPECT_LT(on_time_slip, 5e-4);
+  EXPECT_GT(late_Nm, 1.5);
+  EXPECT_LT(on_time_Nm, 0.4);  // the slow copies' own rounding of the sweep
+}
+
+}  // namespace
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,157 @@
+// Logs as a timeline and as a port: merging, selection, garbled and stepping clocks; time passes
+// only in wait_until and never beyond what has been taken.
+#include "tools/ports/replay_port.h"
+
+#include <gtest/gtest.h>
+
+#include "tools/ports/log_timeline.h"
+
+namespace beltgrip::sim {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr std::int64_t kS = 1'000'000'000;
+
+struct Line {
+  std::int64_t t_ns;
+  std::uint32_t id = 0x100;
+  const char* interface = "can0";
+};
+
+class FakeLog final : public can::LogReader {
+ public:
+  explicit FakeLog(std::vector<Line> lines) : lines_(std::move(lines)) {}
+  bool next(can::LogRecord& record) override {
+    if (stats_.frames == lines_.size()) return false;
+    const Line& line = lines_[stats_.frames++];
+    record.t_ns = line.t_ns;
+    record.frame = {};
+    record.frame.id.value = line.id;
+    record.interface = line.interface;
+    return true;
+  }
+  const can::LogStats& stats() const override { return stats_; }
+
+ private:
+  std::vector<Line> lines_;
+  can::LogStats stats_;
+};
+
+LogTimeline timeline(std::vector<std::vector<Line>> logs, FrameSelection selection = {}) {
+  std::vector<std::unique_ptr<can::LogReader>> readers;
+  for (auto& log : logs) readers.push_back(std::make_unique<FakeLog>(std::move(log)));
+  return LogTimeline(std::move(readers), std::move(selection));
+}
+
+std::vector<std::int64_t> stamps(LogTimeline& log) {
+  std::vector<std::int64_t> result;
+  can::StampedFrame frame;
+  while (log.next(frame)) result.push_back(frame.t_ns);
+  return result;
+}
+
+using Stamps = std::vector<std::int64_t>;
+
+TEST(LogTimeline, MergesByStampAndKeepsTheOrderOfEqualOnes) {
+  LogTimeline log =
+      timeline({{{1 * kMs, 1}, {5 * kMs, 2}}, {{0, 3}, {5 * kMs, 4}, {9 * kMs, 5}}, {}});
+  std::vector<std::uint32_t> ids;
+  can::StampedFrame frame;
+  while (log.next(frame)) ids.push_back(frame.frame.id.value);
+  EXPECT_EQ(ids, (std::vector<std::uint32_t>{3, 1, 2, 4, 5}));
+  EXPECT_EQ(log.counters().frames, 5u);
+  EXPECT_EQ(log.counters().first_ns, 0);
+  EXPECT_EQ(log.counters().last_ns, 9 * kMs);
+  EXPECT_EQ(log.stats().frames, 5u);
+}
+
+TEST(LogTimeline, SelectsByInterfaceAndIdentifier) {
+  FrameSelection selection;
+  selection.interface = "can1";
+  selection.ignored = {{0x6A0, false}};
+  LogTimeline log = timeline({{{1, 0x100, "can0"},
+                               {2, 0x100, "can1"},
+                               {3, 0x6A0, "can1"},
+                               {4, 0x6A0, "can0"},
+                               {5, 0x101, "can1"},
+                               {6, 0x101, "can11"}}},
+                             selection);
+  EXPECT_EQ(stamps(log), (Stamps{2, 5}));
+}
+
+TEST(LogTimeline, ALittleDisorderIsHeldBack) {
+  LogTimeline log = timeline({{{10}, {30}, {20}, {40}}});
+  EXPECT_EQ(stamps(log), (Stamps{10, 30, 30, 40}));
+  EXPECT_EQ(log.counters().clock_steps, 0u);
+}
+
+TEST(LogTimeline, ALonelyLeapIsAGarbledLine) {
+  LogTimeline log = timeline({{{1 * kS}, {900000000 * kS}, {1 * kS + kMs}, {1 * kS + 2 * kMs}}});
+  EXPECT_EQ(stamps(log), (Stamps{1 * kS, 1 * kS + kMs, 1 * kS + 2 * kMs}));
+  EXPECT_EQ(log.counters().frames_bad, 1u);
+  EXPECT_EQ(log.counters().clock_steps, 0u);
+}
+
+TEST(LogTimeline, AClockSetBackOrFarAheadIsTakenOut) {
+  LogTimeline back = timeline({{{5000 * kS}, {5001 * kS}, {1401 * kS}, {1402 * kS}}});
+  EXPECT_EQ(stamps(back), (Stamps{5000 * kS, 5001 * kS, 5001 * kS, 5002 * kS}));
+  EXPECT_EQ(back.counters().clock_steps, 1u);
+  LogTimeline ahead = timeline({{{0}, {1 * kS}, {800000000 * kS}, {800000001 * kS}}});
+  EXPECT_EQ(stamps(ahead), (Stamps{0, 1 * kS, 601 * kS, 602 * kS}));
+  EXPECT_EQ(ahead.counters().clock_steps, 1u);
+  LogTimeline pause = timeline({{{0}, {599 * kS}}});
+  EXPECT_EQ(stamps(pause), (Stamps{0, 599 * kS}));
+}
+
+TEST(ReplayPort, StampsAreTheClock) {
+  LogTimeline log = timeline({{{10 * kMs, 1}, {12 * kMs, 2}, {15 * kMs, 3}, {21 * kMs, 4}}});
+  std::vector<std::int64_t> sent;
+  ReplayPort port(
+      log, [&](daemon::MonoTime t, const can::CanFrame&, std::uint8_t) { sent.push_back(t); });
+  EXPECT_EQ(port.now(), 10 * kMs);
+  std::array<daemon::RxFrame, 2> two;
+  EXPECT_EQ(port.receive(two), 1u);  // the first one has arrived
+  EXPECT_EQ(two[0].frame.id.value, 1u);
+  EXPECT_EQ(port.wait_until(15 * kMs), daemon::Wake::kFrames);
+  EXPECT_EQ(port.receive(two), 2u);  // due before or at the deadline
+  EXPECT_EQ(two[0].t, 12 * kMs);
+  EXPECT_EQ(two[1].t, 15 * kMs);
+  EXPECT_LE(two[1].t, port.now());
+  EXPECT_EQ(port.receive(two), 0u);
+  EXPECT_EQ(port.wait_until(15 * kMs), daemon::Wake::kDeadline);
+  EXPECT_EQ(port.now(), 15 * kMs);
+  EXPECT_EQ(port.wait_until(20 * kMs), daemon::Wake::kDeadline);
+  EXPECT_EQ(port.send({}), daemon::SendResult::kSent);
+  EXPECT_EQ(port.wait_until(25 * kMs), daemon::Wake::kFrames);
+  EXPECT_EQ(port.now(), 20 * kMs);
+  EXPECT_EQ(port.receive(two), 1u);  // what was sent is confirmed first, at once
+  EXPECT_TRUE(two[0].own_echo);
+  EXPECT_EQ(two[0].t, 20 * kMs);
+  EXPECT_EQ(port.wait_until(25 * kMs), daemon::Wake::kFrames);
+  EXPECT_EQ(port.now(), 21 * kMs);
+  EXPECT_EQ(port.receive(two), 1u);
+  EXPECT_FALSE(two[0].own_echo);
+  EXPECT_EQ(port.wait_until(25 * kMs), daemon::Wake::kClosed);
+  EXPECT_EQ(port.now(), 21 * kMs);
+  EXPECT_EQ(sent, (Stamps{20 * kMs}));
+}
+
+TEST(ReplayPort, SmallBatchesLoseNothing) {
+  LogTimeline log = timeline({{{1, 1}, {1, 2}, {1, 3}, {2, 4}, {2, 5}}});
+  ReplayPort port(log, {});
+  std::array<daemon::RxFrame, 1> one;
+  std::uint32_t expected = 1;
+  while (port.wait_until(10) != daemon::Wake::kClosed) {
+    while (port.receive(one) == 1) EXPECT_EQ(one[0].frame.id.value, expected++);
+  }
+  EXPECT_EQ(expected, 6u);
+}
+
+TEST(ReplayPort, AnEmptyLogIsClosedAtOnce) {
+  LogTimeline log = timeline({{}});
+  ReplayPort port(log, {});
+  EXPECT_EQ(port.wait_until(1000), daemon::Wake::kClosed);
+}
+
+}  // namespace
+}  // namespace beltgrip::sim

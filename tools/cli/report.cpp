@@ -1,0 +1,130 @@
+// beltgrip report: the experiments of logs as one HTML file to look at.
+#include <array>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/core/publish/names.h"
+#include "tools/cli/command.h"
+#include "tools/cli/configuration.h"
+#include "tools/cli/output_file.h"
+#include "tools/cli/replay_run.h"
+#include "tools/cli/stop_signals.h"
+#include "tools/report/experiment_page.h"
+#include "tools/text/terminal.h"
+
+namespace beltgrip::cli {
+
+namespace {
+
+struct Options {
+  std::vector<std::string> logs;
+  std::string config, method, interface;
+  std::string out = "report.html";
+};
+
+std::string number(const char* pattern, auto... values) {
+  char buffer[64];
+  std::snprintf(buffer, sizeof buffer, pattern, values...);
+  return buffer;
+}
+
+// The samples of each experiment, and what came of it.
+class Courses final : public daemon::SampleSink {
+ public:
+  explicit Courses(std::string log) : log_(std::move(log)) {}
+
+  void on_report(const daemon::SampleReport& report) noexcept override {
+    if (report.in_experiment && report.curve.usable) {
+      const estimator::CurveEstimate& curve = report.curve;
+      now_.t_s.push_back(static_cast<double>(report.t) * 1e-9);
+      now_.mu_star.push_back(curve.mu_star);
+      now_.sigma_star_percent.push_back(curve.sigma_star_percent);
+      now_.friction_slope_per_percent.push_back(curve.friction_slope);
+      now_.phase.push_back(static_cast<std::size_t>(curve.phase));
+    }
+    if (!report.new_result) return;
+    finish(report.result);
+    all_.push_back(std::move(now_));
+    now_ = {};
+  }
+  std::vector<report::ExperimentCourse> take() { return std::move(all_); }
+
+ private:
+  void finish(const daemon::ExperimentResult& result) {
+    const double begin_s = static_cast<double>(result.start) * 1e-9;
+    now_.name = log_ + number(", from %.2f s on", begin_s);
+    if (result.stopped) now_.stop_s = static_cast<double>(result.end) * 1e-9;
+    const bool value = result.outcome == daemon::Outcome::kCompleted;
+    const estimator::PeakEstimate& peak = result.peak;
+    if (value) now_.peak = {peak.mu_max, peak.ci95_low, peak.ci95_high};
+    const bool bound = !value && peak.kind == estimator::PeakKind::kLowerBound;
+    now_.verdict = {now_.name,
+                    outcome_text(result.outcome) + ", " + reason_text(result.stop_reason),
+                    daemon::cause_text(result.stop_reason, result.cause),
+                    value   ? number("%.4f", peak.mu_max)
+                    : bound ? number("at least %.4f", peak.mu_max)
+                            : "",
+                    value ? number("%.4f .. %.4f", peak.ci95_low, peak.ci95_high) : "",
+                    result.stopped ? number("%.2f", result.sigma_stop_percent) : "",
+                    value ? number("%.2f", peak.sigma_peak_percent) : ""};
+  }
+
+  std::string log_;
+  report::ExperimentCourse now_;
+  std::vector<report::ExperimentCourse> all_;
+};
+
+void run(const Options& options) {
+  end_streams_when_stopped(options.logs);
+  Inputs inputs(options.logs);
+  const daemon::Config config = load_configuration(options.config, options.method);
+  inputs.add(config.files);
+  inputs.demand_apart(options.out);
+  std::vector<report::ExperimentCourse> experiments;
+  std::string none;
+  for (const std::string& log : options.logs) {
+    Courses courses(log.substr(log.rfind('/') + 1));
+    const ReplayResult result =
+        replay({log}, options.interface, config, ReplayOutputs{.also = &courses});
+    for (const std::string& warning : result.warnings) {
+      warn(warning);
+    }
+    if (result.experiments.empty()) none += log + ": " + no_experiment(result) + "\n";
+    for (auto& each : courses.take()) experiments.push_back(std::move(each));
+  }
+  report::HtmlPage page("BeltGrip: experiments");
+  std::array<std::string, report::kPhaseCount> phases;
+  for (std::size_t i = 0; i < phases.size(); ++i) {
+    phases[i] = daemon::phase_name(static_cast<estimator::Phase>(i));
+  }
+  if (!none.empty()) page.paragraph(none);
+  if (!config.assumed.empty()) {
+    std::string assumed =
+        "Assumed, as the configuration leaves them out, and inside the interval: ";
+    for (const std::string& key : config.assumed) {
+      assumed += (&key == &config.assumed.front() ? "" : ", ") + key;
+    }
+    page.paragraph(assumed);
+  }
+  report::add_experiments(page, experiments, phases);
+  write_file(options.out, inputs, page.text());
+  print(stdout, std::to_string(experiments.size()) + " experiments: " + options.out + "\n");
+}
+
+}  // namespace
+
+void add_report(CLI::App& app) {
+  CLI::App* command = app.add_subcommand("report", "The experiments of logs as one HTML file");
+  auto options = std::make_shared<Options>();
+  command->add_option("log", options->logs, "Logs as for replay")->required();
+  command->add_option("--config", options->config, "BeltGrip's configuration")->required();
+  command->add_option("--method", options->method, "Instead of the configuration's")
+      ->check(CLI::IsMember({"robust", "paper"}));
+  command->add_option("--interface", options->interface, "Frames of this interface only");
+  command->add_option("--out", options->out, "The HTML file")->capture_default_str();
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace beltgrip::cli

@@ -1,0 +1,448 @@
+#include "tools/diagnose/data/experiment_data.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <utility>
+
+#include "estimator/statistics/order.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+using Eigen::ArrayXd;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kGrid_s = 0.1;
+constexpr double kKernelSigma_s = 0.07;
+constexpr double kSlowSigma_s = 0.25;
+constexpr double kTrim_s = 0.3;            // either end of a gapless stretch
+constexpr double kSlipMax = 0.06;          // beyond: damage, not friction to be explained
+constexpr double kSlipRateMax_1_s = 0.03;  // the run-away: ratios of derivatives, no statics
+constexpr double kRatioTolerance = 0.085;  // ln; around an end stop
+constexpr double kSoftness_1_N = 5e-6;     // and below it, as pulleys give way to the clamp force
+constexpr double kSpeedMin_rad_s = 10.0;
+constexpr double kForceMin_N = 200.0;
+// Of the clamp force: where its slow copy departs further from it, the pressure moves too fast for
+// what a lag, a shift or play is computed from.
+constexpr double kForceStepMax = 0.02;
+
+// Value and slope at each grid instant: local linear fit; between the samples of a slow channel
+// linear interpolation; nothing across a gap.
+GridSignal to_grid(const Channel& channel, double start_s, int n, double dt_s) {
+  GridSignal out;
+  out.value = ArrayXd::Constant(n, kNaN);
+  out.slope = ArrayXd::Zero(n);
+  if (channel.t_s.size() < 3) return out;
+  const double period_s = median_period_s(channel);
+  out.period_s = period_s;
+  const double sigma_s = std::max(kKernelSigma_s, 0.7 * (dt_s - kGrid_s + kKernelSigma_s));
+  const double half_s = 3.0 * sigma_s;
+  const double gap_s = std::max(0.25, 3.5 * period_s);
+  std::size_t first = 0;
+  for (int k = 0; k < n; ++k) {
+    const double t = start_s + k * dt_s;
+    while (first < channel.t_s.size() && channel.t_s[first] < t - half_s) ++first;
+    double w0 = 0.0, w1 = 0.0, w2 = 0.0, y0 = 0.0, y1 = 0.0;
+    double nearest_before = -1e9, nearest_after = 1e9;
+    for (std::size_t i = first; i < channel.t_s.size() && channel.t_s[i] <= t + half_s; ++i) {
+      const double u = (channel.t_s[i] - t) / sigma_s;
+      (u <= 0.0 ? nearest_before : nearest_after) = u <= 0.0 ? u : std::min(nearest_after, u);
+      const double w = std::exp(-0.5 * u * u);
+      w0 += w;
+      w1 += w * u;
+      w2 += w * u * u;
+      y0 += w * channel.value[i];
+      y1 += w * u * channel.value[i];
+    }
+    if ((nearest_after - nearest_before) * sigma_s > gap_s && k > 0 && k + 1 < n) {
+      // Too far apart for the fit; a slow channel may still be interpolated below.
+    } else if (const double determinant = w0 * w2 - w1 * w1; determinant > 0.02 * w0 * w0) {
+      out.value[k] = (w2 * y0 - w1 * y1) / determinant;
+      out.slope[k] = (w0 * y1 - w1 * y0) / determinant / sigma_s;
+      out.present = true;
+      continue;
+    }
+    const auto after = std::upper_bound(channel.t_s.begin(), channel.t_s.end(), t);
+    if (after == channel.t_s.begin() || after == channel.t_s.end()) continue;
+    const auto i = static_cast<std::size_t>(after - channel.t_s.begin());
+    const double width_s = channel.t_s[i] - channel.t_s[i - 1];
+    if (width_s > gap_s) continue;
+    const double share = (t - channel.t_s[i - 1]) / width_s;
+    out.value[k] = (1.0 - share) * channel.value[i - 1] + share * channel.value[i];
+    out.slope[k] = (channel.value[i] - channel.value[i - 1]) / width_s;
+    out.present = true;
+  }
+  return out;
+}
+
+// Where a third and more of the channel's samples sit on its largest or smallest value for half a
+// second while the channel moves elsewhere: noise takes a clipped signal off its bound now and
+// then.
+std::vector<bool> saturated_samples(const Channel& channel, double start_s, int n, double dt_s) {
+  constexpr double kWindow_s = 0.5, kAround_s = 0.5, kShare = 0.33;
+  constexpr std::size_t kCountMin = 5;
+  std::vector<bool> out(static_cast<std::size_t>(n), false);
+  if (channel.value.size() < 10) return out;
+  const auto [low, high] = std::minmax_element(channel.value.begin(), channel.value.end());
+  if (*low == *high) return out;
+  for (const double bound : {*low, *high}) {
+    std::size_t begin = 0, hits = 0;
+    for (std::size_t end = 0; end < channel.value.size(); ++end) {
+      if (channel.value[end] == bound) ++hits;
+      for (; channel.t_s[begin] < channel.t_s[end] - kWindow_s; ++begin) {
+        if (channel.value[begin] == bound) --hits;
+      }
+      const auto count = static_cast<double>(end - begin + 1);
+      if (hits < kCountMin || static_cast<double>(hits) < kShare * count) continue;
+      const auto at = [&](double t_s) { return static_cast<int>((t_s - start_s) / dt_s); };
+      const int from = std::max(0, at(channel.t_s[begin] - kAround_s));
+      const int to = std::min(n - 1, at(channel.t_s[end] + kAround_s));
+      for (int k = from; k <= to; ++k) out[static_cast<std::size_t>(k)] = true;
+    }
+  }
+  return out;
+}
+
+// A torque is held for long by right, and its rounding repeats values as a bound does. It is
+// clipped where nearly all samples on one bound repeat it, while hardly any elsewhere repeat their
+// neighbour; held on both, it goes from one level to another.
+bool clipped(const Channel& channel) {
+  constexpr double kOften = 0.7, kHardly = 0.1, kFew = 10.0;
+  if (channel.value.size() < 10) return false;
+  const auto [low, high] = std::minmax_element(channel.value.begin(), channel.value.end());
+  struct Place {
+    double samples = 0.0, repeats = 0.0;
+    bool is_held() const { return samples > kFew && repeats > kOften * samples; }
+  } on_low, on_high, elsewhere;
+  for (std::size_t i = 1; i < channel.value.size(); ++i) {
+    const double here = channel.value[i];
+    Place& place = here == *low ? on_low : here == *high ? on_high : elsewhere;
+    place.samples += 1.0;
+    if (here == channel.value[i - 1]) place.repeats += 1.0;
+  }
+  return on_low.is_held() != on_high.is_held() && elsewhere.samples > kFew &&
+         elsewhere.repeats < kHardly * elsewhere.samples;
+}
+
+// One sigma of a rounding that no noise carries from step to step, so that no averaging removes it:
+// there the samples repeat their neighbours. Relative to the mean value.
+double held_rounding(const Channel& channel) {
+  std::vector<double> steps;
+  double held = 0.0, sum = 0.0;
+  const std::vector<double>& x = channel.value;
+  for (std::size_t i = 1; i + 1 < x.size(); ++i) {
+    held += x[i - 1] == x[i] && x[i] == x[i + 1] ? 1.0 : 0.0;
+    sum += std::abs(x[i]);
+    if (x[i] != x[i - 1]) steps.push_back(std::abs(x[i] - x[i - 1]));
+  }
+  if (steps.empty() || sum == 0.0) return 0.0;
+  const double step = estimator::at_rank(steps, steps.size() / 100);
+  const auto count = static_cast<double>(x.size() - 2);
+  return step / std::sqrt(12.0) * std::sqrt(held / count) / (sum / count);
+}
+
+struct LocalFit {
+  ArrayXd value, slope;
+};
+// Local linear fit with Gaussian weights; where there is none, what is given.
+LocalFit local_fit(const ArrayXd& values, const ArrayXd& slopes, double dt_s, double sigma_s) {
+  LocalFit out{values, slopes};
+  const auto n = static_cast<int>(values.size());
+  const int reach = static_cast<int>(std::ceil(3.0 * sigma_s / dt_s));
+  std::vector<double> weight;
+  for (int i = 0; i <= reach; ++i) {
+    weight.push_back(std::exp(-0.5 * std::pow(i * dt_s / sigma_s, 2.0)));
+  }
+  for (int k = 0; k < n; ++k) {
+    double w0 = 0.0, w1 = 0.0, w2 = 0.0, y0 = 0.0, y1 = 0.0;
+    for (int i = std::max(0, k - reach); i <= std::min(n - 1, k + reach); ++i) {
+      const double y = values[i];
+      if (!std::isfinite(y)) continue;
+      const double w = weight[static_cast<std::size_t>(std::abs(i - k))];
+      const double u = (i - k) * dt_s;
+      w0 += w;
+      w1 += w * u;
+      w2 += w * u * u;
+      y0 += w * y;
+      y1 += w * u * y;
+    }
+    const double determinant = w0 * w2 - w1 * w1;
+    if (!std::isfinite(values[k]) || determinant <= 0.02 * w0 * w0 * dt_s * dt_s) continue;
+    out.value[k] = (w2 * y0 - w1 * y1) / determinant;
+    out.slope[k] = (w0 * y1 - w1 * y0) / determinant;
+  }
+  return out;
+}
+
+// One sigma of the samples' noise; 0: too few.
+double sigma_of_samples(const ArrayXd& values) {
+  std::vector<double> second;
+  for (Eigen::Index k = 2; k + 2 < values.size(); ++k) {
+    const double d = values[k - 2] - 2.0 * values[k] + values[k + 2];
+    if (std::isfinite(d)) second.push_back(std::abs(d));
+  }
+  if (second.size() < 20) return 0.0;
+  return estimator::kSigmaPerMedian * estimator::median(second) / std::sqrt(6.0);
+}
+
+// One sigma of a local linear fit's value in the middle: its weights are Gaussian.
+double spread(double sigma, double width_s, double dt_s) {
+  return sigma * std::sqrt(dt_s / (2.0 * std::sqrt(std::numbers::pi) * width_s));
+}
+
+int stop_of(double speed_ratio, double force_N, const estimator::VariatorParameters& variator) {
+  if (!(speed_ratio > 0.0)) return kNoStop;
+  const auto at = [&](double stop) {
+    const double off = std::log(speed_ratio / stop);
+    return off < kRatioTolerance && -off < kRatioTolerance + kSoftness_1_N * std::max(0.0, force_N);
+  };
+  return at(variator.ratio_overdrive) ? kOverdriveStop
+         : at(variator.ratio_low)     ? kLowStop
+                                      : kNoStop;
+}
+
+// Drops the ends of gapless stretches, where the local fits have no neighbours, and short ones.
+void trim(ExperimentData& data) {
+  const int n = data.size();
+  const int ends = static_cast<int>(std::lround(kTrim_s / data.dt_s));
+  std::vector<bool> kept(data.valid.size(), false);
+  for (int k = 0; k < n;) {
+    if (!data.valid[static_cast<std::size_t>(k)]) {
+      ++k;
+      continue;
+    }
+    int end = k;
+    while (end < n && data.valid[static_cast<std::size_t>(end)] &&
+           data.stop[static_cast<std::size_t>(end)] == data.stop[static_cast<std::size_t>(k)]) {
+      ++end;
+    }
+    if (end - k > 2 * ends + 10) {
+      for (int i = k + ends; i < end - ends; ++i) kept[static_cast<std::size_t>(i)] = true;
+    }
+    k = end;
+  }
+  data.valid = kept;
+}
+
+// Takes out the samples where the pressure moves too fast, and those beside them: a delay moves the
+// step there. Where the pressure moves in steps all along, next to which the signals are whole, as
+// they are not at the end of a stretch, nothing more goes: between two steps a second is worth
+// keeping.
+void mask_and_segment(const std::vector<bool>& masked, ExperimentData& data) {
+  constexpr int kShortest = 4, kLong = 10, kBeside = 2;
+  const int n = data.size();
+  const auto stretches = [&](int beside) {
+    const auto is_kept = [&](int k) {
+      const auto from = masked.begin() + std::max(0, k - beside);
+      const auto to = masked.begin() + std::min(n, k + beside + 1);
+      return data.valid[static_cast<std::size_t>(k)] && std::find(from, to, true) == to;
+    };
+    std::vector<std::pair<int, int>> out;
+    for (int k = 0; k < n;) {
+      int end = k;
+      while (end < n && is_kept(end) &&
+             data.stop[static_cast<std::size_t>(end)] == data.stop[static_cast<std::size_t>(k)]) {
+        ++end;
+      }
+      if (end - k >= kShortest) out.emplace_back(k, end);
+      k = std::max(end, k + 1);
+    }
+    return out;
+  };
+  std::vector<std::pair<int, int>> found = stretches(0);
+  int in_long = 0, in_short = 0;
+  for (const auto& [begin, end] : found) {
+    (end - begin >= kLong ? in_long : in_short) += end - begin;
+  }
+  if (in_long > in_short) found = stretches(kBeside);
+  std::vector<bool> kept(data.valid.size(), false);
+  for (const auto& [begin, end] : found) {
+    data.start_of_segment.push_back(begin);
+    data.valid_count += end - begin;
+    for (int i = begin; i < end; ++i) kept[static_cast<std::size_t>(i)] = true;
+  }
+  data.valid = kept;
+}
+
+}  // namespace
+
+void add_slow(GridSignal& signal, double dt_s) {
+  const LocalFit fit = local_fit(signal.value, signal.slope, dt_s, kSlowSigma_s);
+  signal.slow = fit.value;
+  signal.slow_slope = fit.slope;
+  signal.sharp = fit.value;
+  signal.sharp_slope = fit.slope;
+}
+
+namespace {
+// Of a local linear fit over some windows, per sample the widest that agrees with all narrower ones
+// within their noise. narrowest: over the first of them, of a noise of narrowest_sigma.
+LocalFit widest_fit(const GridSignal& signal, double dt_s, const LocalFit& narrowest,
+                    double narrowest_sigma, double sigma, std::span<const double> wider_s) {
+  constexpr double kSigmas = 2.5;
+  const auto n = static_cast<int>(signal.value.size());
+  LocalFit out = narrowest;
+  ArrayXd low = out.value - kSigmas * narrowest_sigma;
+  ArrayXd high = out.value + kSigmas * narrowest_sigma;
+  std::vector<bool> agrees(static_cast<std::size_t>(n), true);
+  for (const double width_s : wider_s) {
+    const LocalFit fit = local_fit(signal.value, signal.slope, dt_s, width_s);
+    const double around = kSigmas * spread(sigma, width_s, dt_s);
+    for (int k = 0; k < n; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      agrees[i] = agrees[i] && fit.value[k] - around < high[k] && fit.value[k] + around > low[k];
+      if (!agrees[i]) continue;
+      out.value[k] = fit.value[k];
+      out.slope[k] = fit.slope[k];
+      low[k] = std::max(low[k], fit.value[k] - around);
+      high[k] = std::min(high[k], fit.value[k] + around);
+    }
+  }
+  return out;
+}
+}  // namespace
+
+void widen_slow(GridSignal& signal, double dt_s) {
+  constexpr std::array kWidths_s{kSlowSigma_s, 0.5, 1.0, 2.0};
+  const double sigma = sigma_of_samples(signal.value);
+  if (sigma == 0.0) return;
+  const LocalFit slow =
+      widest_fit(signal, dt_s, {signal.slow, signal.slow_slope}, spread(sigma, kSlowSigma_s, dt_s),
+                 sigma, std::span(kWidths_s).subspan(1));
+  const LocalFit sharp =
+      widest_fit(signal, dt_s, {signal.value, signal.slope}, sigma, sigma, kWidths_s);
+  signal.slow = slow.value;
+  signal.slow_slope = slow.slope;
+  signal.sharp = sharp.value;
+  signal.sharp_slope = sharp.slope;
+}
+
+namespace {
+// Where a grid is read that is shifted by so many samples.
+struct Place {
+  Eigen::Index before = 0;
+  double share = 0.0;  // on the way to the next
+};
+Place shifted_place(Eigen::Index k, double by, Eigen::Index n) {
+  const double at = std::clamp(static_cast<double>(k) + by, 0.0, static_cast<double>(n - 1));
+  const auto before = std::min(static_cast<Eigen::Index>(at), n - 2);
+  return {before, at - static_cast<double>(before)};
+}
+}  // namespace
+
+ArrayXd shifted(const GridSignal& signal, double dt_s, double shift_s) {
+  const ArrayXd& x = signal.sharp;
+  const auto n = x.size();
+  ArrayXd out(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const auto [i, u] = shifted_place(k, shift_s / dt_s, n);
+    // Hermite: values and slopes of the fit at both ends.
+    const double a = x[i], b = x[i + 1];
+    const double da = signal.sharp_slope[i] * dt_s, db = signal.sharp_slope[i + 1] * dt_s;
+    const double v = 1.0 - u;
+    const double y =
+        v * v * (1.0 + 2.0 * u) * a + u * u * (1.0 + 2.0 * v) * b + u * v * (v * da - u * db);
+    out[k] = std::isfinite(y) ? y : x[k];
+  }
+  return out;
+}
+
+ArrayXd shifted_slope(const GridSignal& signal, double dt_s, double shift_s) {
+  const ArrayXd& x = signal.slow_slope;
+  const auto n = x.size();
+  ArrayXd out(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const auto [i, u] = shifted_place(k, shift_s / dt_s, n);
+    const double y = (1.0 - u) * x[i] + u * x[i + 1];
+    out[k] = std::isfinite(y) ? y : x[k];
+  }
+  return out;
+}
+
+ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator) {
+  ExperimentData data;
+  data.name = table.name;
+  data.notes = table.notes;
+  const Channel& speed = table[Role::kPrimarySpeed];
+  if (speed.t_s.size() < 10) {
+    data.notes.push_back(table.name + ": no primary_speed");
+    return data;
+  }
+  const double start_s = speed.t_s.front();
+  data.dt_s = std::max(kGrid_s, median_period_s(speed));
+  const int n = static_cast<int>((speed.t_s.back() - start_s) / data.dt_s) + 1;
+  const auto on_grid = [&](Role role) {
+    GridSignal out = to_grid(table[role], start_s, n, data.dt_s);
+    add_slow(out, data.dt_s);
+    return out;
+  };
+  data.t_s = ArrayXd::LinSpaced(n, 0.0, (n - 1) * data.dt_s);
+  data.omega_p = on_grid(Role::kPrimarySpeed);
+  data.omega_s = on_grid(Role::kSecondarySpeed);
+  data.pressure = on_grid(Role::kSecondaryPressure);
+  data.torque_is_engine = table[Role::kPrimaryTorque].empty();
+  data.torque = on_grid(data.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque);
+  data.torque_s = on_grid(Role::kSecondaryTorque);
+  data.pressure_p = on_grid(Role::kPrimaryPressure);
+  data.command = on_grid(Role::kSecondaryPressureCommand);
+  data.temperature = on_grid(Role::kOilTemperature);
+
+  data.rounding_slip =
+      std::hypot(held_rounding(speed), held_rounding(table[Role::kSecondarySpeed]));
+
+  data.line_p = order_line(speed);
+  data.line_s = order_line(table[Role::kSecondarySpeed]);
+
+  std::vector<bool> saturated =
+      saturated_samples(table[Role::kSecondaryPressure], start_s, n, data.dt_s);
+  data.saturated_pressure = std::find(saturated.begin(), saturated.end(), true) != saturated.end();
+  for (const Role role : {Role::kPrimaryTorque, Role::kEngineTorque, Role::kSecondaryTorque}) {
+    if (!clipped(table[role])) continue;
+    data.notes.push_back(table.name + ": a torque rests on its bound; left out there");
+    const std::vector<bool> too = saturated_samples(table[role], start_s, n, data.dt_s);
+    std::transform(saturated.begin(), saturated.end(), too.begin(), saturated.begin(),
+                   std::logical_or<>());
+  }
+  data.stop.assign(static_cast<std::size_t>(n), kNoStop);
+  data.valid.assign(static_cast<std::size_t>(n), false);
+  std::vector<bool> too_fast(static_cast<std::size_t>(n), false);
+  const auto usable = [](const GridSignal& signal, int k) {
+    return !signal.present || std::isfinite(signal.value[k]);
+  };
+  for (int k = 0; k < n; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    if (!(data.omega_p.value[k] > kSpeedMin_rad_s) || !std::isfinite(data.omega_s.value[k]))
+      continue;
+    const double force_N = variator.secondary_piston_area_m2 * data.pressure.value[k] +
+                           variator.secondary_spring_force_N;
+    data.stop[i] = stop_of(data.omega_s.value[k] / data.omega_p.value[k], force_N, variator);
+    if (data.stop[i] == kNoStop) continue;
+    const double ratio = data.stop[i] == kLowStop ? variator.ratio_low : variator.ratio_overdrive;
+    const double slip = 1.0 - data.omega_s.value[k] / (data.omega_p.value[k] * ratio);
+    const double slip_rate = (data.omega_s.value[k] * data.omega_p.slope[k] /
+                                  (data.omega_p.value[k] * data.omega_p.value[k]) -
+                              data.omega_s.slope[k] / data.omega_p.value[k]) /
+                             ratio;
+    const double step_N =
+        variator.secondary_piston_area_m2 * (data.pressure.value[k] - data.pressure.slow[k]);
+    data.valid[i] = std::abs(slip) < kSlipMax + kSoftness_1_N * force_N &&
+                    std::abs(slip_rate) < kSlipRateMax_1_s && data.pressure.present &&
+                    force_N > kForceMin_N && data.torque.present && usable(data.pressure, k) &&
+                    usable(data.torque, k) && usable(data.torque_s, k) && usable(data.command, k) &&
+                    usable(data.temperature, k) && usable(data.pressure_p, k) && !saturated[i];
+    too_fast[i] = !(std::abs(step_N) < kForceStepMax * force_N);
+  }
+  trim(data);
+  mask_and_segment(too_fast, data);
+  widen_slow(data.pressure, data.dt_s);
+  if (data.saturated_pressure) {
+    data.notes.push_back(table.name + ": secondary_pressure rests on its bound; left out there");
+  }
+  return data;
+}
+
+}  // namespace beltgrip::diagnose

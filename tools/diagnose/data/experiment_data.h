@@ -1,0 +1,63 @@
+// One experiment on a uniform grid: every channel through the same local linear fit with Gaussian
+// weights, so that sums, ratios and derivatives of channels stay consistent, and the mask of the
+// samples that may carry a conclusion. The mask depends on data only, never on a hypothesis.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "estimator/physics/parameters.h"
+#include "tools/diagnose/data/order_lines.h"
+#include "tools/diagnose/data/signal_table.h"
+
+namespace beltgrip::diagnose {
+
+enum EndStopIndex : int { kOverdriveStop = 0, kLowStop = 1, kNoStop = -1 };
+inline constexpr int kStops = 2;
+
+// A channel on the grid; NaN where the channel has no data.
+struct GridSignal {
+  Eigen::ArrayXd value;
+  Eigen::ArrayXd slope;        // per second, of the same fit
+  Eigen::ArrayXd slow;         // smoother copy: what a shift, lag or play changes is taken from it,
+  Eigen::ArrayXd slow_slope;   // else such an effect would win by averaging the channel's noise
+  Eigen::ArrayXd sharp;        // what a shift, lag or play is computed from: the slow copy; of the
+  Eigen::ArrayXd sharp_slope;  // pressure one that is not rounded where it turns or steps
+  double period_s = 0.0;       // median time between the channel's samples
+  bool present = false;
+};
+
+struct ExperimentData {
+  std::string name;
+  double dt_s = 0.1;
+  Eigen::ArrayXd t_s;  // from the first sample of the experiment
+  GridSignal omega_p, omega_s, pressure, torque, torque_s, pressure_p, command, temperature;
+  OrderLine line_p, line_s;  // once per revolution, primary and secondary speed
+  bool torque_is_engine = false;
+  std::vector<int> stop;              // EndStopIndex per sample
+  std::vector<bool> valid;            // may carry a conclusion
+  std::vector<int> start_of_segment;  // first valid sample of every gapless stretch
+  int valid_count = 0;
+  bool saturated_pressure = false;
+  double rounding_slip = 0.0;  // one sigma of what the rounding of the speeds leaves in the slip
+  std::vector<std::string> notes;
+  int size() const { return static_cast<int>(t_s.size()); }
+};
+
+// Never throws: what cannot be used is masked, and said in notes.
+ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator);
+
+// Both slow copies, from value.
+void add_slow(GridSignal& signal, double dt_s);
+
+// Slow copies over the widest of some windows that agrees with all narrower ones within their
+// noise: a signal that moves on straight lines is left with next to none of its noise. sharp is the
+// same from the samples on.
+void widen_slow(GridSignal& signal, double dt_s);
+
+// sharp(t + shift), cubic; held at the ends. Seconds. slow_slope, linear.
+Eigen::ArrayXd shifted(const GridSignal& signal, double dt_s, double shift_s);
+Eigen::ArrayXd shifted_slope(const GridSignal& signal, double dt_s, double shift_s);
+
+}  // namespace beltgrip::diagnose

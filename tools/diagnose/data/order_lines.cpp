@@ -1,0 +1,185 @@
+#include "tools/diagnose/data/order_lines.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+
+namespace beltgrip::diagnose {
+namespace {
+
+constexpr double kPiece_s = 4.0;
+constexpr double kSmooth_s = 0.3;  // half width of the local line that is taken out
+constexpr double kSpeedMin_rad_s = 20.0;
+constexpr int kSamplesMin = 60;  // per piece
+// One sigma of what jitter of the clock and unfinished revolutions leave, share of the amplitude.
+constexpr double kAmplitudeShare = 3e-3;
+// Neighbouring orders: what noise there is without a line.
+constexpr double kNeighbours[] = {0.80, 0.84, 0.88, 0.92, 1.08, 1.12, 1.16, 1.20};
+
+// Samples of the local line on each side of its middle.
+double each_side(double period_s) { return std::round(kSmooth_s / period_s); }
+
+// Local straight line through the samples about each; the window ends between two samples.
+std::vector<double> smoothed(const Channel& speed, double period_s) {
+  const std::size_t n = speed.t_s.size();
+  const double reach_s = (each_side(period_s) + 0.5) * period_s;
+  std::vector<double> out(n, std::numeric_limits<double>::quiet_NaN());
+  std::size_t first = 0, end = 0;
+  double s0 = 0.0, s1 = 0.0, s2 = 0.0, y0 = 0.0, y1 = 0.0;
+  const double origin_s = n > 0 ? speed.t_s[0] : 0.0;
+  const auto change = [&](std::size_t i, double sign) {
+    const double t = speed.t_s[i] - origin_s;
+    s0 += sign;
+    s1 += sign * t;
+    s2 += sign * t * t;
+    y0 += sign * speed.value[i];
+    y1 += sign * t * speed.value[i];
+  };
+  for (std::size_t i = 0; i < n; ++i) {
+    while (end < n && speed.t_s[end] <= speed.t_s[i] + reach_s) change(end++, 1.0);
+    while (speed.t_s[first] < speed.t_s[i] - reach_s) change(first++, -1.0);
+    const double determinant = s0 * s2 - s1 * s1;
+    if (s0 < 8.0 || determinant <= 0.0) continue;
+    const double slope = (s0 * y1 - s1 * y0) / determinant;
+    out[i] = (y0 - slope * s1) / s0 + slope * (speed.t_s[i] - origin_s);
+  }
+  return out;
+}
+
+}  // namespace
+
+void OrderLine::add(const OrderLine& other) {
+  pieces += other.pieces;
+  excess += other.excess;
+  power += other.power;
+  power_squares += other.power_squares;
+  noise += other.noise;
+}
+
+double OrderLine::amplitude() const {
+  return pieces > 0 ? std::sqrt(std::max(power / pieces, 0.0)) : 0.0;
+}
+
+double OrderLine::amplitude_sigma() const {
+  if (pieces < 3) return std::numeric_limits<double>::infinity();
+  const double mean = power / pieces;
+  const double spread = std::max(power_squares / pieces - mean * mean, 0.0);
+  const double sigma_power = std::sqrt((spread + 1e-300) / pieces);
+  const double by_chance = 0.5 * sigma_power / std::max(amplitude(), std::sqrt(noise / pieces));
+  return std::hypot(by_chance, kAmplitudeShare * amplitude());
+}
+
+double OrderLine::chi2() const {
+  if (pieces < 3 || excess <= 0.0) return 0.0;
+  return excess * excess / pieces;  // |A|^2 / noise is exponential: mean 1, variance 1
+}
+
+namespace {
+
+// A few seconds of a speed: shaft angle and relative departure from the smooth speed.
+struct Piece {
+  std::vector<double> angle, rest;
+  double passed = 0.0;  // of a line once per revolution: what the smoothing leaves of it
+  double power_at(double order) const {
+    std::complex<double> sum;
+    for (std::size_t i = 0; i < rest.size(); ++i) {
+      sum += rest[i] * std::polar(1.0, -order * angle[i]);
+    }
+    return std::norm(sum * (2.0 / static_cast<double>(rest.size())));
+  }
+};
+
+// Share of an oscillation of omega rad/s that the local straight line follows: the mean of its
+// window's samples (Dirichlet's kernel).
+double followed(double omega, double period_s) {
+  const double half = std::sin(0.5 * omega * period_s);
+  if (std::abs(half) < 1e-9) return 1.0;
+  const double reach = each_side(period_s);
+  return std::sin((reach + 0.5) * omega * period_s) / ((2.0 * reach + 1.0) * half);
+}
+
+std::vector<Piece> pieces_of(const Channel& speed) {
+  std::vector<Piece> out;
+  if (speed.t_s.size() < 100) return out;
+  const double period_s = median_period_s(speed);
+  if (!(period_s > 0.0)) return out;
+  const std::vector<double> smooth = smoothed(speed, period_s);
+  std::size_t begin = 0;
+  while (begin < speed.t_s.size()) {
+    std::size_t end = begin;
+    Piece piece;
+    double phi = 0.0;
+    while (end < speed.t_s.size() && speed.t_s[end] < speed.t_s[begin] + kPiece_s) {
+      if (end > begin) {
+        // Not of the smooth speed: where that cuts a corner, the angle would stay wrong.
+        phi +=
+            0.5 * (speed.value[end] + speed.value[end - 1]) * (speed.t_s[end] - speed.t_s[end - 1]);
+      }
+      piece.angle.push_back(phi);
+      piece.rest.push_back(speed.value[end] / smooth[end] - 1.0);
+      ++end;
+    }
+    const double span_s = speed.t_s[end - 1] - speed.t_s[begin];
+    for (std::size_t i = begin; i < end; ++i) {
+      piece.passed += (1.0 - followed(smooth[i], period_s)) / static_cast<double>(end - begin);
+    }
+    const bool usable = piece.rest.size() >= kSamplesMin && span_s > 0.8 * kPiece_s &&
+                        std::isfinite(phi) && phi > kSpeedMin_rad_s * span_s &&
+                        std::all_of(piece.rest.begin(), piece.rest.end(), [](double v) {
+                          return std::abs(v) < 0.1;  // NaN fails as well
+                        });
+    if (usable) out.push_back(std::move(piece));
+    begin = end;
+  }
+  return out;
+}
+
+}  // namespace
+
+OrderLine order_line(const Channel& speed) {
+  OrderLine out;
+  for (const Piece& piece : pieces_of(speed)) {
+    double noise = 0.0;
+    for (const double order : kNeighbours) noise += piece.power_at(order);
+    noise /= static_cast<double>(std::size(kNeighbours));
+    if (!(noise > 0.0)) continue;
+    const double here = piece.power_at(1.0);
+    // The noise itself is a mean of a few: its inverse is biased by n / (n - 1).
+    constexpr double kMean = static_cast<double>(std::size(kNeighbours));
+    const double excess = here / noise * (kMean - 1.0) / kMean - 1.0;
+    out.excess += std::min(excess, 50.0);
+    const double power = (here - noise) / (piece.passed * piece.passed);
+    out.power += power;
+    out.power_squares += power * power;
+    out.noise += noise;
+    ++out.pieces;
+  }
+  return out;
+}
+
+OrderSpectrum order_spectrum(const std::vector<SignalTable>& tables, Role role) {
+  constexpr int kSteps = 160;
+  constexpr double kStep = 0.02, kFirst = 0.2;
+  std::vector<double> power(kSteps, 0.0);
+  std::size_t count = 0;
+  for (const SignalTable& table : tables) {
+    const std::vector<Piece> pieces = pieces_of(table[role]);
+    // A few of each experiment are enough for a picture.
+    const std::size_t step = std::max<std::size_t>(1, pieces.size() / 4);
+    for (std::size_t i = 0; i < pieces.size(); i += step, ++count) {
+      for (int k = 0; k < kSteps; ++k) {
+        power[static_cast<std::size_t>(k)] += pieces[i].power_at(kFirst + k * kStep);
+      }
+    }
+  }
+  OrderSpectrum out;
+  for (int k = 0; count > 0 && k < kSteps; ++k) {
+    out.order.push_back(kFirst + k * kStep);
+    out.amplitude.push_back(
+        std::sqrt(power[static_cast<std::size_t>(k)] / static_cast<double>(count)));
+  }
+  return out;
+}
+
+}  // namespace beltgrip::diagnose

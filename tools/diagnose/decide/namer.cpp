@@ -1,0 +1,575 @@
+#include "tools/diagnose/decide/namer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <set>
+
+#include "estimator/statistics/distributions.h"
+#include "tools/diagnose/decide/unknown.h"
+#include "tools/diagnose/infer/gain.h"
+#include "tools/diagnose/infer/parallel.h"
+#include "tools/diagnose/infer/uncertainty.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+// Chance of a name on data without an effect, and of an unknown cause.
+constexpr double kFalseName = 0.005;
+constexpr double kFalseUnknown = 0.005;
+constexpr int kRefined = 9;           // candidates refitted per step
+constexpr std::size_t kFromAfar = 5;  // of these, from afar
+constexpr double kPlain = 2.0;        // times the threshold: no chance
+constexpr double kFar = 1000.0;       // gain of a candidate: the machine alone is far from the data
+constexpr double kNearMax = 400.0;
+constexpr std::size_t kNearest = 2;  // refitted however far: a shift is far from linear
+constexpr double kNear = 40.0;       // linear loss within which a refit may still reach the best
+constexpr int kEffectsMax = 3;
+constexpr int kStepsMax = 4;
+constexpr int kRounds = 3;
+constexpr int kSettling = 20;     // steps of a fit whose effects are settled
+constexpr int kGroupDegrees = 3;  // of a group of score_groups
+constexpr double kPromotedOdds = 3.0;
+constexpr int kPromotions = 2;
+constexpr double kThereOdds = 20.0;   // that it is there
+constexpr double kClassOdds = 200.0;  // worse by more: told apart; the class is to miss one in 100
+// A further cause must matter beside those found: below this share of their evidence it is the
+// difference between the found effect's equation and the machine.
+constexpr double kShareOfFirst = 0.02;
+// Of the gain: a name that explains as much is no such difference, be the first as large as it may.
+constexpr double kOwnGain = 100.0, kOwnShare = 5e-4;
+constexpr double kHeld = 0.5;
+constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
+// Where something else is so much more probable that cannot be, for its size, neither is it.
+constexpr double kUnlikely = 0.01;
+constexpr double kDisagreement = 0.05;   // p of a size that experiments do not agree on
+constexpr double kLeftOutMin = 0.0;      // of the log predictive density
+constexpr double kLeftOutPlain = 200.0;  // the same: beyond doubt, however few experiments show it
+constexpr double kRippleMin = 1e-4;      // of the speed: less is of no consequence for slip
+
+constexpr std::array kConstants{kDeformationPerkN, kLossConstant_Nm, kLossPerSpeed_Nms,
+                                kLnRatioOverdrive, kLnRatioLow};
+
+std::string_view id_of(const Engine& engine, int slot) {
+  return engine.campaign().slots[static_cast<std::size_t>(slot)].row->id;
+}
+
+std::vector<int> plus(std::vector<int> set, int slot) {
+  set.push_back(slot);
+  return set;
+}
+
+// The slots to refit: by gain and by significance, none that is barred.
+std::vector<int> shortlist(const std::vector<Score>& scores, int count, double in_curve_max,
+                           const std::vector<int>& barred) {
+  std::vector<Score> by_gain = scores, by_chi2 = scores;
+  std::sort(by_gain.begin(), by_gain.end(), [](auto& a, auto& b) { return a.gain > b.gain; });
+  std::sort(by_chi2.begin(), by_chi2.end(), [](auto& a, auto& b) { return a.chi2 > b.chi2; });
+  std::vector<int> out;
+  for (std::size_t i = 0; i < scores.size() && static_cast<int>(out.size()) < count; ++i) {
+    for (const Score* score : {&by_gain[i], &by_chi2[i]}) {
+      if (score->gain > 4.0 && score->in_curve < in_curve_max &&
+          std::find(barred.begin(), barred.end(), score->slot) == barred.end() &&
+          std::find(out.begin(), out.end(), score->slot) == out.end()) {
+        out.push_back(score->slot);
+      }
+    }
+  }
+  return out;
+}
+
+// Time between the samples of what a slot shifts in time; 0: it shifts nothing.
+double sample_period_s(const Campaign& campaign, const Slot& slot) {
+  if (slot.row->unit != "s") return 0.0;
+  double period_s = 0.0;
+  for (const ExperimentData& run : campaign.runs) {
+    const GridSignal& channel = slot.row->id == "torque_delay"   ? run.torque
+                                : slot.role == "primary_speed"   ? run.omega_p
+                                : slot.role == "secondary_speed" ? run.omega_s
+                                : slot.role == "command"         ? run.command
+                                                                 : run.pressure;
+    period_s = std::max(period_s, channel.period_s);
+  }
+  return period_s;
+}
+
+// What bends the machine out of its range only to make up for itself: a gain of the torque and a
+// drag below zero, where the torque was never varied.
+bool bends_machine(const Engine& engine, const Hypothesis& h) {
+  constexpr double kTolerances = 3.5;
+  const auto off = [&](const ModelState& state) {
+    double squares = 0.0;
+    for (const int p : kConstants) {
+      const NuisanceRow& row = engine.campaign().nuisances[static_cast<std::size_t>(p)];
+      squares += std::pow((state.nuisance[p] - row.nominal) / row.tolerance, 2.0);
+    }
+    return std::sqrt(squares);
+  };
+  return off(h.state) > std::max(kTolerances, off(engine.state()) + 1.0);
+}
+
+// A size that no machine has is one where the data do not hold the fit; one far below the usual is
+// of no consequence, however sure; a value that is held from one sample to the next is late by half
+// the time between them; no tilt shows at one torque.
+bool credible(const Engine& engine, int slot, double size) {
+  const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
+  const EffectRow& row = *which.row;
+  const double share = std::abs(size) / row.typical;
+  if (std::abs(size) < kHeld * sample_period_s(engine.campaign(), which)) return false;
+  if (row.id == "radius_tilt" && !engine.campaign().torque_varies) return false;
+  return share > kOfConsequence && share < kBelievable && size < row.high &&
+         (size > row.low || row.low == 0.0);
+}
+
+bool credible(const Engine& engine, const Hypothesis& h) {
+  if (bends_machine(engine, h)) return false;
+  return std::all_of(h.slots.begin(), h.slots.end(),
+                     [&](int slot) { return credible(engine, slot, h.state.effects[slot]); });
+}
+
+double ln_sum(const std::vector<double>& ln_values) {
+  const double top = *std::max_element(ln_values.begin(), ln_values.end());
+  double sum = 0.0;
+  for (const double v : ln_values) sum += std::exp(v - top);
+  return top + std::log(sum);
+}
+
+// An effect's own dependence is no other cause: there its equation only has another shape.
+bool is_own(const Engine& engine, const std::vector<int>& slots, const UnknownGroup& group) {
+  return std::any_of(slots.begin(), slots.end(), [&](int slot) {
+    const EffectRow& row = *engine.campaign().slots[static_cast<std::size_t>(slot)].row;
+    return row.acts_on == group.acts_on &&
+           row.depends_on.find(group.depends_on) != std::string_view::npos;
+  });
+}
+
+// The group that explains what the best hypothesis cannot, if there is one.
+std::optional<UnknownGroup> better_group(const Engine& engine, const Hypothesis& best, double gain,
+                                         double threshold) {
+  const double certainty = *std::min_element(best.chi2.begin(), best.chi2.end());
+  for (const UnknownGroup& group : score_groups(engine)) {  // by gain, falling
+    if (group.gain < gain + 2.0 * (kGroupDegrees - 1) + threshold + kShareOfFirst * gain) break;
+    if (group.chi2 < std::max(threshold, certainty) || group.size < 1.0 ||
+        group.left_out_gain <= kLeftOutMin) {
+      continue;
+    }
+    if (!is_own(engine, best.slots, group)) return group;
+  }
+  return std::nullopt;
+}
+
+// The group explains something still when the best hypothesis is there, whose gain is more than the
+// linear where the constants of the machine had made up for it.
+bool outlasts(const Engine& engine, const Hypothesis& best, const UnknownGroup& group,
+              double threshold) {
+  Engine beside = engine;
+  beside.accept(best);
+  beside.update_noise();
+  beside.accept(beside.refine(best.slots, kSettling));
+  beside.update_noise();
+  const std::vector<UnknownGroup> left = score_groups(beside);
+  return std::any_of(left.begin(), left.end(), [&](const UnknownGroup& each) {
+    return each.acts_on == group.acts_on && each.depends_on == group.depends_on &&
+           each.gain > threshold && each.chi2 > threshold;
+  });
+}
+
+// The better of both starts: the linear one may lead far along what the data hardly hold.
+Hypothesis refine_replacement(const Engine& engine, const Engine::Replacement& start,
+                              const std::vector<int>& slots) {
+  Hypothesis linear = engine.refine_from(start.state, slots);
+  Hypothesis beside = engine.refine_from(start.beside, slots);
+  return linear.log_likelihood > beside.log_likelihood ? linear : beside;
+}
+
+// What the friction curve alone could do as well, however it runs, while it runs as friction does.
+bool is_in_curve(const Naming& naming, int slot) {
+  return Engine::curve_is_possible(naming.sharp.state) &&
+         std::any_of(naming.last_screen.begin(), naming.last_screen.end(), [&](const Score& score) {
+           return score.slot == slot && score.in_curve > kInCurveMax;
+         });
+}
+
+struct Promotion {
+  Hypothesis hypothesis;
+  int slot, instead_of;
+};
+
+// Every accepted slot against every other slot in its place. What is more probable there by more
+// than kPromotedOdds, if it is possible at all: it should have been accepted.
+std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
+                                         const std::function<bool()>& stop, int jobs) {
+  std::optional<Promotion> promoted;
+  const std::vector<int>& set = engine.accepted();
+  naming.accepted.clear();
+  naming.hypothesis = engine.refine(set);
+  const Hypothesis whole = naming.hypothesis;
+  for (std::size_t j = 0; j < set.size(); ++j) {
+    Accepted out;
+    out.slot = set[j];
+    out.chi2 = whole.chi2[j];
+    out.left_out_gain = engine.left_out_gain(out.slot);
+    std::vector<int> others = set;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(j));
+    std::vector<std::pair<Engine::Replacement, int>> ranked;
+    for (int slot = 0; slot < static_cast<int>(engine.campaign().slots.size()); ++slot) {
+      if (std::find(set.begin(), set.end(), slot) != set.end()) continue;
+      ranked.emplace_back(engine.replace(plus(others, slot), out.slot), slot);
+    }
+    std::sort(ranked.begin(), ranked.end(),
+              [](const auto& a, const auto& b) { return a.first.gain > b.first.gain; });
+    std::map<std::string_view, std::vector<double>> evidence;
+    evidence[id_of(engine, out.slot)].push_back(whole.log_evidence);
+    const Hypothesis without = refine_replacement(engine, engine.replace(others, out.slot), others);
+    const double loss = std::max(0.0, whole.log_likelihood - without.log_likelihood) * 2.0;
+    std::size_t near = 0;
+    while (
+        near < ranked.size() && near < kRefined &&
+        (near < kNearest || -ranked[near].first.gain <= std::clamp(0.4 * loss, kNear, kNearMax))) {
+      ++near;
+    }
+    std::vector<std::optional<Hypothesis>> rivals(near);
+    in_parallel(jobs, near, [&](std::size_t i) {
+      if (stop()) return;
+      const std::vector<int> rival = plus(others, ranked[i].second);
+      rivals[i] = refine_replacement(engine, ranked[i].first, rival);
+    });
+    for (std::size_t i = 0; i < near; ++i) {
+      const std::optional<Hypothesis>& rival = rivals[i];
+      if (!rival) continue;
+      const Hypothesis& other = *rival;
+      if (parts_experiments(without.fit.scatter, other.fit.scatter)) continue;
+      const double bar = promoted ? promoted->hypothesis.log_evidence
+                                  : whole.log_evidence + std::log(kPromotedOdds);
+      if (other.log_evidence > bar && credible(engine, other)) {
+        promoted = Promotion{other, ranked[i].second, out.slot};
+      }
+      if (is_in_curve(naming, ranked[i].second)) continue;  // never a name
+      evidence[id_of(engine, ranked[i].second)].push_back(other.log_evidence);
+      if (id_of(engine, ranked[i].second) != id_of(engine, out.slot) &&
+          other.log_evidence > whole.log_evidence - std::log(kClassOdds)) {
+        out.aliases.push_back(ranked[i].second);
+      }
+    }
+    std::vector<double> all{without.log_evidence};
+    for (const auto& [id, values] : evidence) all.push_back(ln_sum(values));
+    out.ln_odds = whole.log_evidence - without.log_evidence;
+    out.probability = std::exp(ln_sum(evidence[id_of(engine, out.slot)]) - ln_sum(all));
+    naming.accepted.push_back(out);
+  }
+  return promoted;
+}
+
+// Takes a slot out again. Where it had carried the machine's constants away, the way back leads
+// from the nominal machine.
+void drop(Engine& engine, const Naming& naming, int slot) {
+  std::vector<int> fewer = engine.accepted();
+  std::erase(fewer, slot);
+  ModelState start = naming.nominal.state;
+  for (const int kept : fewer) start.effects[kept] = engine.state().effects[kept];
+  const Hypothesis from_here = engine.refine(fewer);
+  const Hypothesis from_nominal = engine.refine_from(start, fewer);
+  engine.accept(from_here.log_likelihood > from_nominal.log_likelihood ? from_here : from_nominal);
+  engine.update_noise();
+}
+
+void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& stop, int jobs) {
+  for (int i = 0; i < kPromotions; ++i) {
+    const std::optional<Promotion> better = compare_classes(engine, naming, stop, jobs);
+    if (!better || stop()) return;
+    if (is_in_curve(naming, better->slot)) {
+      naming.not_confirmed.push_back(better->instead_of);
+      drop(engine, naming, better->instead_of);
+    } else {
+      engine.accept(better->hypothesis);
+      engine.update_noise();
+    }
+  }
+  compare_classes(engine, naming, stop, jobs);
+}
+
+void find_intervals(const Engine& engine, Naming& naming) {
+  const Hypothesis& h = naming.hypothesis;
+  const std::vector<Uncertainty> all = uncertainties(engine, h);
+  for (Accepted& each : naming.accepted) {
+    const auto at = std::find(h.slots.begin(), h.slots.end(), each.slot) - h.slots.begin();
+    each.sigma = all[static_cast<std::size_t>(at)].sigma;
+    each.degrees = all[static_cast<std::size_t>(at)].degrees;
+    each.stability = all[static_cast<std::size_t>(at)].stability;
+  }
+}
+
+// What the experiments do not agree on, or what is better left out, is no finding.
+void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& stop, int jobs) {
+  while (!naming.accepted.empty() && !stop()) {
+    const auto doubtful =
+        std::find_if(naming.accepted.begin(), naming.accepted.end(), [&](const Accepted& each) {
+          const double size = naming.hypothesis.state.effects[each.slot];
+          return each.ln_odds < std::log(kThereOdds) || !credible(engine, each.slot, size) ||
+                 each.probability < kUnlikely ||
+                 estimator::student_p(size / each.sigma, each.degrees) > kDisagreement;
+        });
+    if (doubtful == naming.accepted.end()) return;
+    naming.not_confirmed.push_back(doubtful->slot);
+    drop(engine, naming, doubtful->slot);
+    find_classes(engine, naming, stop, jobs);
+    find_intervals(engine, naming);
+  }
+}
+
+// An effect that does not help to predict experiments left out of the fit is none. One that is a
+// constant of the machine under another name cannot help there: the constant's usual values alone
+// tell it.
+void drop_unconfirmed(Engine& engine, Naming& naming) {
+  if (engine.summaries().size() < 3) return;
+  for (;;) {
+    const std::vector<int>& set = engine.accepted();
+    std::vector<std::pair<double, int>> judged;  // gain of the log predictive density, slot
+    for (const int slot : set) {
+      if (!engine.is_constant(slot)) judged.emplace_back(engine.left_out_gain(slot), slot);
+    }
+    if (judged.empty()) return;
+    const auto [density, slot] = *std::min_element(judged.begin(), judged.end());
+    const Hypothesis whole = engine.refine(set, 3);
+    const Gain gain = left_out_gain(engine, naming.sharp, whole.state, set);
+    // A nominal curve that no friction has predicts as well as it was bent to; that it need not be
+    // bent any more counts as much.
+    const bool straightened =
+        !Engine::curve_is_possible(naming.sharp.state) && Engine::curve_is_possible(whole.state);
+    // What shows in one or two experiments only is not beyond the chance of drawing them.
+    const bool helps = gain.better() || straightened || density > kLeftOutPlain;
+    // One signal may be predicted a little worse where all at once are predicted better, beyond the
+    // chance of drawing the experiments.
+    const bool on_the_whole = gain.density && gain.density->low > 0.0;
+    if (density > kLeftOutMin && helps &&
+        (on_the_whole || !gain.worse(noise_floors(engine.campaign(), naming.sharp.state)))) {
+      return;
+    }
+    naming.not_confirmed.push_back(slot);
+    drop(engine, naming, slot);
+  }
+}
+
+double worth_beside(double first_gain) {
+  return std::min(kShareOfFirst * first_gain, kOwnGain + kOwnShare * first_gain);
+}
+
+// Adds to the accepted effects as long as any is there. first_gain: the largest so far.
+void add_effects(Engine& engine, Naming& out, double& first_gain, const std::function<bool()>& stop,
+                 int jobs) {
+  // A member may be dropped again: the number of steps is bounded, not only that of effects.
+  for (int step = 0; step < kStepsMax && !stop(); ++step) {
+    if (static_cast<int>(engine.accepted().size()) >= kEffectsMax) break;
+    const std::vector<Score> scores = engine.screen();
+    out.last_screen = scores;
+    const std::vector<int> set = engine.accepted();
+    const Hypothesis base = engine.refine(set, 3);
+    // So far from the data, or with a curve that no friction has, the linear says little of where
+    // an effect would lead.
+    const bool possible = Engine::curve_is_possible(engine.state());
+    // The same where experiments differ by more than replicates do.
+    const bool scattered = engine.scatters_unusually();
+    const bool far = !possible || scattered ||
+                     std::any_of(scores.begin(), scores.end(),
+                                 [](const Score& score) { return score.gain > kFar; });
+    Hypothesis best;
+    bool found = false;
+    // From the linear estimate, and where that leaves the range of the linear, from the present.
+    const auto fitted = [&](const std::vector<int>& candidate, bool afar) {
+      Hypothesis h = engine.refine_from(engine.add(candidate).state, candidate);
+      const auto or_better = [&](Hypothesis other) {
+        if (other.log_likelihood > h.log_likelihood) h = std::move(other);
+      };
+      if (h.log_likelihood < base.log_likelihood) or_better(engine.refine(candidate));
+      if (afar) or_better(engine.refine_from_afar(candidate));
+      return h;
+    };
+    const auto consider = [&](Hypothesis h) {
+      const double gain = 2.0 * (h.log_likelihood - base.log_likelihood);
+      for (const double chi2 : h.chi2) {
+        if (!(chi2 > out.threshold)) return;
+      }
+      if (!credible(engine, h)) return;
+      if (parts_experiments(base.fit.scatter, h.fit.scatter)) return;
+      if (gain < std::max(out.threshold, worth_beside(first_gain))) return;
+      if (!found || h.log_evidence > best.log_evidence) {
+        best = std::move(h);
+        found = true;
+      }
+    };
+    const double in_curve_max = possible ? kInCurveMax : 2.0;
+    std::vector<int> candidates = shortlist(scores, kRefined, in_curve_max, out.not_confirmed);
+    if (scattered) {
+      const std::vector<int> usual =
+          shortlist(engine.screen_with_usual_scatter(), static_cast<int>(kFromAfar), in_curve_max,
+                    out.not_confirmed);
+      std::erase_if(candidates, [&](int slot) {
+        return std::find(usual.begin(), usual.end(), slot) != usual.end();
+      });
+      candidates.insert(candidates.begin(), usual.begin(), usual.end());
+    }
+    const auto consider_all = [&](bool from_afar) {
+      std::vector<std::optional<Hypothesis>> fits(candidates.size());
+      in_parallel(jobs, candidates.size(), [&](std::size_t i) {
+        if (!stop()) fits[i] = fitted(plus(set, candidates[i]), from_afar && i < kFromAfar);
+      });
+      for (std::optional<Hypothesis>& fit : fits) {
+        if (!fit) continue;
+        // What the new one makes superfluous goes out.
+        std::vector<int> left;
+        for (std::size_t j = 0; j < fit->slots.size(); ++j) {
+          if (fit->chi2[j] > out.threshold) left.push_back(fit->slots[j]);
+        }
+        const bool swaps = fit->chi2.back() > out.threshold && left.size() < fit->slots.size();
+        consider(swaps ? engine.refine_from(fit->state, left, kSettling) : std::move(*fit));
+      }
+    };
+    consider_all(far);
+    // Something is there, but no way leads to it from here.
+    const bool plain = std::any_of(scores.begin(), scores.end(), [&](const Score& score) {
+      return score.chi2 > kPlain * out.threshold && (!possible || score.in_curve < kInCurveMax);
+    });
+    if (!found && !far && plain) consider_all(true);
+    if (!found) break;
+    // To its end, before anything is compared with it.
+    best = engine.refine_from(best.state, best.slots, kSettling);
+    // A pair whose sum a third effect imitates: all pairs, linear, on the present matrices.
+    if (set.empty()) {
+      std::vector<std::pair<double, std::vector<int>>> pairs;
+      for (std::size_t a = 0; a < candidates.size(); ++a) {
+        for (std::size_t b = a + 1; b < candidates.size(); ++b) {
+          if (id_of(engine, candidates[a]) == id_of(engine, candidates[b])) continue;
+          const std::vector<int> pair{candidates[a], candidates[b]};
+          pairs.emplace_back(engine.add(pair).gain, pair);
+        }
+      }
+      std::sort(pairs.rbegin(), pairs.rend());
+      const double single = 2.0 * (best.log_likelihood - base.log_likelihood);
+      for (std::size_t i = 0; i < pairs.size() && i < 3 && !stop(); ++i) {
+        if (pairs[i].first < single + out.threshold + worth_beside(single)) break;
+        consider(fitted(pairs[i].second, false));
+      }
+    }
+    const double gain = 2.0 * (best.log_likelihood - base.log_likelihood);
+    // A smooth dependence on a recorded variable that explains clearly more than any name is no
+    // effect of the library: a name would be wrong, and so would those built on it.
+    if (const auto better = better_group(engine, best, gain, out.threshold);
+        better && outlasts(engine, best, *better, out.threshold)) {
+      out.unknown = better;
+      break;
+    }
+    first_gain = std::max(first_gain, gain);
+    engine.accept(best);
+    engine.update_noise();
+    engine.accept(engine.refine(engine.accepted(), kSettling));
+    engine.update_noise();
+    // Members that the others have made superfluous.
+    bool removed = true;
+    while (removed && engine.accepted().size() > 1) {
+      removed = false;
+      const Hypothesis whole = engine.refine(engine.accepted(), 3);
+      for (std::size_t j = 0; j < whole.slots.size(); ++j) {
+        if (whole.chi2[j] > out.threshold) continue;
+        std::vector<int> fewer = whole.slots;
+        fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(j));
+        engine.accept(engine.refine(fewer));
+        engine.update_noise();
+        removed = true;
+        break;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<Ripple> find_ripples(const Campaign& campaign, double threshold) {
+  OrderLine primary, secondary;
+  for (const ExperimentData& run : campaign.runs) {
+    primary.add(run.line_p);
+    secondary.add(run.line_s);
+  }
+  std::vector<Ripple> out;
+  for (const auto& [shaft, line] : {std::pair{"primary", primary}, {"secondary", secondary}}) {
+    // Sums of exponential variables have heavier tails than the normal: three times the bound.
+    // What the model knows of is no news, unless it is of another size.
+    const auto known = campaign.known_ripples.find(shaft);
+    const bool is_known = known != campaign.known_ripples.end();
+    const double beyond = line.amplitude() - (is_known ? known->second : 0.0);
+    // Some experiments may show a line that others do not: the amplitude's own scatter tells.
+    const double sigmas = beyond / std::max(line.amplitude_sigma(), 1e-12);
+    const double chi2 = is_known ? sigmas * sigmas : line.chi2();
+    out.push_back(
+        {shaft, line.amplitude(), line.amplitude_sigma(), chi2,
+         std::min(chi2, sigmas * sigmas) > 3.0 * threshold && std::abs(beyond) > kRippleMin});
+  }
+  return out;
+}
+
+double chance_threshold(int candidates, double probability) {
+  const double target = probability / std::max(candidates, 1);
+  double low = 0.0, high = 200.0;
+  for (int i = 0; i < 80; ++i) {
+    const double middle = 0.5 * (low + high);
+    (std::erfc(std::sqrt(middle / 2.0)) > target ? low : high) = middle;
+  }
+  return low;
+}
+
+Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs) {
+  Naming out;
+  out.threshold = chance_threshold(static_cast<int>(engine.campaign().slots.size()), kFalseName);
+  out.ripples = find_ripples(engine.campaign(), out.threshold);
+  engine.fit_machine(jobs);
+  engine.update_noise();
+  for (int i = 0; i < 2; ++i) {
+    engine.accept(engine.refine({}, kSettling));
+    engine.update_noise();
+  }
+  out.sharp = {engine.state(), engine.campaign().noise, true};
+  out.nominal = engine.nominal_from(engine.state());
+  out.nominal_groups = score_groups(engine);
+  double first_gain = 0.0;
+  // What left-out experiments do not confirm may have stood before what they would.
+  for (int round = 0; round < kRounds && !stop(); ++round) {
+    const std::size_t dropped = out.not_confirmed.size();
+    first_gain = 0.0;
+    add_effects(engine, out, first_gain, stop, jobs);
+    if (!stop()) out.last_screen = engine.screen();
+    drop_unconfirmed(engine, out);
+    if (out.not_confirmed.size() == dropped || out.unknown) break;
+  }
+  find_classes(engine, out, stop, jobs);
+  find_intervals(engine, out);
+  drop_doubtful(engine, out, stop, jobs);
+  if (stop()) return out;
+
+  if (out.unknown) return out;
+
+  // What is left: any cause? An effect that it makes superfluous was only its shadow.
+  for (;;) {
+    const std::vector<UnknownGroup> groups = score_groups(engine);
+    const double bound = chance_threshold(static_cast<int>(groups.size()), kFalseUnknown);
+    const auto left = std::find_if(groups.begin(), groups.end(), [&](const UnknownGroup& group) {
+      return group.chi2 > bound && group.gain > bound && group.gain > kShareOfFirst * first_gain &&
+             group.size > 1.0 && group.left_out_gain > kLeftOutMin &&
+             !is_own(engine, engine.accepted(), group);
+    });
+    if (left == groups.end()) return out;
+    out.unknown = *left;
+    const std::vector<int> set = engine.accepted();
+    std::vector<int> kept;
+    for (std::size_t i = 0; i < set.size(); ++i) {
+      if (left->accepted_chi2[i] > out.threshold) kept.push_back(set[i]);
+    }
+    if (kept.size() == set.size() || stop()) return out;
+    engine.accept(engine.refine(kept));
+    engine.update_noise();
+    find_classes(engine, out, stop, jobs);
+    find_intervals(engine, out);
+  }
+}
+
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,36 @@
+// What no belt drive does, whatever it is like: wrong units and signs, channels that stand still,
+// logs of two machines, the same log twice. Where something of the kind is there, no name is given.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/diagnose/data/diagnosis.h"
+#include "tools/diagnose/data/experiment_data.h"
+
+namespace beltgrip::diagnose {
+
+struct Doubts {
+  std::vector<std::string> notes;
+  std::optional<Unexplained> impossible;
+};
+
+// The same data under two names would count as two experiments that agree in everything.
+void drop_copies(std::vector<SignalTable>& tables, Doubts& doubts);
+
+// An optional channel that some experiments have and others have not would make of the others what
+// it is not: left out of all.
+void drop_uneven_channels(std::vector<ExperimentData>& runs, Doubts& doubts);
+
+void check_same_machine(const std::vector<ExperimentData>& runs,
+                        const estimator::VariatorParameters& variator, Doubts& doubts);
+void check_torques(const std::vector<ExperimentData>& runs, Doubts& doubts);
+// By what was measured alone: the fitted mu_max may lie far beyond what the data reached.
+void check_friction(const std::vector<ExperimentData>& runs,
+                    const estimator::VariatorParameters& variator, Doubts& doubts);
+// By the fit of the machine's constants.
+void check_fitted_friction(const std::map<std::string, Interval>& machine, Doubts& doubts);
+
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,661 @@
+#include "tools/diagnose/infer/engine.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "estimator/statistics/order.h"
+#include "tools/diagnose/infer/parallel.h"
+#include "tools/diagnose/model/curve_family.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kSaturatedPrecision = 50.0;
+constexpr std::array<double, 3> kCoarseness{30.0, 8.0, 2.0};
+constexpr double kCovered = 2.0;     // rms in units of noise that is told apart from none by eye
+constexpr int kAttempts = 10;        // to find a step that gains, each shorter than the last
+constexpr double kLongStep = 0.05;   // in tolerances and usual sizes
+constexpr double kWorthwhile = 1.0;  // of the log likelihood
+constexpr double kSameStep = 1e-3;   // apart by less of their length: both fail
+constexpr double kCurveFault = 0.1;  // one sigma of curve_faults()
+constexpr double kSizePrior = 3.0;   // one sigma of an effect's size, in usual sizes
+
+bool stop_used(const Campaign& campaign, int stop) {
+  for (const ExperimentData& run : campaign.runs) {
+    for (std::size_t k = 0; k < run.valid.size(); ++k) {
+      if (run.valid[k] && run.stop[k] == stop) return true;
+    }
+  }
+  return false;
+}
+
+// Huber weights from the present residuals.
+void reweigh(const Campaign& campaign, const ModelState& state, Whitening& whitening) {
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    const ExperimentData& data = campaign.runs[e];
+    if (data.valid_count == 0) continue;
+    const Residuals at = residuals_of(campaign, static_cast<int>(e), state);
+    for (std::size_t kind = 0; kind < kResidualKinds; ++kind) {
+      if (at.value[kind].size() == 0) continue;
+      std::vector<double> size;
+      for (int k = 0; k < data.size(); ++k) {
+        if (data.valid[static_cast<std::size_t>(k)]) size.push_back(std::abs(at.value[kind][k]));
+      }
+      std::vector<double> sorted = size;
+      const double bound = 6.0 * estimator::kSigmaPerMedian * estimator::median(sorted) + 1.0;
+      for (std::size_t i = 0; i < size.size(); ++i) {
+        whitening.weight[e][kind][static_cast<Index>(i)] =
+            size[i] > bound ? std::sqrt(bound / size[i]) : 1.0;
+      }
+    }
+  }
+}
+
+bool torque_varies(const std::vector<ExperimentData>& runs) {
+  constexpr double kVaried = 0.25;  // of its middle
+  std::vector<double> all;
+  for (const ExperimentData& run : runs) {
+    for (int k = 0; k < run.size(); ++k) {
+      if (run.valid[static_cast<std::size_t>(k)]) all.push_back(run.torque.slow[k]);
+    }
+  }
+  if (all.empty()) return false;
+  std::sort(all.begin(), all.end());
+  const std::size_t tail = all.size() / 100;
+  return all[all.size() - 1 - tail] - all[tail] > kVaried * std::abs(all[all.size() / 2]);
+}
+
+// What the model leaves of the data, rms in units of their noise: of the kind where that is most.
+double leaves(const Campaign& campaign, const ModelState& state) {
+  std::array<double, kResidualKinds> squares{}, count{};
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    if (campaign.runs[e].valid_count == 0) continue;
+    const Residuals at = residuals_of(campaign, static_cast<int>(e), state);
+    for (std::size_t kind = 0; kind < kResidualKinds; ++kind) {
+      const Eigen::ArrayXd& value = at.value[kind];
+      squares[kind] += value.square().sum();
+      count[kind] += static_cast<double>((value != 0.0).count());
+    }
+  }
+  double most = 0.0;
+  for (std::size_t kind = 0; kind < kResidualKinds; ++kind) {
+    most = std::max(most, squares[kind] / std::max(count[kind], 1.0));
+  }
+  return std::sqrt(most);
+}
+
+}  // namespace
+
+Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model) {
+  Campaign out;
+  out.runs = std::move(runs);
+  out.variator = model.variator;
+  out.nuisances = nuisances_of(model);
+  out.slots = make_slots(out.runs);
+  out.switched_on = slot_values(model, out.slots);
+  out.torque_varies = torque_varies(out.runs);
+  if (const auto ripple = model.effects.find("speed_ripple"); ripple != model.effects.end()) {
+    out.known_ripples = ripple->second.parameters;
+  }
+  for (const ExperimentData& run : out.runs) {
+    out.has_balance |= run.valid_count > 0 && run.torque_s.present;
+    out.has_tracking |= run.valid_count > 0 && run.command.present;
+  }
+  return out;
+}
+
+Engine::Engine(Campaign campaign) : campaign_(std::move(campaign)) {
+  state_.nuisance.resize(kNuisanceCount);
+  for (int i = 0; i < kNuisanceCount; ++i) {
+    state_.nuisance[i] = campaign_.nuisances[static_cast<std::size_t>(i)].nominal;
+  }
+  state_.effects = VectorXd::Zero(static_cast<Index>(campaign_.slots.size()));
+  const bool low = stop_used(campaign_, kLowStop);
+  const bool overdrive = stop_used(campaign_, kOverdriveStop);
+  for (int i = 0; i < kNuisanceCount; ++i) {
+    const bool is_low =
+        i == kLnPeakSlipLow || (i >= kShapeLow && i <= kEndOfShapes) || i == kLnRatioLow;
+    const bool is_overdrive = i == kLnPeakSlipOverdrive ||
+                              (i >= kShapeOverdrive && i < kShapeLow) || i == kLnRatioOverdrive;
+    if ((is_low && !low) || (is_overdrive && !overdrive)) continue;
+    if (i == kSecondaryInertia_kgm2 && !campaign_.has_balance) continue;
+    if ((i == kCommandGain || i == kCommandOffset_Pa) && !campaign_.has_tracking) continue;
+    nuisances_.push_back(i);
+  }
+}
+
+double Engine::scale(int parameter) const {
+  return parameter < kNuisanceCount
+             ? campaign_.nuisances[static_cast<std::size_t>(parameter)].tolerance
+             : campaign_.slots[static_cast<std::size_t>(parameter - kNuisanceCount)].row->typical;
+}
+
+Prior Engine::prior(const std::vector<int>& parameters, const ModelState& at) const {
+  const auto n = static_cast<Index>(parameters.size());
+  Prior out{VectorXd::Zero(n), VectorXd::Ones(n)};
+  for (Index j = 0; j < n; ++j) {
+    const int p = parameters[static_cast<std::size_t>(j)];
+    if (const int first = first_knot(p); first >= 0) {
+      for (int i = 0; i < kShapeKnots; ++i) {
+        const int knot = first + i;
+        out.pull[j] +=
+            curve_modes_inverse()(p - first, i) *
+            (campaign_.nuisances[static_cast<std::size_t>(knot)].nominal - at.nuisance[knot]);
+      }
+    } else if (p < kNuisanceCount) {
+      out.pull[j] =
+          (campaign_.nuisances[static_cast<std::size_t>(p)].nominal - at.nuisance[p]) / scale(p);
+    } else {
+      out.pull[j] = -at.effects[p - kNuisanceCount] / scale(p);
+      out.precision[j] = 1.0 / (kSizePrior * kSizePrior);
+    }
+  }
+  return out;
+}
+
+std::vector<int> Engine::with_nuisances(const std::vector<int>& slots) const {
+  std::vector<int> out = nuisances_;
+  for (const int slot : slots) out.push_back(kNuisanceCount + slot);
+  return out;
+}
+
+std::vector<int> Engine::columns_of(const std::vector<int>& parameters) const {
+  std::vector<int> out;
+  for (const int p : parameters) {
+    const auto found = std::find(summary_parameters_.begin(), summary_parameters_.end(), p);
+    out.push_back(static_cast<int>(found - summary_parameters_.begin()));
+  }
+  return out;
+}
+
+Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int>& parameters,
+                                 const ModelState& start, const Whitening& whitening,
+                                 const Scatter& scatter, int iterations,
+                                 int scatter_iterations) const {
+  VectorXd scales(static_cast<Index>(parameters.size()));
+  for (Index j = 0; j < scales.size(); ++j) {
+    scales[j] = scale(parameters[static_cast<std::size_t>(j)]);
+  }
+  std::vector<int> columns(parameters.size());
+  for (std::size_t i = 0; i < columns.size(); ++i) columns[i] = static_cast<int>(i);
+  const auto residuals_at = [&](const ModelState& state) {
+    std::vector<Residuals> out(campaign.runs.size());
+    for (std::size_t e = 0; e < out.size(); ++e) {
+      if (campaign.runs[e].valid_count == 0) continue;
+      out[e] = residuals_of(campaign, static_cast<int>(e), state);
+    }
+    return out;
+  };
+  const auto summaries_at = [&](const ModelState& state, const std::vector<Residuals>& at,
+                                const std::vector<int>& wanted) {
+    std::vector<Summary> out;
+    for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+      if (campaign.runs[e].valid_count == 0) continue;
+      out.push_back(
+          summarise(campaign, static_cast<int>(e), state, at[e], wanted, scales, whitening));
+    }
+    add_curve_bounds(state, wanted, out);
+    return out;
+  };
+  // Log likelihood of staying at a state.
+  const auto standing = [&](const ModelState& state, const std::vector<Summary>& summaries,
+                            const Scatter& with) {
+    const Fit none = fit_linear(summaries, {}, Prior{VectorXd(0), VectorXd(0)}, with, 0);
+    const Prior here = prior(parameters, state);
+    return none.log_likelihood - 0.5 * here.pull.cwiseAbs2().dot(here.precision);
+  };
+  Optimum best;
+  best.state = start;
+  std::vector<Residuals> at = residuals_at(start);
+  best.summaries = summaries_at(start, at, parameters);
+  best.fit =
+      fit_linear(best.summaries, columns, prior(parameters, start), scatter, scatter_iterations);
+  best.objective = standing(start, best.summaries, best.fit.scatter);
+  double damping = 1e-4;
+  for (int i = 0; i < iterations; ++i) {
+    VectorXd diagonal = VectorXd::Zero(scales.size());
+    for (const Summary& each : best.summaries) {
+      diagonal += each.aa.diagonal().head(scales.size());
+    }
+    const Prior here = prior(parameters, best.state);
+    double gained = 0.0;
+    bool moved = false;
+    VectorXd failed = VectorXd::Zero(scales.size());  // the last step that did
+    for (int attempt = 0; attempt < kAttempts && !moved; ++attempt) {
+      Prior damped = here;
+      damped.precision += damping * diagonal;
+      damped.pull = here.pull.cwiseProduct(here.precision).cwiseQuotient(damped.precision);
+      const Fit step = fit_linear(best.summaries, columns, damped, best.fit.scatter, 0);
+      if ((step.step - failed).norm() < kSameStep * failed.norm()) {
+        damping = std::clamp(10.0 * damping, 1e-5, 1e6);
+        continue;
+      }
+      const ModelState from = best.state;
+      gained = 0.0;
+      double share = 1.0;
+      // A long step for next to nothing has gone past what it was made for.
+      const bool is_long = step.step.cwiseAbs().maxCoeff() > kLongStep;
+      for (double tried = 1.0; tried > 0.1; tried *= 0.5) {
+        ModelState next = from;
+        move(parameters, step.step, tried, next);
+        std::vector<Residuals> there = residuals_at(next);
+        const double gain =
+            standing(next, summaries_at(next, there, {}), best.fit.scatter) - best.objective;
+        if (gain <= gained) break;  // a shorter one gains less still
+        gained = gain;
+        share = tried;
+        best.state = next;
+        at = std::move(there);
+        if (gained > kWorthwhile || !is_long) break;
+      }
+      moved = gained > 0.0;
+      failed = step.step;
+      damping = std::clamp(moved && share == 1.0 ? 0.1 * damping : 10.0 * damping, 1e-5, 1e6);
+    }
+    if (!moved) break;
+    best.summaries = summaries_at(best.state, at, parameters);
+    best.fit = fit_linear(best.summaries, columns, prior(parameters, best.state), best.fit.scatter,
+                          scatter_iterations);
+    best.objective = standing(best.state, best.summaries, best.fit.scatter);
+    if (gained < 0.02) break;
+  }
+  return best;
+}
+
+void Engine::fit_machine(int jobs) {
+  const NoiseLevels measured = estimate_noise_levels(campaign_, state_);
+  campaign_.noise = measured;
+  campaign_.slip_noise_share = estimate_slip_noise_shares(campaign_, state_);
+  for (const double coarseness : kCoarseness) {
+    coarse_.push_back(campaign_);
+    coarse_.back().noise = measured.times(coarseness);
+  }
+  const ModelState start = state_;
+  const double ln_mu_seen = ln_mu_reached();
+  struct Attempt {
+    ModelState first, last;
+    std::vector<ModelState> way;
+    Whitening whitening;
+    double objective = 0.0;
+  };
+  constexpr std::array kPeaks{0.012, 0.02, 0.035};
+  std::array<Attempt, kPeaks.size()> attempts;
+  in_parallel(jobs, attempts.size(), [&](std::size_t i) {
+    Attempt& attempt = attempts[i];
+    ModelState state = start;
+    state.nuisance[kLnMuMax] = ln_mu_seen;
+    state.nuisance[kLnPeakSlipOverdrive] = std::log(kPeaks[i]);
+    state.nuisance[kLnPeakSlipLow] = std::log(1.4 * kPeaks[i]);
+    attempt.first = state;
+    // From a coarse look to the sharp one: far from the optimum every misfit is beyond all noise.
+    Whitening& whitening = attempt.whitening;
+    whitening = identity_whitening(campaign_);
+    for (const Campaign& coarse : coarse_) {
+      state = minimise(coarse, nuisances_, state, whitening, default_scatter(), 8, 0).state;
+      reweigh(coarse, state, whitening);
+      attempt.way.push_back(state);
+    }
+    for (const int iterations : {8, 6}) {
+      state =
+          minimise(campaign_, nuisances_, state, whitening, default_scatter(), iterations, 0).state;
+      reweigh(campaign_, state, whitening);
+    }
+    // The same measure for every start: no weights, scatter between experiments counted.
+    attempt.last = state;
+    attempt.objective = minimise(coarse_.back(), nuisances_, state, identity_whitening(campaign_),
+                                 default_scatter(), 0, 0)
+                            .objective;
+  });
+  const Attempt& best = *std::max_element(
+      attempts.begin(), attempts.end(),
+      [](const Attempt& a, const Attempt& b) { return a.objective < b.objective; });
+  state_ = best.last;
+  first_ = best.first;
+  way_ = best.way;
+  whitening_ = best.whitening;
+}
+
+Nominal Engine::nominal_from(const ModelState& sharp) const {
+  if (leaves(campaign_, sharp) < kCovered) return {sharp, campaign_.noise, true};
+  const Whitening whitening = identity_whitening(campaign_);
+  Nominal out;
+  out.is_covered = false;
+  for (std::size_t i = coarse_.size(); i-- > 0;) {
+    const Campaign& coarse = coarse_[i];
+    out.noise = coarse.noise;
+    out.state = minimise(coarse, nuisances_, way_[i], whitening, default_scatter(), 8, 0).state;
+    if (leaves(coarse, out.state) < kCovered) break;
+  }
+  return out;
+}
+
+Hypothesis Engine::refine_from_afar(const std::vector<int>& slots) const {
+  const std::vector<int> parameters = with_nuisances(slots);
+  ModelState state = first_;
+  const Whitening whitening = identity_whitening(campaign_);
+  for (const Campaign& coarse : coarse_) {
+    state = minimise(coarse, parameters, state, whitening, default_scatter(), 8, 0).state;
+  }
+  return refine_from(state, slots, 8);
+}
+
+// Friction that the data reach: what is left above belongs to single samples.
+double Engine::ln_mu_reached() const {
+  std::vector<double> seen;
+  for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
+    const ExperimentData& data = campaign_.runs[e];
+    if (data.valid_count == 0) continue;
+    const Quantities q = evaluate(data, static_cast<int>(e), campaign_.variator, state_.nuisance,
+                                  Effects{&campaign_.slots, campaign_.switched_on});
+    for (int k = 0; k < data.size(); ++k) {
+      if (data.valid[static_cast<std::size_t>(k)]) {
+        seen.push_back(std::abs(q.belt_torque[k]) / q.capacity[k]);
+      }
+    }
+  }
+  const double nominal = state_.nuisance[kLnMuMax];
+  if (seen.empty()) return nominal;
+  return nominal + std::log(std::clamp(estimator::at_rank(seen, seen.size() * 97 / 100), 0.2, 5.0));
+}
+
+void Engine::update_noise() {
+  std::vector<int> slots(campaign_.slots.size());
+  for (std::size_t i = 0; i < slots.size(); ++i) slots[i] = static_cast<int>(i);
+  summary_parameters_ = with_nuisances(slots);
+  VectorXd scales(static_cast<Index>(summary_parameters_.size()));
+  for (Index j = 0; j < scales.size(); ++j) {
+    scales[j] = scale(summary_parameters_[static_cast<std::size_t>(j)]);
+  }
+  // A tight prior on sizes: together, all effects could explain the noise itself.
+  Prior all = prior(summary_parameters_, state_);
+  for (Index j = static_cast<Index>(nuisances_.size()); j < all.precision.size(); ++j) {
+    all.precision[j] = kSaturatedPrecision;
+    all.pull[j] = 0.0;
+  }
+  std::vector<RawColumns> raw;
+  raw.reserve(campaign_.runs.size());
+  for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
+    const auto run = static_cast<int>(e);
+    raw.push_back(raw_columns(campaign_, run, state_, residuals_of(campaign_, run, state_),
+                              summary_parameters_, scales, true));
+  }
+  for (int pass = 0; pass < 2; ++pass) whitening_ = fit_whitening(campaign_, raw, all, whitening_);
+  summaries_.clear();
+  for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
+    if (campaign_.runs[e].valid_count == 0) continue;
+    summaries_.push_back(summary_of(campaign_, static_cast<int>(e), raw[e], whitening_));
+  }
+  add_curve_bounds(state_, summary_parameters_, summaries_);
+  const std::vector<int> parameters = with_nuisances(accepted_);
+  base_ = fit_linear(summaries_, columns_of(parameters), prior(parameters, state_),
+                     default_scatter(), 25);
+}
+
+double Engine::degrees(double with_scatter, double without_scatter) const {
+  const double share = std::clamp(1.0 - with_scatter / std::max(without_scatter, 1e-300), 0.0, 1.0);
+  const double between = std::max(1.0, static_cast<double>(summaries_.size()) - 2.0 -
+                                           static_cast<double>(accepted_.size())) +
+                         kScatterPriorRuns;
+  return between / std::max(share * share, 1e-6);
+}
+
+bool Engine::scatters_unusually() const {
+  constexpr double kUnusual = 3.0;  // times the usual
+  return (base_.scatter.variance > kUnusual * kUnusual * default_scatter().variance).any();
+}
+
+std::vector<Score> Engine::screen_with_usual_scatter() const {
+  const std::vector<int> base = with_nuisances(accepted_);
+  return screen(fit_linear(summaries_, columns_of(base), prior(base, state_), default_scatter(), 0),
+                0);
+}
+
+std::vector<Score> Engine::screen(const Fit& from, int scatter_steps) const {
+  std::vector<Score> out;
+  const std::vector<int> base = with_nuisances(accepted_);
+  const std::vector<int> base_columns = columns_of(base);
+  const Prior base_prior = prior(base, state_);
+  std::vector<int> curve;
+  for (const int i : nuisances_) {
+    if (i <= kEndOfShapes) curve.push_back(i);
+  }
+  const std::vector<int> curve_columns = columns_of(curve);
+  const auto curve_size = static_cast<Index>(curve.size());
+  const Prior any_curve{VectorXd::Zero(curve_size), VectorXd::Constant(curve_size, 1e-3)};
+  for (int slot = 0; slot < static_cast<int>(campaign_.slots.size()); ++slot) {
+    if (std::find(accepted_.begin(), accepted_.end(), slot) != accepted_.end()) continue;
+    std::vector<int> parameters = base;
+    parameters.push_back(kNuisanceCount + slot);
+    const std::vector<int> columns = columns_of(parameters);
+    const Fit fit =
+        fit_linear(summaries_, columns, prior(parameters, state_), from.scatter, scatter_steps);
+    const Information info =
+        information_on(summaries_, base_columns, base_prior, columns.back(), fit.scatter);
+    Score score;
+    score.slot = slot;
+    double energy = 0.0;
+    for (const Summary& each : summaries_) energy += each.aa(columns.back(), columns.back());
+    score.absorbed = energy > 0.0 ? 1.0 - info.without_scatter / energy : 1.0;
+    const Information beside_curve =
+        information_on(summaries_, curve_columns, any_curve, columns.back(), fit.scatter);
+    score.in_curve = energy > 0.0 ? 1.0 - beside_curve.without_scatter / energy : 1.0;
+    const double unit = scale(kNuisanceCount + slot);
+    const auto last = fit.step.size() - 1;
+    score.value = fit.step[last] * unit;
+    score.sigma = std::sqrt(std::max(fit.covariance(last, last), 0.0)) * unit;
+    score.chi2 = chi2_of_student(fit.step[last] / std::sqrt(fit.covariance(last, last)),
+                                 degrees(info.with_scatter, info.without_scatter));
+    score.gain = 2.0 * (fit.log_likelihood - from.log_likelihood);
+    out.push_back(score);
+  }
+  return out;
+}
+
+bool Engine::is_constant(int slot) const {
+  constexpr double kSame = 1.0 - 1e-3;  // of the column's energy
+  const int column = columns_of({kNuisanceCount + slot}).front();
+  const std::vector<int> constants = columns_of(nuisances_);
+  const auto n = static_cast<Eigen::Index>(constants.size());
+  MatrixXd gram = MatrixXd::Zero(n, n);
+  VectorXd along = VectorXd::Zero(n);
+  double energy = 0.0;
+  for (const Summary& each : summaries_) {
+    energy += each.aa(column, column);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const int row = constants[static_cast<std::size_t>(i)];
+      along[i] += each.aa(row, column);
+      for (Eigen::Index j = 0; j < n; ++j) {
+        gram(i, j) += each.aa(row, constants[static_cast<std::size_t>(j)]);
+      }
+    }
+  }
+  const double explained = along.dot(gram.completeOrthogonalDecomposition().solve(along));
+  return energy > 0.0 && explained > kSame * energy;
+}
+
+Engine::Replacement Engine::add(const std::vector<int>& slots) const {
+  const std::vector<int> parameters = with_nuisances(slots);
+  const Fit fit =
+      fit_linear(summaries_, columns_of(parameters), prior(parameters, state_), base_.scatter, 3);
+  Replacement out{2.0 * (fit.log_likelihood - base_.log_likelihood), state_, state_};
+  move(parameters, fit.step, 1.0, out.state);
+  return out;
+}
+
+std::vector<Summary> Engine::summaries_without(const std::vector<int>& slots) const {
+  std::vector<Summary> moved = summaries_;
+  for (const int slot : slots) {
+    const int column = columns_of({kNuisanceCount + slot}).front();
+    const double back = -state_.effects[slot] / scale(kNuisanceCount + slot);
+    for (Summary& each : moved) {  // the residual's column after the step back
+      const auto last = each.aa.rows() - 1;
+      const double power = each.aa(last, last) + 2.0 * back * each.aa(column, last) +
+                           back * back * each.aa(column, column);
+      const VectorXd cross = each.aa.col(last) + back * each.aa.col(column);
+      each.aa.col(last) = cross;
+      each.aa.row(last) = cross.transpose();
+      each.aa(last, last) = power;
+      each.ua.col(last) += back * each.ua.col(column);
+    }
+  }
+  return moved;
+}
+
+Engine::Replacement Engine::replace(const std::vector<int>& slots, int instead_of) const {
+  const std::vector<int> parameters = with_nuisances(slots);
+  const std::vector<Summary> without = summaries_without({instead_of});
+  const Fit fit =
+      fit_linear(without, columns_of(parameters), prior(parameters, state_), base_.scatter, 3);
+  Replacement out{2.0 * (fit.log_likelihood - base_.log_likelihood), state_, state_};
+  out.state.effects[instead_of] = 0.0;
+  out.beside = out.state;
+  move(parameters, fit.step, 1.0, out.state);
+  if (slots.empty()) return out;
+  const std::vector<int> alone(parameters.end() - static_cast<std::ptrdiff_t>(slots.size()),
+                               parameters.end());
+  move(alone, fit_linear(without, columns_of(alone), prior(alone, state_), base_.scatter, 0).step,
+       1.0, out.beside);
+  return out;
+}
+
+void Engine::add_curve_bounds(const ModelState& state, const std::vector<int>& parameters,
+                              std::vector<Summary>& summaries) const {
+  if (summaries.empty()) return;
+  const Index last = summaries.front().aa.rows() - 1;
+  VectorXd row(last + 1);
+  MatrixXd all = MatrixXd::Zero(last + 1, last + 1);
+  for (const int first : {kShapeOverdrive, kShapeLow}) {
+    for (const CurveFault& each : curve_faults(
+             std::span<const double, kShapeKnots>(state.nuisance.data() + first, kShapeKnots))) {
+      row.setZero();
+      for (std::size_t j = 0; j < parameters.size(); ++j) {
+        if (first_knot(parameters[j]) == first) {
+          row[static_cast<Index>(j)] = each.by_mode[parameters[j] - first];
+        }
+      }
+      row[last] = each.slope;
+      all += row * row.transpose();
+    }
+  }
+  all /= kCurveFault * kCurveFault * static_cast<double>(summaries.size());
+  for (Summary& each : summaries) each.aa += all;
+}
+
+void Engine::move(const std::vector<int>& parameters, const VectorXd& step, double share,
+                  ModelState& state) const {
+  for (std::size_t j = 0; j < parameters.size(); ++j) {
+    const double by = share * step[static_cast<Index>(j)] * scale(parameters[j]);
+    if (const int first = first_knot(parameters[j]); first >= 0) {
+      state.nuisance.segment(first, kShapeKnots) += by * curve_modes().col(parameters[j] - first);
+    } else if (parameters[j] < kNuisanceCount) {
+      state.nuisance[parameters[j]] += by;
+    } else {
+      const int slot = parameters[j] - kNuisanceCount;
+      const EffectRow& row = *campaign_.slots[static_cast<std::size_t>(slot)].row;
+      state.effects[slot] = std::clamp(state.effects[slot] + by, row.low, row.high);
+    }
+  }
+}
+
+Hypothesis Engine::refine(const std::vector<int>& slots, int iterations) const {
+  return refine_from(state_, slots, iterations);
+}
+
+Hypothesis Engine::refine_from(const ModelState& from, const std::vector<int>& slots,
+                               int iterations) const {
+  Hypothesis out;
+  out.slots = slots;
+  ModelState start = from;
+  for (Index i = 0; i < start.effects.size(); ++i) {
+    if (std::find(slots.begin(), slots.end(), static_cast<int>(i)) == slots.end()) {
+      start.effects[i] = 0.0;
+    }
+  }
+  const std::vector<int> parameters = with_nuisances(slots);
+  VectorXd scales(static_cast<Index>(parameters.size()));
+  for (Index j = 0; j < scales.size(); ++j) {
+    scales[j] = scale(parameters[static_cast<std::size_t>(j)]);
+  }
+  std::vector<int> columns(parameters.size());
+  for (std::size_t i = 0; i < columns.size(); ++i) columns[i] = static_cast<int>(i);
+  const Optimum optimum =
+      minimise(campaign_, parameters, start, whitening_, base_.scatter, iterations, 6);
+  const ModelState& best = optimum.state;
+  const Fit& fit = optimum.fit;
+  const std::vector<Summary>& summaries = optimum.summaries;
+  const double here = optimum.objective;
+  out.state = best;
+  out.fit = fit;
+  out.log_likelihood = here;
+  out.log_evidence = here;
+  for (std::size_t s = 0; s < slots.size(); ++s) {
+    const auto j = static_cast<Index>(nuisances_.size() + s);
+    const double variance = std::max(fit.covariance(j, j), 1e-300);
+    const double value = best.effects[slots[s]] / scales[j];
+    std::vector<int> others = columns;
+    others.erase(others.begin() + j);
+    std::vector<int> other_parameters = parameters;
+    other_parameters.erase(other_parameters.begin() + j);
+    const Information info = information_on(summaries, others, prior(other_parameters, best),
+                                            static_cast<int>(j), fit.scatter);
+    out.degrees.push_back(degrees(info.with_scatter, info.without_scatter));
+    out.chi2.push_back(chi2_of_student(value / std::sqrt(variance), out.degrees.back()));
+    // Occam: width of the posterior over that of the prior (its height is in the likelihood).
+    out.log_evidence += 0.5 * std::log(variance / (kSizePrior * kSizePrior));
+  }
+  return out;
+}
+
+bool Engine::curve_is_possible(const ModelState& state) {
+  constexpr double kStep = 0.05, kFall = 0.02;  // of mu_max
+  constexpr double kFaultMost = 2.0;            // sigmas
+  double faults = 0.0;
+  for (const int first : {kShapeOverdrive, kShapeLow}) {
+    const std::span<const double, kShapeKnots> departure(state.nuisance.data() + first,
+                                                         kShapeKnots);
+    const CurveShape curve(departure, 0.0);
+    double highest = 0.0;
+    for (double x = kStep; x < 1.0; x += kStep) {
+      const double here = curve.evaluate(x).value;
+      if (here < highest - kFall) return false;
+      highest = std::max(highest, here);
+    }
+    for (const CurveFault& each : curve_faults(departure)) faults += each.slope * each.slope;
+  }
+  return faults <= kFaultMost * kFaultMost * kCurveFault * kCurveFault;
+}
+
+void Engine::accept(const Hypothesis& hypothesis) {
+  accepted_ = hypothesis.slots;
+  state_ = hypothesis.state;
+}
+
+double Engine::left_out_gain(int without) const {
+  const auto density = [&](const std::vector<Summary>& summaries, const std::vector<int>& set) {
+    const std::vector<int> parameters = with_nuisances(set);
+    return left_out_density(summaries, columns_of(parameters), prior(parameters, state_));
+  };
+  std::vector<int> fewer = accepted_;
+  std::erase(fewer, without);
+  return density(summaries_, accepted_) - density(summaries_without({without}), fewer);
+}
+
+std::vector<double> Engine::left_out_gains() const {
+  const auto densities = [&](const std::vector<Summary>& summaries, const std::vector<int>& set) {
+    const std::vector<int> parameters = with_nuisances(set);
+    return left_out_densities(summaries, columns_of(parameters), prior(parameters, state_));
+  };
+  std::vector<double> out = densities(summaries_, accepted_);
+  const std::vector<double> without = densities(summaries_without(accepted_), {});
+  for (std::size_t e = 0; e < out.size(); ++e) out[e] -= without[e];
+  return out;
+}
+
+}  // namespace beltgrip::diagnose

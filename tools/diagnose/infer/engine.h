@@ -1,0 +1,149 @@
+// Fits: the nominal machine to the data, the noise that is left, and any set of effects jointly
+// with the machine's constants. All hypotheses at one stage share whitening and weights, so that
+// their likelihoods compare.
+#pragma once
+
+#include <vector>
+
+#include "tools/diagnose/infer/infer.h"
+#include "tools/diagnose/model/model_file.h"
+
+namespace beltgrip::diagnose {
+
+struct Hypothesis {
+  std::vector<int> slots;
+  ModelState state;             // at the optimum
+  Fit fit;                      // linear fit there; columns: active nuisances, then slots
+  double log_likelihood = 0.0;  // with priors on the machine's constants and the sizes
+  double log_evidence = 0.0;    // sizes integrated out
+  std::vector<double> chi2;     // per slot: equivalent chi-square(1) of its being there
+  std::vector<double> degrees;  // per slot: of freedom
+};
+
+// Of Score::in_curve. More: in these experiments the effect is no other thing than a friction curve
+// that runs otherwise.
+inline constexpr double kInCurveMax = 0.998;
+
+struct Score {
+  int slot = 0;
+  double chi2 = 0.0;      // equivalent chi-square(1), sparse scatter counted
+  double gain = 0.0;      // of twice the log likelihood
+  double value = 0.0;     // linear estimate
+  double sigma = 0.0;     // its one sigma
+  double absorbed = 0.0;  // share of the column's energy that the machine's constants explain
+  double in_curve = 0.0;  // that the friction curve alone could explain, however it runs
+};
+
+// The machine without effects, as near to the data as its constants alone lead it. A fit by the
+// sharp noise of the sensors lets scatter between experiments and correlated noise take over what
+// the machine misses, and then goes far astray: where the machine misses much, it is fitted with
+// as much noise as it leaves.
+struct Nominal {
+  ModelState state;
+  NoiseLevels noise;       // that covers what it leaves
+  bool is_covered = true;  // the sensors' own noise does
+};
+
+class Engine {
+ public:
+  explicit Engine(Campaign campaign);
+
+  const Campaign& campaign() const { return campaign_; }
+  const ModelState& state() const { return state_; }
+  const std::vector<int>& accepted() const { return accepted_; }
+  const std::vector<Summary>& summaries() const { return summaries_; }
+  const Whitening& whitening() const { return whitening_; }
+  const std::vector<int>& active_nuisances() const { return nuisances_; }
+
+  // Constants of the nominal machine from the data: robust, from several starts.
+  void fit_machine(int jobs = 1);
+  // sharp: the fit of the machine alone by the noise of the sensors.
+  Nominal nominal_from(const ModelState& sharp) const;
+  // Noise model and matrices at the present state; call after fit_machine and accept.
+  void update_noise();
+  // All slots one at a time on top of the accepted ones.
+  std::vector<Score> screen() const { return screen(base_, kScatterSteps); }
+  // The same as if experiments scattered as healthy ones do: where they seem to scatter far more,
+  // that may be the effect that is looked for, and with so much scatter nothing of it is seen.
+  std::vector<Score> screen_with_usual_scatter() const;
+  bool scatters_unusually() const;
+  // Full non-linear fit of a set of slots (all of them, accepted or not).
+  Hypothesis refine(const std::vector<int>& slots, int iterations = 5) const;
+  Hypothesis refine_from(const ModelState& start, const std::vector<int>& slots,
+                         int iterations = 5) const;
+  // The same from far away: coarse noise first, the machine's constants from where fit_machine
+  // began.
+  Hypothesis refine_from_afar(const std::vector<int>& slots) const;
+  // Gain of twice the log likelihood of a set over the accepted one, linear, and its state.
+  // Of `slots` in place of the accepted one `instead_of`, whose size goes back to zero.
+  struct Replacement {
+    double gain = 0.0;
+    ModelState state;   // of the linear fit: a start for refine_from
+    ModelState beside;  // another: the machine's constants stay, the effects alone are fitted
+  };
+  Replacement add(const std::vector<int>& slots) const;
+  Replacement replace(const std::vector<int>& slots, int instead_of) const;
+  // No friction falls before its peak or grows stiffer on the way to it. A fitted
+  // curve that does has been bent to explain something else; what it hides is no longer near the
+  // present state.
+  static bool curve_is_possible(const ModelState& state);
+  // Makes the hypothesis the present state.
+  void accept(const Hypothesis& hypothesis);
+  // By how much the accepted effects predict experiments that were left out of the fit better than
+  // the same set without one of them: sum over experiments of the log predictive density.
+  double left_out_gain(int without) const;
+  // The same of the whole set over none, per experiment.
+  std::vector<double> left_out_gains() const;
+
+  // An effect that does what a constant of the machine does, or some together, by another name.
+  bool is_constant(int slot) const;
+
+  double scale(int parameter) const;
+  Prior prior(const std::vector<int>& parameters, const ModelState& at) const;
+  std::vector<int> with_nuisances(const std::vector<int>& slots) const;  // parameter numbers
+  double degrees(double with_scatter, double without_scatter) const;
+
+  // Adds to the matrices, in equal shares, what the friction curves of the state do that no
+  // friction does (curve_faults). Columns: the parameters (scaled), others, residual.
+  void add_curve_bounds(const ModelState& state, const std::vector<int>& parameters,
+                        std::vector<Summary>& summaries) const;
+
+  // Adds a scaled step, effects kept within their bounds.
+  void move(const std::vector<int>& parameters, const Eigen::VectorXd& step, double share,
+            ModelState& state) const;
+
+ private:
+  struct Optimum {
+    ModelState state;
+    Fit fit;
+    double objective = 0.0;  // log likelihood with priors, at the state
+    std::vector<Summary> summaries;
+  };
+  // Levenberg-Marquardt on the marginal likelihood, scatter re-estimated on the way.
+  Optimum minimise(const Campaign& campaign, const std::vector<int>& parameters,
+                   const ModelState& start, const Whitening& whitening, const Scatter& scatter,
+                   int iterations, int scatter_iterations) const;
+  static constexpr int kScatterSteps = 8;
+  // from: the fit without the slot; scatter_steps 0: by its scatter.
+  std::vector<Score> screen(const Fit& from, int scatter_steps) const;
+  std::vector<int> columns_of(const std::vector<int>& parameters) const;
+  // The matrices with the sizes of some accepted effects put back to zero.
+  std::vector<Summary> summaries_without(const std::vector<int>& slots) const;
+  double ln_mu_reached() const;
+
+  Campaign campaign_;
+  std::vector<Campaign> coarse_;  // the same with more noise, falling
+  std::vector<ModelState> way_;   // of the best fit of the machine alone: its state behind each
+  ModelState state_;
+  ModelState first_;  // where the best fit of the machine alone began
+  std::vector<int> accepted_;
+  std::vector<int> nuisances_;
+  Whitening whitening_;
+  std::vector<int> summary_parameters_;
+  std::vector<Summary> summaries_;
+  Fit base_;
+};
+
+Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model);
+
+}  // namespace beltgrip::diagnose

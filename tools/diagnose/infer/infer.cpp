@@ -1,0 +1,585 @@
+#include "tools/diagnose/infer/infer.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "estimator/statistics/distributions.h"
+#include "estimator/statistics/order.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kHuber = 3.0;
+constexpr double kScatterCap = 8.0;  // in usual scatters: beyond, it is an effect and not scatter
+
+// One sigma between healthy experiments: what replicates on rigs scatter by.
+constexpr std::array<double, kRandomEffects> kDefaultScatter{4e-3, 1.5e-4, 0.1, 0.02, 0.1, 500.0};
+
+std::array<ResidualColumns, kRandomEffects> random_columns(const Campaign& campaign, int run,
+                                                           const ModelState& state,
+                                                           const Residuals& at) {
+  const auto n = at.foot.size();
+  std::array<ResidualColumns, kRandomEffects> out;
+  QuantityChange level, seat, zero, zero_out, zero_track;
+  level.ln_capacity = ArrayXd::Ones(n);
+  out[0] = propagate(campaign, at, level);
+  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+  // A speed that is held on one step of its rounding is off by the same all along.
+  seat.slip = ArrayXd::Constant(n, std::hypot(1.0, data.rounding_slip / kDefaultScatter[1]));
+  out[1] = propagate(campaign, at, seat);
+  zero.torque = ArrayXd::Ones(n);
+  zero.balance = ArrayXd::Ones(n);
+  out[2] = propagate(campaign, at, zero);
+  QuantityChange peak;
+  peak.torque = ArrayXd::Zero(n);
+  for (Index k = 0; k < n; ++k) {
+    const int stop = data.stop[static_cast<std::size_t>(k)];
+    if (stop == kNoStop) continue;
+    peak.torque[k] =
+        at.slope[k] * at.foot[k] *
+        std::exp(state.nuisance[stop == kLowStop ? kLnPeakSlipLow : kLnPeakSlipOverdrive]);
+  }
+  out[3] = propagate(campaign, at, peak);
+  zero_out.balance = ArrayXd::Ones(n);
+  out[4] = propagate(campaign, at, zero_out);
+  zero_track.tracking = ArrayXd::Ones(n);
+  out[5] = propagate(campaign, at, zero_track);
+  return out;
+}
+
+// The prediction errors of the valid samples, segment by segment, in units of their sigma.
+void whiten(const ExperimentData& data, const Whitening::Filter& filter, const ArrayXd& in,
+            Eigen::Ref<VectorXd> out) {
+  const int full = static_cast<int>(filter.coefficient.size()) - 1;
+  Index row = 0;
+  for (int k = 0; k < data.size();) {
+    if (!data.valid[static_cast<std::size_t>(k)]) {
+      ++k;
+      continue;
+    }
+    int end = k;
+    while (end < data.size() && data.valid[static_cast<std::size_t>(end)]) ++end;
+    const int warm = std::min(full, end - k);
+    for (int order = 0; order < warm; ++order) {
+      const VectorXd& a = filter.coefficient[static_cast<std::size_t>(order)];
+      double e = in[k + order];
+      for (int i = 0; i < order; ++i) e -= a[i] * in[k + order - 1 - i];
+      out[row++] = e / filter.sigma[static_cast<std::size_t>(order)];
+    }
+    if (const Index rest = end - k - warm; rest > 0) {
+      auto block = out.segment(row, rest);
+      const VectorXd& a = filter.coefficient.back();
+      const auto delayed = [&](int by) { return in.segment(k + warm - by, rest).matrix(); };
+      static_assert(Whitening::kOrder == 6);  // one pass over the samples
+      if (full == Whitening::kOrder) {
+        block = (delayed(0) - a[0] * delayed(1) - a[1] * delayed(2) - a[2] * delayed(3) -
+                 a[3] * delayed(4) - a[4] * delayed(5) - a[5] * delayed(6)) /
+                filter.sigma.back();
+      } else {  // not fitted yet: order 0
+        block = delayed(0) / filter.sigma.back();
+      }
+      row += rest;
+    }
+    k = end;
+  }
+}
+
+// Prediction coefficients of all orders up to kOrder (Levinson), from the segments' autocovariance.
+Whitening::Filter levinson(const std::vector<double>& covariance) {
+  Whitening::Filter out;
+  const int order = static_cast<int>(covariance.size()) - 1;
+  const double power = std::max(covariance[0], 1e-12);
+  VectorXd a = VectorXd::Zero(order);
+  double error = power * (1.0 + 1e-6);
+  out.coefficient.push_back(a);
+  out.sigma.push_back(std::sqrt(error));
+  for (int m = 0; m < order; ++m) {
+    double reflection = covariance[static_cast<std::size_t>(m) + 1];
+    for (int i = 0; i < m; ++i) reflection -= a[i] * covariance[static_cast<std::size_t>(m - i)];
+    reflection /= error;
+    VectorXd next = a;
+    next[m] = reflection;
+    for (int i = 0; i < m; ++i) next[i] = a[i] - reflection * a[m - 1 - i];
+    a = next;
+    error *= std::max(1.0 - reflection * reflection, 1e-6);
+    out.coefficient.push_back(a);
+    out.sigma.push_back(std::sqrt(error));
+  }
+  return out;
+}
+
+}  // namespace
+
+Scatter default_scatter() {
+  Scatter out;
+  for (int i = 0; i < kRandomEffects; ++i) {
+    const double s = kDefaultScatter[static_cast<std::size_t>(i)];
+    out.variance[i] = s * s;
+  }
+  return out;
+}
+
+bool parts_experiments(const Scatter& without, const Scatter& with) {
+  constexpr double kMore = 4.0;  // of the variance, on balance of all kinds
+  return (with.variance / without.variance).prod() > kMore;
+}
+
+Whitening identity_whitening(const Campaign& campaign) {
+  Whitening out;
+  for (auto& filter : out.filter) {
+    filter.coefficient = {VectorXd()};
+    filter.sigma = {1.0};
+  }
+  for (const ExperimentData& run : campaign.runs) {
+    out.weight.push_back({ArrayXd::Ones(run.valid_count), ArrayXd::Ones(run.valid_count),
+                          ArrayXd::Ones(run.valid_count)});
+  }
+  return out;
+}
+
+namespace {
+
+std::vector<int> kinds_of(const Campaign& campaign) {
+  std::vector<int> kinds{kFrictionResidual};
+  if (campaign.has_balance) kinds.push_back(kBalanceResidual);
+  if (campaign.has_tracking) kinds.push_back(kTrackingResidual);
+  return kinds;
+}
+
+bool is_zero(const ArrayXd& column) {
+  return std::all_of(column.begin(), column.end(), [](double v) { return v == 0.0; });
+}
+
+// One block per kind of residual; rows: valid samples.
+std::vector<WhiteBlock> whitened(const Campaign& campaign, int run, const RawColumns& raw,
+                                 const Whitening& whitening) {
+  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+  const std::vector<int> kinds = kinds_of(campaign);
+  const Index rows = data.valid_count;
+  const auto& weight = whitening.weight[static_cast<std::size_t>(run)];
+  std::vector<WhiteBlock> out(kinds.size());
+  const bool mixed = campaign.has_balance && whitening.cross != 0.0;
+  for (std::size_t i = kinds.size(); i-- > 0;) {  // friction last: the balance's goes into it
+    const auto kind = static_cast<std::size_t>(kinds[i]);
+    WhiteBlock& block = out[i];
+    const std::vector<int>* beside = mixed && kind == kFrictionResidual ? &out[1].columns : nullptr;
+    for (std::size_t j = 0; j < raw.columns.size(); ++j) {
+      const auto column = static_cast<int>(j);
+      if (!is_zero(raw.columns[j][kind]) ||
+          (beside != nullptr && std::binary_search(beside->begin(), beside->end(), column))) {
+        block.columns.push_back(column);
+      }
+    }
+    block.rows.resize(rows, static_cast<Index>(block.columns.size()));
+    std::size_t next = 0;
+    for (Index c = 0; c < block.rows.cols(); ++c) {
+      const int column = block.columns[static_cast<std::size_t>(c)];
+      const ArrayXd& in = raw.columns[static_cast<std::size_t>(column)][kind];
+      auto to = block.rows.col(c);
+      if (in.size() == 0) {
+        to.setZero();
+      } else {
+        whiten(data, whitening.filter[kind], in, to);
+        to.array() *= weight[kind];
+      }
+      if (beside == nullptr) continue;
+      if (next < beside->size() && (*beside)[next] == column) {
+        to -= whitening.cross * out[1].rows.col(static_cast<Index>(next++));
+      }
+      to /= std::sqrt(1.0 - whitening.cross * whitening.cross);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& state,
+                       const Residuals& residuals, const std::vector<int>& parameters,
+                       const VectorXd& scale, bool with_random, const ExtraColumns& extra) {
+  RawColumns out;
+  out.with_random = with_random;
+  if (!with_random && parameters.empty() && !extra) {  // nothing that asks for derivatives
+    out.columns.push_back(residuals.value);
+    return out;
+  }
+  Residuals at = residuals;
+  if (with_random || !parameters.empty()) prepare_derivatives(campaign, run, state, at);
+  for (std::size_t j = 0; j < parameters.size(); ++j) {
+    ResidualColumns column = derivative(campaign, run, state, at, parameters[j]);
+    for (ArrayXd& each : column) each *= scale[static_cast<Index>(j)];
+    out.columns.push_back(std::move(column));
+  }
+  if (extra) {
+    for (ResidualColumns& column : extra(run, at)) out.columns.push_back(std::move(column));
+  }
+  out.columns.push_back(at.value);
+  if (with_random) {
+    for (ResidualColumns& column : random_columns(campaign, run, state, at)) {
+      out.columns.push_back(std::move(column));
+    }
+  }
+  return out;
+}
+
+Summary summary_of(const Campaign& campaign, int run, const RawColumns& raw,
+                   const Whitening& whitening) {
+  if (campaign.runs[static_cast<std::size_t>(run)].valid_count == 0) {
+    const auto count =
+        static_cast<Index>(raw.columns.size()) - (raw.with_random ? kRandomEffects : 0);
+    return {MatrixXd::Zero(count, count), MatrixXd::Zero(kRandomEffects, count),
+            MatrixXd::Zero(kRandomEffects, kRandomEffects), 0};
+  }
+  const std::vector<WhiteBlock> all = whitened(campaign, run, raw, whitening);
+  const int n = static_cast<int>(raw.columns.size()) - (raw.with_random ? kRandomEffects : 0);
+  Summary out{MatrixXd::Zero(n, n), MatrixXd::Zero(kRandomEffects, n),
+              MatrixXd::Zero(kRandomEffects, kRandomEffects), 0};
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const WhiteBlock& block = all[i];
+    const auto own = std::lower_bound(block.columns.begin(), block.columns.end(), n);
+    const std::vector<int> columns(block.columns.begin(), own);
+    const auto count = static_cast<Index>(columns.size());
+    // The random effects: behind the others, or kept from before.
+    const WhiteBlock& holder =
+        raw.with_random ? block : whitening.random[static_cast<std::size_t>(run)][i];
+    std::vector<int> effects(raw.with_random
+                                 ? holder.columns.begin() + static_cast<std::ptrdiff_t>(count)
+                                 : holder.columns.begin(),
+                             holder.columns.end());
+    const auto random = holder.rows.rightCols(static_cast<Index>(effects.size()));
+    if (raw.with_random) {
+      for (int& effect : effects) effect -= n;
+    }
+    const auto rows = block.rows.leftCols(count);
+    out.samples += static_cast<int>(block.rows.rows());
+    // A signal that never moves leaves a block without columns: nothing to add.
+    if (!effects.empty()) out.uu(effects, effects) += random.transpose() * random;
+    if (columns.empty()) continue;
+    MatrixXd aa = MatrixXd::Zero(count, count);
+    aa.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
+    out.aa(columns, columns) += MatrixXd(aa.selfadjointView<Eigen::Lower>());
+    if (!effects.empty()) out.ua(effects, columns) += random.transpose() * rows;
+  }
+  return out;
+}
+
+Summary summarise(const Campaign& campaign, int run, const ModelState& state, const Residuals& at,
+                  const std::vector<int>& parameters, const VectorXd& scale,
+                  const Whitening& whitening, const ExtraColumns& extra) {
+  return summary_of(
+      campaign, run,
+      raw_columns(campaign, run, state, at, parameters, scale, whitening.random.empty(), extra),
+      whitening);
+}
+
+Summary summarise(const Campaign& campaign, int run, const ModelState& state,
+                  const std::vector<int>& parameters, const VectorXd& scale,
+                  const Whitening& whitening, const ExtraColumns& extra) {
+  return summarise(campaign, run, state, residuals_of(campaign, run, state), parameters, scale,
+                   whitening, extra);
+}
+
+std::array<VectorXd, kResidualKinds> white_residuals(const Campaign& campaign, int run,
+                                                     const ModelState& state,
+                                                     const Whitening& whitening,
+                                                     const Scatter& scatter) {
+  const RawColumns raw =
+      raw_columns(campaign, run, state, residuals_of(campaign, run, state), {}, {}, true);
+  const Summary summary = summary_of(campaign, run, raw, whitening);
+  const MatrixXd inverse = (1.0 / scatter.variance).matrix().asDiagonal();
+  VectorXd weights(1 + kRandomEffects);
+  weights << 1.0, -(summary.uu + inverse).llt().solve(summary.ua.col(0));
+  const std::vector<WhiteBlock> blocks = whitened(campaign, run, raw, whitening);
+  const std::vector<int> kinds = kinds_of(campaign);
+  std::array<VectorXd, kResidualKinds> out;
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    if (blocks[i].columns.empty()) continue;
+    out[static_cast<std::size_t>(kinds[i])] = blocks[i].rows * weights(blocks[i].columns);
+  }
+  return out;
+}
+
+Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& columns,
+               const Prior& prior, const Scatter& start, int scatter_iterations) {
+  const auto n = static_cast<Index>(columns.size());
+  const auto runs = summaries.size();
+  const Index last = summaries.empty() ? 0 : summaries[0].aa.rows() - 1;
+  std::vector<int> picked = columns;
+  picked.push_back(static_cast<int>(last));
+  using RandomRows = Eigen::Matrix<double, kRandomEffects, Eigen::Dynamic>;
+  using RandomSquare = Eigen::Matrix<double, kRandomEffects, kRandomEffects>;
+  struct Part {
+    MatrixXd aa;
+    RandomRows ua;
+  };
+  std::vector<Part> parts(runs);
+  for (std::size_t e = 0; e < runs; ++e) {
+    parts[e].aa = summaries[e].aa(picked, picked);
+    parts[e].ua = summaries[e].ua(Eigen::all, picked);
+  }
+  const Scatter usual = default_scatter();
+  Fit fit;
+  fit.scatter = start;
+  for (int iteration = 0;; ++iteration) {
+    MatrixXd total = MatrixXd::Zero(n + 1, n + 1);
+    double ln_det = 0.0;
+    std::vector<RandomSquare> posterior(
+        runs);  // covariance of the random effects given the parameters
+    const RandomSquare inverse = (1.0 / fit.scatter.variance).matrix().asDiagonal();
+    for (std::size_t e = 0; e < runs; ++e) {
+      const Eigen::LLT<RandomSquare> llt(summaries[e].uu + inverse);
+      posterior[e] = llt.solve(RandomSquare::Identity());
+      const RandomRows root = llt.matrixL().solve(parts[e].ua);
+      total += parts[e].aa;
+      total.selfadjointView<Eigen::Lower>().rankUpdate(root.transpose(), -1.0);
+      ln_det +=
+          2.0 * llt.matrixLLT().diagonal().array().log().sum() + fit.scatter.variance.log().sum();
+    }
+    total.triangularView<Eigen::StrictlyUpper>() = total.transpose();
+    MatrixXd information = total.topLeftCorner(n, n);
+    VectorXd right = -total.topRightCorner(n, 1);
+    for (Index j = 0; j < n; ++j) {
+      information(j, j) += prior.precision[j];
+      right[j] += prior.precision[j] * prior.pull[j];
+    }
+    const Eigen::LDLT<MatrixXd> ldlt(information);
+    fit.step = ldlt.solve(right);
+    fit.covariance = ldlt.solve(MatrixXd::Identity(n, n));
+    const VectorXd off = fit.step - prior.pull;
+    VectorXd full(n + 1);
+    full << fit.step, 1.0;
+    fit.misfit = full.dot(total * full);
+    const double quadratic = fit.misfit + off.dot(prior.precision.cwiseProduct(off));
+    double scatter_prior = 0.0;
+    for (int i = 0; i < kRandomEffects; ++i) {
+      scatter_prior += kScatterPriorRuns * (std::log(fit.scatter.variance[i]) +
+                                            usual.variance[i] / fit.scatter.variance[i]);
+    }
+    fit.log_likelihood = -0.5 * (quadratic + ln_det + scatter_prior);
+    if (iteration >= scatter_iterations) break;
+    Eigen::Array<double, kRandomEffects, 1> square =
+        Eigen::Array<double, kRandomEffects, 1>::Zero();
+    for (std::size_t e = 0; e < runs; ++e) {
+      const Eigen::Matrix<double, kRandomEffects, 1> u = -posterior[e] * (parts[e].ua * full);
+      const RandomRows lever = posterior[e] * parts[e].ua.leftCols(n);
+      const RandomRows spread = lever * fit.covariance;
+      square += u.array().square() + posterior[e].diagonal().array() +
+                spread.cwiseProduct(lever).rowwise().sum().array();
+    }
+    fit.scatter.variance = (square + kScatterPriorRuns * usual.variance) /
+                           (static_cast<double>(runs) + kScatterPriorRuns);
+    fit.scatter.variance = fit.scatter.variance.min(kScatterCap * kScatterCap * usual.variance);
+  }
+  return fit;
+}
+
+std::vector<double> left_out_densities(const std::vector<Summary>& summaries,
+                                       const std::vector<int>& columns, const Prior& prior) {
+  constexpr int kScatterIterations = 6;
+  std::vector<int> picked = columns;
+  picked.push_back(static_cast<int>(summaries.empty() ? 0 : summaries[0].aa.rows() - 1));
+  std::vector<Summary> own;  // of these columns alone: copied for every experiment
+  own.reserve(summaries.size());
+  for (const Summary& each : summaries) {
+    own.push_back({each.aa(picked, picked), each.ua(Eigen::all, picked), each.uu, each.samples});
+  }
+  std::vector<int> all_of_them(columns.size());
+  std::iota(all_of_them.begin(), all_of_them.end(), 0);
+  std::vector<double> out;
+  for (std::size_t e = 0; e < summaries.size(); ++e) {
+    std::vector<Summary> runs = own;
+    runs.erase(runs.begin() + static_cast<std::ptrdiff_t>(e));
+    const Fit others = fit_linear(runs, all_of_them, prior, default_scatter(), kScatterIterations);
+    // The others' posterior as the prior of the one left out; its gain in evidence.
+    runs.push_back(own[e]);
+    const Fit all = fit_linear(runs, all_of_them, prior, others.scatter, 0);
+    const double ln_det = others.covariance.ldlt().vectorD().array().max(1e-300).log().sum() -
+                          all.covariance.ldlt().vectorD().array().max(1e-300).log().sum();
+    out.push_back(all.log_likelihood - others.log_likelihood - 0.5 * ln_det);
+  }
+  return out;
+}
+
+double left_out_density(const std::vector<Summary>& summaries, const std::vector<int>& columns,
+                        const Prior& prior) {
+  const std::vector<double> each = left_out_densities(summaries, columns, prior);
+  return std::accumulate(each.begin(), each.end(), 0.0);
+}
+
+Information information_on(const std::vector<Summary>& summaries, const std::vector<int>& others,
+                           const Prior& prior, int column, const Scatter& scatter) {
+  const auto n = static_cast<Index>(others.size());
+  std::vector<int> picked = others;
+  picked.push_back(column);
+  const auto perpendicular = [&](bool with_scatter) {
+    MatrixXd total = MatrixXd::Zero(n + 1, n + 1);
+    const MatrixXd inverse = (1.0 / scatter.variance).matrix().asDiagonal();
+    for (const Summary& each : summaries) {
+      total += each.aa(picked, picked);
+      if (!with_scatter) continue;
+      const MatrixXd ua = each.ua(Eigen::all, picked);
+      total -= ua.transpose() * (each.uu + inverse).llt().solve(ua);
+    }
+    for (Index j = 0; j < n; ++j) total(j, j) += prior.precision[j];
+    const VectorXd cross = total.topRightCorner(n, 1);
+    return total(n, n) - cross.dot(total.topLeftCorner(n, n).ldlt().solve(cross));
+  };
+  return {perpendicular(true), perpendicular(false)};
+}
+
+Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>& raw,
+                        const Prior& prior, const Whitening& before) {
+  std::vector<Summary> summaries;
+  const auto runs = campaign.runs.size();
+  summaries.reserve(runs);
+  for (std::size_t e = 0; e < runs; ++e) {
+    summaries.push_back(summary_of(campaign, static_cast<int>(e), raw[e], before));
+  }
+  std::vector<int> all(static_cast<std::size_t>(prior.pull.size()));
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
+  const Fit fit = fit_linear(summaries, all, prior, default_scatter(), 4);
+  VectorXd full(fit.step.size() + 1);
+  full << fit.step, 1.0;
+  const MatrixXd inverse = (1.0 / fit.scatter.variance).matrix().asDiagonal();
+
+  // What is left over, unwhitened and unweighted, in the grid's order.
+  Whitening out = identity_whitening(campaign);
+  std::array<std::vector<std::vector<double>>, kResidualKinds> rest;
+  std::array<std::vector<double>, kResidualKinds> covariance;
+  std::array<std::vector<double>, kResidualKinds> count;
+  for (int kind = 0; kind < kResidualKinds; ++kind) {
+    const auto q = static_cast<std::size_t>(kind);
+    rest[q].resize(runs);
+    covariance[q].assign(Whitening::kOrder + 1, 0.0);
+    count[q].assign(Whitening::kOrder + 1, 0.0);
+  }
+  const std::vector<int> kinds = kinds_of(campaign);
+  const Whitening plain = out;
+  for (std::size_t e = 0; e < runs; ++e) {
+    const ExperimentData& data = campaign.runs[e];
+    if (data.valid_count == 0) continue;
+    const std::vector<WhiteBlock> blocks = whitened(campaign, static_cast<int>(e), raw[e], plain);
+    const VectorXd u = -(summaries[e].uu + inverse).llt().solve(summaries[e].ua * full);
+    VectorXd weights(full.size() + u.size());
+    weights << full, u;
+    for (std::size_t i = 0; i < kinds.size(); ++i) {
+      const auto q = static_cast<std::size_t>(kinds[i]);
+      VectorXd block = VectorXd::Zero(blocks[i].rows.rows());
+      if (!blocks[i].columns.empty()) block = blocks[i].rows * weights(blocks[i].columns);
+      rest[q][e].assign(block.data(), block.data() + block.size());
+      // Clipped: a few outliers must not make the noise look white.
+      std::vector<double> size;
+      for (const double v : rest[q][e]) {
+        if (v != 0.0) size.push_back(std::abs(v));
+      }
+      const double bound =
+          (size.empty() ? 0.0 : 4.0 * estimator::kSigmaPerMedian * estimator::median(size)) + 1e-12;
+      Index row = 0;
+      std::vector<Index> row_of(static_cast<std::size_t>(data.size()), -1);
+      for (int k = 0; k < data.size(); ++k) {
+        if (data.valid[static_cast<std::size_t>(k)]) row_of[static_cast<std::size_t>(k)] = row++;
+      }
+      for (int k = 0; k < data.size(); ++k) {
+        const Index a = row_of[static_cast<std::size_t>(k)];
+        if (a < 0) continue;
+        for (int lag = 0; lag <= Whitening::kOrder && k - lag >= 0; ++lag) {
+          const Index b = row_of[static_cast<std::size_t>(k - lag)];
+          if (b < 0) break;
+          covariance[q][static_cast<std::size_t>(lag)] +=
+              std::clamp(block[a], -bound, bound) * std::clamp(block[b], -bound, bound);
+          // A sample that this residual does not use is exactly zero.
+          if (block[a] != 0.0) count[q][static_cast<std::size_t>(lag)] += 1.0;
+        }
+      }
+    }
+  }
+  for (const int kind : kinds) {
+    const auto q = static_cast<std::size_t>(kind);
+    for (std::size_t lag = 0; lag < covariance[q].size(); ++lag) {
+      covariance[q][lag] /= std::max(count[q][0], 1.0);  // biased: keeps the filter stable
+    }
+    out.filter[q] = levinson(covariance[q]);
+  }
+  double cross = 0.0, power_friction = 0.0, power_balance = 0.0;
+  for (std::size_t e = 0; e < runs; ++e) {
+    const ExperimentData& data = campaign.runs[e];
+    if (rest[kFrictionResidual][e].empty()) continue;
+    std::array<VectorXd, kResidualKinds> white;
+    for (const int kind : kinds) {
+      const auto q = static_cast<std::size_t>(kind);
+      ArrayXd grid = ArrayXd::Zero(data.size());
+      std::size_t row = 0;
+      for (int k = 0; k < data.size(); ++k) {
+        if (data.valid[static_cast<std::size_t>(k)]) grid[k] = rest[q][e][row++];
+      }
+      white[q].resize(data.valid_count);
+      whiten(data, out.filter[q], grid, white[q]);
+      for (Index i = 0; i < white[q].size(); ++i) {
+        const double size = std::abs(white[q][i]);
+        out.weight[e][q][i] = size > kHuber ? std::sqrt(kHuber / size) : 1.0;
+      }
+    }
+    if (campaign.has_balance) {
+      const ArrayXd f = white[kFrictionResidual].array() * out.weight[e][kFrictionResidual];
+      const ArrayXd b = white[kBalanceResidual].array() * out.weight[e][kBalanceResidual];
+      cross += (f * b).sum();
+      power_friction += f.square().sum();
+      power_balance += b.square().sum();
+    }
+  }
+  if (power_friction > 0.0 && power_balance > 0.0) {
+    out.cross = std::clamp(cross / std::sqrt(power_friction * power_balance), -0.95, 0.95);
+  }
+  for (std::size_t e = 0; e < runs; ++e) {
+    RawColumns random;
+    random.columns.assign(raw[e].columns.end() - kRandomEffects, raw[e].columns.end());
+    out.random.push_back(whitened(campaign, static_cast<int>(e), random, out));
+  }
+  return out;
+}
+
+namespace {
+
+double ln_normal_p(double z) {  // two-sided
+  if (z < 25.0) return std::log(std::erfc(z / std::numbers::sqrt2));
+  return -0.5 * z * z - std::log(z * std::sqrt(std::numbers::pi / 2.0));
+}
+
+double chi2_of_ln_p(double ln_p) {
+  if (ln_p >= 0.0) return 0.0;
+  double low = 0.0, high = 1.0;
+  while (ln_normal_p(high) > ln_p && high < 1e6) high *= 2.0;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (ln_normal_p(middle) > ln_p ? low : high) = middle;
+  }
+  return low * low;
+}
+}  // namespace
+
+double chi2_of_student(double t, double degrees) {
+  if (degrees > 2000.0) return t * t;
+  const double p = estimator::student_p(t, degrees);
+  // Far tail: ln p of Student's t directly.
+  return chi2_of_ln_p(p < 1e-280
+                          ? std::log(2.0) - 0.5 * (degrees + 1.0) * std::log1p(t * t / degrees)
+                          : std::log(p));
+}
+
+double chi2_of_f(double f, double numerator_degrees, double denominator_degrees) {
+  const double denominator = std::min(denominator_degrees, 1e5);
+  const double p = estimator::f_p(f, numerator_degrees, denominator);
+  return chi2_of_ln_p(p < 1e-280
+                          ? -0.5 * denominator * std::log1p(numerator_degrees * f / denominator)
+                          : std::log(p));
+}
+
+}  // namespace beltgrip::diagnose

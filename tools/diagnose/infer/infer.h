@@ -1,0 +1,138 @@
+// From residuals to evidence: whitening, scatter between experiments as random effects, one small
+// matrix per experiment; after that every question is algebra on these matrices.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <vector>
+
+#include "tools/diagnose/infer/residuals.h"
+
+namespace beltgrip::diagnose {
+
+// What varies from experiment to experiment in a healthy machine: level of friction, seat of the
+// ratio, zero of the torque, slip at the peak, zero of the secondary torque, zero of the tracking.
+inline constexpr int kRandomEffects = 6;
+
+// Whitened columns of one residual; those that are zero there (the other end stop's, what another
+// residual alone sees) are left out: half of them.
+struct WhiteBlock {
+  std::vector<int> columns;
+  Eigen::MatrixXd rows;  // one column per entry
+};
+
+// Prediction-error filter per residual: order p from the data, lower orders for the first samples
+// of a segment. Weights: Huber, per sample, fixed for all hypotheses.
+struct Whitening {
+  static constexpr int kOrder = 6;
+  struct Filter {
+    std::vector<Eigen::VectorXd> coefficient;  // [order] -> a_1..a_order
+    std::vector<double> sigma;                 // innovation, per order
+  };
+  std::array<Filter, kResidualKinds> filter;
+  double cross = 0.0;  // correlation of the whitened friction and balance residuals
+  std::vector<std::array<Eigen::ArrayXd, kResidualKinds>> weight;  // per experiment
+  // Columns of the random effects per experiment, whitened; the same for all hypotheses. Empty:
+  // from the state at hand.
+  std::vector<std::vector<WhiteBlock>> random;
+};
+
+// Whitened normal equations of one experiment. Columns: parameters asked for, then the residual.
+struct Summary {
+  Eigen::MatrixXd aa;  // (n + 1) x (n + 1)
+  Eigen::MatrixXd ua;  // random effects x (n + 1)
+  Eigen::MatrixXd uu;
+  int samples = 0;
+};
+
+struct Scatter {
+  Eigen::Array<double, kRandomEffects, 1> variance;
+};
+Scatter default_scatter();
+// A cause that acts in every experiment makes them more alike. What fits within each of them and
+// drives them apart is none: a noise in the regressors that it happens to divide.
+bool parts_experiments(const Scatter& without, const Scatter& with);
+
+// Parameters in play: their columns in the summaries, the prior (in scaled units around the
+// linearisation point).
+struct Prior {
+  Eigen::VectorXd pull;       // mean minus present value, scaled
+  Eigen::VectorXd precision;  // scaled
+};
+
+struct Fit {
+  Eigen::VectorXd step;        // scaled, from the linearisation point
+  Eigen::MatrixXd covariance;  // scaled
+  Scatter scatter;
+  double log_likelihood = 0.0;
+  double misfit = 0.0;  // whitened sum of squares, random effects taken out
+};
+
+// columns: indices into the summaries' columns. Scatter is estimated (restricted likelihood with a
+// prior worth kScatterPriorRuns experiments) unless fixed.
+Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& columns,
+               const Prior& prior, const Scatter& start, int scatter_iterations);
+
+// Log predictive density of each experiment, by a fit to the others; their scatter too.
+std::vector<double> left_out_densities(const std::vector<Summary>& summaries,
+                                       const std::vector<int>& columns, const Prior& prior);
+// Their sum.
+double left_out_density(const std::vector<Summary>& summaries, const std::vector<int>& columns,
+                        const Prior& prior);
+
+// Information on one column given the others, with the scatter and without: its loss tells how much
+// of the evidence lies between experiments.
+struct Information {
+  double with_scatter = 0.0;
+  double without_scatter = 0.0;
+};
+Information information_on(const std::vector<Summary>& summaries, const std::vector<int>& others,
+                           const Prior& prior, int column, const Scatter& scatter);
+
+inline constexpr double kScatterPriorRuns = 4.0;
+
+Whitening identity_whitening(const Campaign& campaign);
+
+// Further columns of one experiment, behind the parameters.
+using ExtraColumns = std::function<std::vector<ResidualColumns>(int run, const Residuals& at)>;
+
+// Columns of one experiment on the grid: parameters (scaled), further columns, residual, and with
+// with_random the random effects.
+struct RawColumns {
+  std::vector<ResidualColumns> columns;
+  bool with_random = false;
+};
+// at: the residuals of this state.
+RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& state,
+                       const Residuals& residuals, const std::vector<int>& parameters,
+                       const Eigen::VectorXd& scale, bool with_random,
+                       const ExtraColumns& extra = {});
+Summary summary_of(const Campaign& campaign, int run, const RawColumns& raw,
+                   const Whitening& whitening);
+// Both at once, with the residuals or without.
+Summary summarise(const Campaign& campaign, int run, const ModelState& state, const Residuals& at,
+                  const std::vector<int>& parameters, const Eigen::VectorXd& scale,
+                  const Whitening& whitening, const ExtraColumns& extra = {});
+Summary summarise(const Campaign& campaign, int run, const ModelState& state,
+                  const std::vector<int>& parameters, const Eigen::VectorXd& scale,
+                  const Whitening& whitening, const ExtraColumns& extra = {});
+
+// The residuals of a state, whitened, what the scatter between experiments explains taken out; one
+// row per valid sample, empty where the kind does not exist.
+std::array<Eigen::VectorXd, kResidualKinds> white_residuals(const Campaign& campaign, int run,
+                                                            const ModelState& state,
+                                                            const Whitening& whitening,
+                                                            const Scatter& scatter);
+
+// Filters, weights and the cross correlation from the residual that is left after the best linear
+// fit of everything (parameters with the prior), so that no effect leaks into the noise. raw: with
+// random effects, one per experiment.
+Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>& raw,
+                        const Prior& prior, const Whitening& before);
+
+// The chi-square(1) value with the same two-sided p-value as Student's t.
+double chi2_of_student(double t, double degrees);
+// The same for an F value.
+double chi2_of_f(double f, double numerator_degrees, double denominator_degrees);
+
+}  // namespace beltgrip::diagnose

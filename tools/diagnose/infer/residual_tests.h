@@ -1,0 +1,22 @@
+// Which assumptions the residuals of the nominal machine break, with the noise's autocorrelation
+// and the scatter between experiments counted.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tools/diagnose/infer/engine.h"
+
+namespace beltgrip::diagnose {
+
+struct ResidualTest {
+  std::string acts_on;  // friction, ratio, torque; clamp force for the pressure's tracking
+  std::string name;
+  double p = 1.0;
+};
+
+// Whiteness of each residual; step of friction, ratio and torque with the direction of the clamp
+// force, the sign of the torque and the end stop. Call with the engine's last noise model.
+std::vector<ResidualTest> test_residuals(const Engine& engine, const ModelState& nominal);
+
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,377 @@
+#include "tools/diagnose/infer/residuals.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/statistics/order.h"
+#include "tools/diagnose/model/curve_family.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+using Eigen::ArrayXd;
+
+// The foot point of what stands in the regressors: of the misfit in torque, the clamp force takes
+// its share.
+void move_to_foot(const ExperimentData& data, const estimator::VariatorParameters& variator,
+                  const ArrayXd& force_share, Residuals& out) {
+  const Quantities& q = out.measured;
+  out.clean_Nm = out.model_Nm;
+  out.clean = data;
+  for (int k = 0; k < data.size(); ++k) {
+    if (!data.valid[static_cast<std::size_t>(k)]) continue;
+    const double off_Nm = q.belt_torque[k] - out.model_Nm[k];
+    const double force_Nm = off_Nm * force_share[k];
+    if (out.model_Nm[k] != 0.0) {
+      const double relative = std::clamp(force_Nm / out.model_Nm[k], -0.2, 0.2);
+      out.clean.pressure.value[k] += relative * q.force_N[k] / variator.secondary_piston_area_m2;
+      out.clean_Nm[k] *= 1.0 + relative;
+    }
+    out.clean.torque.value[k] -= off_Nm - (out.clean_Nm[k] - out.model_Nm[k]);
+  }
+  if (q.balance.size() > 0) out.output_torque = out.clean_Nm / q.ratio;
+}
+
+}  // namespace
+
+double robust_sigma(std::vector<double>& values) {
+  if (values.size() < 20) return 0.0;
+  for (double& v : values) v = std::abs(v);
+  return estimator::kSigmaPerMedian * estimator::median(values);
+}
+
+Quantities quantities(const Campaign& campaign, const ExperimentData& data, int run,
+                      const ModelState& state) {
+  return evaluate(data, run, campaign.variator, state.nuisance,
+                  Effects{&campaign.slots, campaign.switched_on + state.effects});
+}
+
+std::array<CurveShape, kStops> shapes(const Eigen::VectorXd& nuisance, const Quantities& q) {
+  std::array<CurveShape, kStops> out;
+  const double* values = nuisance.data();
+  out[kOverdriveStop] =
+      CurveShape(std::span<const double, kShapeKnots>(values + kShapeOverdrive, kShapeKnots),
+                 q.fall[kOverdriveStop]);
+  out[kLowStop] = CurveShape(std::span<const double, kShapeKnots>(values + kShapeLow, kShapeKnots),
+                             q.fall[kLowStop]);
+  return out;
+}
+
+Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state) {
+  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+  Residuals out;
+  out.measured = quantities(campaign, data, run, state);
+  const Quantities& q = out.measured;
+  const auto curve = shapes(state.nuisance, q);
+  const int n = data.size();
+  out.value[kFrictionResidual] = ArrayXd::Zero(n);
+  out.foot = ArrayXd::Zero(n);
+  out.slope = ArrayXd::Zero(n);
+  out.model_Nm = ArrayXd::Zero(n);
+  out.weight = ArrayXd::Zero(n);
+  const double slip_variance = campaign.slip_noise(run) * campaign.slip_noise(run);
+  const double slip_weight = 1.0 / slip_variance;
+  const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
+  const std::array<double, kStops> peak_slip{std::exp(q.ln_peak_slip[0]),
+                                             std::exp(q.ln_peak_slip[1])};
+  for (int k = 0; k < n; ++k) {
+    if (!data.valid[static_cast<std::size_t>(k)]) continue;
+    const auto stop = static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)]);
+    const double peak = peak_slip[stop], per_peak = 1.0 / peak;
+    const double capacity = q.capacity[k];
+    const double carried_Nm = q.belt_torque[k] * campaign.noise.force_N / q.force_N[k];
+    const double torque_variance = sensor_variance + carried_Nm * carried_Nm;
+    const double torque_weight = 1.0 / torque_variance;
+    // Foot point: Gauss-Newton, halved while the distance would grow.
+    struct Place {
+      double x = 0.0, model_Nm = 0.0, slope = 0.0, distance = 0.0;
+    };
+    const auto at = [&](double x) -> Place {
+      const CurveShape::Point point = curve[stop].evaluate(x);
+      const double model_Nm = capacity * point.value;
+      const double gap_slip = q.slip[k] - x * peak;
+      const double gap_Nm = q.belt_torque[k] - model_Nm;
+      return {x, model_Nm, capacity * point.slope * per_peak,
+              gap_slip * gap_slip * slip_weight + gap_Nm * gap_Nm * torque_weight};
+    };
+    Place foot = at(q.slip[k] * per_peak);
+    // Right of the rising branch the next point of the curve may lie on it, at the same torque:
+    // from beyond the peak no small steps lead there.
+    if (const double rising = nominal_inverse(q.belt_torque[k] / capacity); std::isfinite(rising)) {
+      if (const Place there = at(rising); there.distance < foot.distance) foot = there;
+    }
+    for (int i = 0; i < 12; ++i) {
+      const double gap_slip = q.slip[k] - foot.x * peak;
+      const double gap_Nm = q.belt_torque[k] - foot.model_Nm;
+      double step = (gap_slip * slip_weight + foot.slope * gap_Nm * torque_weight) /
+                    ((slip_weight + foot.slope * foot.slope * torque_weight) * peak);
+      step = std::clamp(step, -0.5, 0.5);
+      const double before = foot.x;
+      for (int halving = 0; halving < 6; ++halving, step *= 0.4) {
+        if (const Place there = at(before + step); there.distance <= foot.distance) {
+          foot = there;
+          break;
+        }
+      }
+      if (std::abs(foot.x - before) < 1e-5) break;  // the distance is flat there
+    }
+    out.foot[k] = foot.x;
+    out.slope[k] = foot.slope;
+    out.model_Nm[k] = foot.model_Nm;
+    out.weight[k] = 1.0 / std::sqrt(torque_variance + foot.slope * foot.slope * slip_variance);
+    out.value[kFrictionResidual][k] =
+        (q.belt_torque[k] - foot.model_Nm - foot.slope * (q.slip[k] - foot.x * peak)) *
+        out.weight[k];
+  }
+  out.balance_weight = ArrayXd::Zero(n);
+  for (int k = 0; k < n; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    if (data.valid[i] && k % kBalanceStep == 0) {
+      out.balance_weight[k] =
+          1.0 / campaign.noise.balance_Nm[static_cast<std::size_t>(data.stop[i])];
+    }
+  }
+  const auto masked = [&](const ArrayXd& values, const ArrayXd& scale) -> ArrayXd {
+    if (values.size() == 0) return ArrayXd::Zero(n);
+    return (out.weight > 0.0).select(values * scale, 0.0);
+  };
+  if (campaign.has_balance) out.value[kBalanceResidual] = masked(q.balance, out.balance_weight);
+  if (campaign.has_tracking) {
+    out.value[kTrackingResidual] =
+        masked(q.tracking, ArrayXd::Constant(n, 1.0 / campaign.noise.tracking_Pa));
+  }
+  return out;
+}
+
+void prepare_derivatives(const Campaign& campaign, int run, const ModelState& state,
+                         Residuals& at) {
+  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+  const Quantities& q = at.measured;
+  // Share of the misfit that is the clamp force's: its noise comes with the torque it carries.
+  const ArrayXd carried_variance = (q.belt_torque * campaign.noise.force_N / q.force_N).square();
+  const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
+  move_to_foot(data, campaign.variator, carried_variance / (sensor_variance + carried_variance),
+               at);
+  at.there = quantities(campaign, at.clean, run, state);
+  at.place.resize(static_cast<std::size_t>(at.foot.size()));
+  std::transform(at.foot.begin(), at.foot.end(), at.place.begin(),
+                 [](double x) { return place_on_curve(std::abs(x)); });
+}
+
+ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
+                          const QuantityChange& change) {
+  ResidualColumns out;
+  const auto n = at.foot.size();
+  if (change.torque.size() + change.slip.size() + change.ln_capacity.size() > 0) {
+    ArrayXd friction = ArrayXd::Zero(n);
+    if (change.torque.size() > 0) friction += change.torque;
+    if (change.slip.size() > 0) friction -= at.slope * change.slip;
+    if (change.ln_capacity.size() > 0) friction -= at.clean_Nm * change.ln_capacity;
+    out[kFrictionResidual] = (at.weight > 0.0).select(friction * at.weight, 0.0);
+  }
+  const auto other = [&](const ArrayXd& values, const auto& scale) -> ArrayXd {
+    if (values.size() == 0) return {};
+    return (at.weight > 0.0).select(values * scale, 0.0);
+  };
+  if (campaign.has_balance) {
+    out[kBalanceResidual] = other(change.balance, at.balance_weight);
+  }
+  if (campaign.has_tracking) {
+    out[kTrackingResidual] = other(change.tracking, 1.0 / campaign.noise.tracking_Pa);
+  }
+  return out;
+}
+
+namespace {
+bool energy_acts(const Campaign& campaign, const ModelState& state) {
+  for (std::size_t i = 0; i < campaign.slots.size(); ++i) {
+    const auto j = static_cast<Eigen::Index>(i);
+    if (campaign.slots[i].row->parameter == "per_kJ" &&
+        state.effects[j] + campaign.switched_on[j] != 0.0) {
+      return true;
+    }
+  }
+  return false;
+}
+}  // namespace
+
+ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& state,
+                           const Residuals& at, int parameter) {
+  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+  const int n = data.size();
+  QuantityChange change;
+  // A change of the belt's torque at one stop, by sample; zero where the stop is never used.
+  const auto per_stop = [&](int stop, auto&& f) -> ResidualColumns {
+    if (std::find(data.stop.begin(), data.stop.end(), stop) == data.stop.end()) return {};
+    ResidualColumns out;
+    ArrayXd& column = out[kFrictionResidual];
+    column = ArrayXd::Zero(n);
+    for (int k = 0; k < n; ++k) {
+      if (data.stop[static_cast<std::size_t>(k)] == stop && at.weight[k] > 0.0) {
+        column[k] = -f(k) * at.weight[k];
+      }
+    }
+    return out;
+  };
+  const auto bump = [&](int k, int i) {
+    const double f = i < kShapeKnots ? mode_function(i, at.place[static_cast<std::size_t>(k)])
+                                     : fall_function(std::abs(at.foot[k]));
+    return at.measured.capacity[k] * f * std::copysign(1.0, at.foot[k]);
+  };
+  switch (parameter) {
+    case kLnMuMax:
+      change.ln_capacity = ArrayXd::Ones(n);
+      return propagate(campaign, at, change);
+    case kLnPeakSlipOverdrive:
+    case kLnPeakSlipLow: {
+      const int stop = parameter == kLnPeakSlipLow ? kLowStop : kOverdriveStop;
+      const double peak = std::exp(state.nuisance[parameter]);
+      return per_stop(stop, [&](int k) { return -at.slope[k] * at.foot[k] * peak; });
+    }
+    default:
+      break;
+  }
+  // A change of ln(r_g): slip and, through the torque out, balance.
+  const auto ratio_change = [&](const ArrayXd& ln_ratio) {
+    change.slip = (1.0 - at.measured.slip) * ln_ratio;
+    if (at.output_torque.size() > 0) {
+      change.balance = -at.measured.ratio * at.output_torque * ln_ratio;
+    }
+    return propagate(campaign, at, change);
+  };
+  const auto torque_change = [&](const ArrayXd& torque) {
+    change.torque = torque;
+    change.balance = torque;
+    return propagate(campaign, at, change);
+  };
+  // With slip energy at work, whatever moves the slip moves the friction: by differences, below.
+  switch (energy_acts(campaign, state) ? -1 : parameter) {
+    case kLossConstant_Nm:
+      return torque_change(ArrayXd::Constant(n, -1.0));
+    case kLossPerSpeed_Nms:
+      return torque_change(-data.omega_p.value);
+    case kLnRatioOverdrive:
+    case kLnRatioLow: {
+      const int stop = parameter == kLnRatioLow ? kLowStop : kOverdriveStop;
+      ArrayXd here(n);
+      for (int k = 0; k < n; ++k) here[k] = data.stop[static_cast<std::size_t>(k)] == stop;
+      return ratio_change(here);
+    }
+    case kDeformationPerkN: {
+      const Quantities& q = at.there;
+      const ArrayXd ln_ratio = -1e-3 * q.force_N / (1.0 - q.deformation).max(0.05);
+      change.slip = (1.0 - q.slip) * ln_ratio;
+      if (q.balance.size() > 0) {
+        change.balance =
+            (q.balance - q.belt_torque - at.clean.torque.slow + at.clean.torque.value) * ln_ratio;
+      }
+      return propagate(campaign, at, change);
+    }
+    case kCommandOffset_Pa:
+      change.tracking = ArrayXd::Constant(n, -1.0);
+      return propagate(campaign, at, change);
+    case kSecondaryInertia_kgm2:
+      change.balance = -at.measured.ratio * at.measured.slope_s;
+      return propagate(campaign, at, change);
+    default:
+      break;
+  }
+  if (parameter >= kShapeOverdrive && parameter < kShapeLow) {
+    return per_stop(kOverdriveStop, [&](int k) { return bump(k, parameter - kShapeOverdrive); });
+  }
+  if (parameter >= kShapeLow && parameter <= kEndOfShapes) {
+    return per_stop(kLowStop, [&](int k) { return bump(k, parameter - kShapeLow); });
+  }
+  // The rest by central differences of the quantities.
+  const bool slot = parameter >= kNuisanceCount;
+  const int index = slot ? parameter - kNuisanceCount : parameter;
+  const double step = slot ? campaign.slots[static_cast<std::size_t>(index)].step()
+                           : campaign.nuisances[static_cast<std::size_t>(index)].step;
+  ModelState moved = state;
+  double& value = slot ? moved.effects[index] : moved.nuisance[index];
+  value += step;
+  const Quantities above = quantities(campaign, at.clean, run, moved);
+  value -= 2.0 * step;
+  const Quantities below = quantities(campaign, at.clean, run, moved);
+  const double scale = 0.5 / step;
+  change.slip = (above.slip - below.slip) * scale;
+  change.torque = (above.belt_torque - below.belt_torque) * scale;
+  change.ln_capacity = (above.capacity / below.capacity).log() * scale;
+  if (above.balance.size() > 0) change.balance = (above.balance - below.balance) * scale;
+  if (above.tracking.size() > 0) change.tracking = (above.tracking - below.tracking) * scale;
+  for (int stop = 0; stop < kStops; ++stop) {  // friction_shape acts on the curve itself
+    const auto s = static_cast<std::size_t>(stop);
+    const double d_ln_peak = (above.ln_peak_slip[s] - below.ln_peak_slip[s]) * scale;
+    const double d_fall = (above.fall[s] - below.fall[s]) * scale;
+    if (d_ln_peak == 0.0 && d_fall == 0.0) continue;
+    const double peak = std::exp(above.ln_peak_slip[s]);
+    for (int k = 0; k < n; ++k) {
+      if (data.stop[static_cast<std::size_t>(k)] == stop && at.weight[k] > 0.0) {
+        change.torque[k] +=
+            at.slope[k] * at.foot[k] * peak * d_ln_peak - bump(k, kShapeKnots) * d_fall;
+      }
+    }
+  }
+  return propagate(campaign, at, change);
+}
+
+NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& state) {
+  std::vector<double> slip, torque, tracking, force;
+  std::array<std::vector<double>, kStops> balance;
+  for (int run = 0; run < static_cast<int>(campaign.runs.size()); ++run) {
+    const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+    const Quantities q = quantities(campaign, data, run, state);
+    const auto collect = [&](const ArrayXd& y, std::vector<double>& into, int stop = kNoStop) {
+      if (y.size() == 0) return;
+      // Second differences over two samples: neighbours share samples of the local fit.
+      const int apart = stop == kNoStop ? 4 : 2 * kBalanceStep;
+      for (int k = apart; k + apart < data.size(); k += 2) {
+        const int first = k - apart, last = k + apart;
+        const auto before = static_cast<std::size_t>(first);
+        const auto after = static_cast<std::size_t>(last);
+        if (!data.valid[before] || !data.valid[after]) continue;
+        if (stop != kNoStop && data.stop[before] != stop) continue;
+        into.push_back((y[k - apart] - 2.0 * y[k] + y[k + apart]) / std::sqrt(6.0));
+      }
+    };
+    collect(q.slip, slip);
+    collect(q.belt_torque, torque);
+    for (const int stop : {kOverdriveStop, kLowStop}) {
+      collect(q.balance, balance[static_cast<std::size_t>(stop)], stop);
+    }
+    collect(q.tracking, tracking);
+    collect(q.force_N, force);
+  }
+  NoiseLevels out;
+  out.slip = std::max(robust_sigma(slip), 2e-6);
+  out.torque_Nm = std::max(robust_sigma(torque), 2e-3);
+  for (std::size_t stop = 0; stop < kStops; ++stop) {
+    out.balance_Nm[stop] = std::max(robust_sigma(balance[stop]), 2e-3);
+  }
+  out.force_N = std::max(robust_sigma(force), 0.2);
+  out.tracking_Pa = std::max(robust_sigma(tracking), 20.0);
+  return out;
+}
+
+std::vector<double> estimate_slip_noise_shares(const Campaign& campaign, const ModelState& state) {
+  constexpr double kLeast = 0.3, kMost = 5.0;
+  std::vector<double> sigma;
+  for (int run = 0; run < static_cast<int>(campaign.runs.size()); ++run) {
+    const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+    const Quantities q = quantities(campaign, data, run, state);
+    std::vector<double> slip;
+    for (int k = 4; k + 4 < data.size(); ++k) {
+      if (!data.valid[static_cast<std::size_t>(k - 4)] ||
+          !data.valid[static_cast<std::size_t>(k) + 4]) {
+        continue;
+      }
+      slip.push_back((q.slip[k - 4] - 2.0 * q.slip[k] + q.slip[k + 4]) / std::sqrt(6.0));
+    }
+    const double here = robust_sigma(slip);
+    const double share = here > 0.0 ? std::clamp(here / campaign.noise.slip, kLeast, kMost) : 1.0;
+    sigma.push_back(std::max(share, data.rounding_slip / campaign.noise.slip));
+  }
+  return sigma;
+}
+
+}  // namespace beltgrip::diagnose

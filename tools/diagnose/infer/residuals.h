@@ -1,0 +1,109 @@
+// Residuals of the model in units of their noise, and their derivatives.
+//   friction: signed distance of the measured (slip, torque) from the curve, errors in both counted
+//             (orthogonal distance): valid on either side of the peak
+//   balance:  torque in against torque out (needs secondary_torque)
+//   tracking: pressure against its command (needs secondary_pressure_command)
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "tools/diagnose/data/experiment_data.h"
+#include "tools/diagnose/model/effects/effect.h"
+#include "tools/diagnose/model/variator_model.h"
+
+namespace beltgrip::diagnose {
+
+enum ResidualKind : int { kFrictionResidual, kBalanceResidual, kTrackingResidual, kResidualKinds };
+
+inline constexpr int kBalanceStep = 5;  // samples of the slow copies, nearly independent
+
+// One sigma of the noise of one grid sample, from differences of neighbours.
+struct NoiseLevels {
+  double slip = 1e-4;
+  double torque_Nm = 0.1;
+  std::array<double, kStops> balance_Nm{0.1, 0.1};  // the secondary side counts by the ratio
+  double tracking_Pa = 1e3;
+  double force_N = 1.0;
+  NoiseLevels times(double factor) const {
+    return {slip * factor,
+            torque_Nm * factor,
+            {balance_Nm[0] * factor, balance_Nm[1] * factor},
+            tracking_Pa * factor,
+            force_N * factor};
+  }
+};
+
+struct ModelState {
+  Eigen::VectorXd nuisance;
+  Eigen::VectorXd effects;  // one per slot
+};
+
+// Data and model of one diagnosis; everything that no hypothesis changes.
+struct Campaign {
+  std::vector<ExperimentData> runs;
+  estimator::VariatorParameters variator;
+  NuisanceTable nuisances;
+  std::vector<Slot> slots;
+  Eigen::VectorXd switched_on;  // sizes that the model file gives; states come on top
+  std::map<std::string, double> known_ripples;  // of the model file, by shaft
+  NoiseLevels noise;
+  std::vector<double> slip_noise_share;  // per experiment: its noise of slip over noise.slip
+  double slip_noise(int run) const {
+    const auto i = static_cast<std::size_t>(run);
+    return noise.slip * (i < slip_noise_share.size() ? slip_noise_share[i] : 1.0);
+  }
+  // By more than a ramp itself moves it as the belt begins to slip. What follows the torque cannot
+  // be told where it does not.
+  bool torque_varies = false;
+  bool has_balance = false;
+  bool has_tracking = false;
+};
+
+// Residuals of one experiment and what their derivatives need.
+struct Residuals {
+  std::array<Eigen::ArrayXd, kResidualKinds> value;  // empty where the kind does not exist
+  Eigen::ArrayXd foot;            // x = slip / slip at the peak, of the foot point
+  Eigen::ArrayXd slope;           // dT/d(slip) there
+  Eigen::ArrayXd model_Nm;        // curve at the foot point, at the measured clamp force
+  Eigen::ArrayXd weight;          // 1 / (noise of the distance)
+  Eigen::ArrayXd balance_weight;  // 1 / (noise of the balance)
+  Quantities measured;            // the model at the state, on the data as they are
+  // By prepare_derivatives only, at the foot point: no noise in a regressor.
+  Eigen::ArrayXd clean_Nm, output_torque;
+  ExperimentData clean;           // torques and pressure there
+  Quantities there;               // the model on them
+  std::vector<CurvePlace> place;  // of |foot|
+};
+
+// The model at a state, of the campaign's data or of others in their place; its friction curves.
+Quantities quantities(const Campaign& campaign, const ExperimentData& data, int run,
+                      const ModelState& state);
+std::array<CurveShape, kStops> shapes(const Eigen::VectorXd& nuisance, const Quantities& q);
+
+Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state);
+// Adds what derivative() needs; at: the residuals of this state.
+void prepare_derivatives(const Campaign& campaign, int run, const ModelState& state, Residuals& at);
+
+// d(residual)/d(parameter); empty: zero. Parameters are numbered: nuisances first, then slots.
+using ResidualColumns = std::array<Eigen::ArrayXd, kResidualKinds>;
+ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& state,
+                           const Residuals& at, int parameter);
+
+// Effect of a change of slip, torque, ln(capacity), balance and tracking on the residuals.
+struct QuantityChange {
+  Eigen::ArrayXd slip, torque, ln_capacity, balance, tracking;  // empty: none
+};
+ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
+                          const QuantityChange& change);
+
+// By the median; changes the values. 0: fewer than 20.
+double robust_sigma(std::vector<double>& values);
+NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& state);
+// A speed sensor's noise counts the more, the slower its shaft turns.
+std::vector<double> estimate_slip_noise_shares(const Campaign& campaign, const ModelState& state);
+
+}  // namespace beltgrip::diagnose

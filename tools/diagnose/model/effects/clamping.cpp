@@ -1,0 +1,80 @@
+#include "tools/diagnose/model/effects/clamping.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace beltgrip::diagnose {
+namespace {
+
+using Eigen::ArrayXd;
+
+// lag(x) - x of a first-order lag, exact for an input that is linear between samples. Odd in the
+// time constant, so that derivatives at zero exist.
+ArrayXd lag_change(const ArrayXd& in, double dt_s, double time_constant_s) {
+  const double tau_s = std::abs(time_constant_s);
+  const double keep = std::exp(-dt_s / tau_s);
+  ArrayXd out = ArrayXd::Zero(in.size());
+  double y = std::nan("");
+  for (Eigen::Index k = 0; k < in.size(); ++k) {
+    const double x = in[k];
+    if (!std::isfinite(x)) {
+      y = std::nan("");
+      continue;
+    }
+    if (!std::isfinite(y)) {
+      y = x;
+    } else {
+      const double before = in[k - 1];
+      y = keep * y + x - keep * before - tau_s * (1.0 - keep) * (x - before) / dt_s;
+    }
+    out[k] = std::copysign(1.0, time_constant_s) * (y - x);
+  }
+  return out;
+}
+
+// play(x) - x: follows only after the input has moved by the width on either side. Odd in the
+// width. first: where it rests before the input has moved, in widths above it; what went before a
+// recording is not in it.
+ArrayXd play_change(const ArrayXd& in, double half_width, double first) {
+  const double w = std::abs(half_width);
+  ArrayXd out = ArrayXd::Zero(in.size());
+  double y = std::nan("");
+  for (Eigen::Index k = 0; k < in.size(); ++k) {
+    const double x = in[k];
+    if (!std::isfinite(x)) continue;
+    if (!std::isfinite(y)) y = x + first * w;
+    y = std::clamp(y, x - w, x + w);
+    out[k] = std::copysign(1.0, half_width) * (y - x);
+  }
+  return out;
+}
+
+}  // namespace
+
+void apply_hydraulic_lag(Context& c, const Slot& slot, double time_constant_s) {
+  if (slot.role == "command") {
+    c.track += lag_change(c.run.command.sharp, c.run.dt_s, time_constant_s);
+  } else {
+    c.pressure += lag_change(c.run.pressure.sharp, c.run.dt_s, time_constant_s);
+  }
+}
+
+void apply_hydraulic_delay(Context& c, const Slot& slot, double delay_s) {
+  const GridSignal& input = slot.role == "command" ? c.run.command : c.run.pressure;
+  const ArrayXd change = shifted(input, c.run.dt_s, -delay_s) - input.sharp;
+  (slot.role == "command" ? c.track : c.pressure) += change;
+}
+
+void apply_centrifugal_force(Context& c, const Slot&, double coefficient_N_s2) {
+  c.force_N += coefficient_N_s2 * c.omega_s.square();
+}
+
+void apply_spring_force(Context& c, const Slot&, double force_N) { c.force_N += force_N; }
+
+void apply_clamp_hysteresis(Context& c, const Slot& slot, double force_N) {
+  const ArrayXd model_N = c.variator.secondary_piston_area_m2 * c.run.pressure.sharp;
+  const double first = slot.role == "raised" ? -1.0 : slot.role == "lowered" ? 1.0 : 0.0;
+  c.force_N += play_change(model_N, force_N, first);
+}
+
+}  // namespace beltgrip::diagnose

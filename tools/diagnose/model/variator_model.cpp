@@ -1,0 +1,323 @@
+#include "tools/diagnose/model/variator_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include "tools/diagnose/model/curve_family.h"
+#include "tools/diagnose/model/effects/effect.h"
+
+namespace beltgrip::diagnose {
+
+using Eigen::ArrayXd;
+
+// Tolerances: what differs between two healthy machines of one type (ranges of the literature for
+// pushbelt variators), so that only what lies beyond is called wrong.
+NuisanceTable default_nuisances() {
+  NuisanceTable table{{
+      {"ln_mu_max", std::log(0.1), 0.4, 1e-3},
+      {"ln_peak_slip_overdrive", std::log(0.02), 0.5, 1e-3},
+      {"ln_peak_slip_low", std::log(0.03), 0.5, 1e-3},
+      {"shape_1_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_2_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_3_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_4_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_5_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_6_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_7_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_8_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_9_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_10_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_11_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_12_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_13_overdrive", 0.0, 1.0, 1e-3},
+      {"shape_1_low", 0.0, 1.0, 1e-3},
+      {"shape_2_low", 0.0, 1.0, 1e-3},
+      {"shape_3_low", 0.0, 1.0, 1e-3},
+      {"shape_4_low", 0.0, 1.0, 1e-3},
+      {"shape_5_low", 0.0, 1.0, 1e-3},
+      {"shape_6_low", 0.0, 1.0, 1e-3},
+      {"shape_7_low", 0.0, 1.0, 1e-3},
+      {"shape_8_low", 0.0, 1.0, 1e-3},
+      {"shape_9_low", 0.0, 1.0, 1e-3},
+      {"shape_10_low", 0.0, 1.0, 1e-3},
+      {"shape_11_low", 0.0, 1.0, 1e-3},
+      {"shape_12_low", 0.0, 1.0, 1e-3},
+      {"shape_13_low", 0.0, 1.0, 1e-3},
+      {"deformation_per_kN", 1.0e-3, 0.7e-3, 1e-5},
+      {"loss_constant_Nm", 0.5, 0.6, 1e-2},
+      {"loss_per_rad_s_Nm", 5e-3, 4e-3, 1e-4},
+      {"ln_ratio_overdrive", 0.0, 6e-4, 1e-5},
+      {"ln_ratio_low", 0.0, 6e-4, 1e-5},
+      {"secondary_inertia_kg_m2", 0.1, 0.3, 1e-3},
+      {"command_offset_Pa", 0.0, 1e5, 10.0},
+      {"command_gain", 0.0, 0.1, 1e-4},
+  }};
+  for (int i = 0; i < kShapeKnots; ++i) {
+    for (const int first : {kShapeOverdrive, kShapeLow}) {
+      const int knot = first + i;
+      table[static_cast<std::size_t>(knot)].nominal = usual_departure()[i];
+    }
+  }
+  return table;
+}
+
+namespace {
+
+constexpr double kBend = 1.3;
+
+// Ends of the intervals of the cubic: 0, the knots below the peak, the peak, the knots beyond it.
+constexpr int kEnds = kShapeKnots + 2;
+constexpr int kPeakEnd = kKnotsBelowPeak + 1;
+constexpr int end_of_knot(int knot) { return knot < kKnotsBelowPeak ? knot + 1 : knot + 2; }
+constexpr std::array<double, kEnds> kEnd = [] {
+  std::array<double, kEnds> ends{};
+  for (int i = 0; i < kShapeKnots; ++i) {
+    ends[static_cast<std::size_t>(end_of_knot(i))] = kShapeKnot[static_cast<std::size_t>(i)];
+  }
+  ends[kPeakEnd] = 1.0;
+  return ends;
+}();
+
+using Cubics = std::array<std::array<double, 4>, kShapeKnots + 1>;
+
+// Hermite cubics through y with the slopes of finite differences, flat at the last end.
+Cubics cubics(const std::array<double, kEnds>& y) {
+  std::array<double, kEnds> slope{};
+  for (std::size_t j = 0; j + 1 < kEnds; ++j) {
+    slope[j] = j == 0 ? (y[1] - y[0]) / (kEnd[1] - kEnd[0])
+                      : (y[j + 1] - y[j - 1]) / (kEnd[j + 1] - kEnd[j - 1]);
+  }
+  Cubics out{};
+  for (std::size_t j = 0; j + 1 < kEnds; ++j) {
+    const double h = kEnd[j + 1] - kEnd[j];
+    const double secant = (y[j + 1] - y[j]) / h;
+    out[j] = {y[j], slope[j], (3.0 * secant - 2.0 * slope[j] - slope[j + 1]) / h,
+              (slope[j] + slope[j + 1] - 2.0 * secant) / (h * h)};
+  }
+  return out;
+}
+
+CurveShape::Point nominal_formula(double size) {
+  static const double kStiffness = std::tan(std::numbers::pi / (2.0 * kBend));
+  const double angle = kBend * std::atan(kStiffness * size);
+  return {std::sin(angle),
+          std::cos(angle) * kBend * kStiffness / (1.0 + kStiffness * kStiffness * size * size)};
+}
+
+// The nominal curve as cubics between points of a table (error below 1e-7), beside each the
+// interval of the departure that it begins in: both are evaluated millions of times.
+constexpr std::size_t kCellsPerUnit = 64, kCellUnits = 4;
+static_assert(kShapeKnot.back() < kCellUnits);
+struct Cell {
+  std::array<double, 4> nominal;  // of the cell's own abscissa, 0 to 1
+  std::size_t interval;
+};
+using Cells = std::array<Cell, kCellsPerUnit * kCellUnits>;
+const Cells& cells() {
+  static const Cells kCells = [] {
+    Cells out{};
+    std::size_t interval = 0;
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      const double x = static_cast<double>(i) / kCellsPerUnit;
+      const CurveShape::Point a = nominal_formula(x), b = nominal_formula(x + 1.0 / kCellsPerUnit);
+      const double rise = b.value - a.value;
+      const double begins = a.slope / kCellsPerUnit, ends = b.slope / kCellsPerUnit;
+      while (interval + 2 < kEnds && kEnd[interval + 1] < x) ++interval;
+      out[i] = {{a.value, begins, 3.0 * rise - 2.0 * begins - ends, begins + ends - 2.0 * rise},
+                interval};
+    }
+    return out;
+  }();
+  return kCells;
+}
+
+std::size_t interval_from(std::size_t first, double x) {
+  while (first + 2 < kEnds && kEnd[first + 1] < x) ++first;
+  return first;
+}
+
+}  // namespace
+
+double fall_function(double x) {
+  const double beyond = x - 1.0;
+  return beyond <= 0.0 ? 0.0 : -beyond * beyond / (0.3 + beyond);
+}
+
+double nominal_inverse(double value) {
+  // Against the root of what the peak is away by it is smooth, also at the peak: cubics.
+  constexpr int kRoots = 64;
+  struct Point {
+    double x, step;  // change of x over one step of the table
+  };
+  static const std::array<Point, kRoots + 1> kTable = [] {
+    const double stiffness = std::tan(std::numbers::pi / (2.0 * kBend));
+    std::array<Point, kRoots + 1> table{};
+    for (std::size_t i = 0; i < table.size(); ++i) {
+      const double root = static_cast<double>(i) / kRoots;
+      const double x = std::tan(std::asin(1.0 - root * root) / kBend) / stiffness;
+      const double per_root =
+          i == 0 ? -std::numbers::sqrt2 * (1.0 + stiffness * stiffness) / (kBend * stiffness)
+                 : -2.0 * root / nominal_formula(x).slope;
+      table[i] = {x, per_root / kRoots};
+    }
+    return table;
+  }();
+  const double size = std::abs(value);
+  if (!(size < 1.0)) return std::numeric_limits<double>::quiet_NaN();
+  const double at = std::sqrt(1.0 - size) * kRoots;
+  const auto i = std::min(static_cast<std::size_t>(at), std::size_t{kRoots - 1});
+  const double u = at - static_cast<double>(i);
+  const Point &a = kTable[i], &b = kTable[i + 1];
+  const double rise = b.x - a.x;
+  const double x =
+      a.x +
+      u * (a.step + u * (3.0 * rise - 2.0 * a.step - b.step + u * (a.step + b.step - 2.0 * rise)));
+  return std::copysign(x, value);
+}
+
+CurveShape::CurveShape(std::span<const double, kShapeKnots> departure, double fall) : fall_(fall) {
+  std::array<double, kEnds> y{};
+  for (int i = 0; i < kShapeKnots; ++i) {
+    y[static_cast<std::size_t>(end_of_knot(i))] = departure[static_cast<std::size_t>(i)];
+  }
+  cubic_ = cubics(y);
+}
+
+CurvePlace place_on_curve(double x) {
+  if (!(x < kEnd.back())) return {kEnds - 2, kEnd.back() - kEnd[kEnds - 2]};
+  const std::size_t j =
+      interval_from(cells()[static_cast<std::size_t>(x * kCellsPerUnit)].interval, x);
+  return {j, x - kEnd[j]};
+}
+
+double CurveShape::departure(const CurvePlace& place) const {
+  const auto& c = cubic_[place.interval];
+  const double u = place.u;
+  return c[0] + u * (c[1] + u * (c[2] + u * c[3]));
+}
+
+CurveShape::Point CurveShape::evaluate(double x) const {
+  const double size = std::abs(x);
+  Point out;
+  if (size < kCellUnits) {
+    const double at = size * kCellsPerUnit;
+    const auto i = static_cast<std::size_t>(at);
+    const Cell& cell = cells()[i];
+    const double v = at - static_cast<double>(i);
+    const auto& n = cell.nominal;
+    out.value = n[0] + v * (n[1] + v * (n[2] + v * n[3]));
+    out.slope = (n[1] + v * (2.0 * n[2] + 3.0 * v * n[3])) * kCellsPerUnit;
+    const std::size_t j = interval_from(cell.interval, size);
+    const auto& c = cubic_[j];
+    const double u = std::min(size, kEnd.back()) - kEnd[j];
+    out.value += c[0] + u * (c[1] + u * (c[2] + u * c[3]));
+    if (size < kEnd.back()) out.slope += c[1] + u * (2.0 * c[2] + 3.0 * u * c[3]);
+  } else {
+    out = nominal_formula(size);
+    out.value += departure(place_on_curve(size));
+  }
+  if (fall_ != 0.0 && size > 1.0) {
+    const double beyond = size - 1.0;
+    out.value += fall_ * fall_function(size);
+    out.slope -= fall_ * (beyond * beyond + 0.6 * beyond) / ((0.3 + beyond) * (0.3 + beyond));
+  }
+  out.value *= std::copysign(1.0, x);
+  return out;
+}
+
+namespace {
+bool is_zero(const ArrayXd& values) {
+  return std::all_of(values.begin(), values.end(), [](double v) { return v == 0.0; });
+}
+}  // namespace
+
+Quantities evaluate(const ExperimentData& run, int experiment,
+                    const estimator::VariatorParameters& variator, const Eigen::VectorXd& nuisance,
+                    const Effects& effects) {
+  const int n = run.size();
+  Context c{run,
+            variator,
+            experiment,
+            run.omega_p.value,
+            run.omega_s.value,
+            run.pressure.value,
+            run.torque.value,
+            run.omega_p.slow_slope,
+            run.omega_s.slow_slope,
+            run.command.present ? run.command.value : ArrayXd(),
+            {},
+            {},
+            {},
+            ArrayXd::Zero(n),
+            {},
+            {},
+            ArrayXd::Zero(n),
+            {nuisance[kLnPeakSlipOverdrive], nuisance[kLnPeakSlipLow]},
+            {}};
+  const auto apply = [&](Stage stage) {
+    for (std::size_t i = 0; i < effects.slots->size(); ++i) {
+      const Slot& slot = (*effects.slots)[i];
+      const double value = effects.value[static_cast<Eigen::Index>(i)];
+      if (slot.row->stage == stage && value != 0.0) slot.row->apply(c, slot, value);
+    }
+  };
+  apply(Stage::kMeasurement);
+  c.force_N = variator.secondary_piston_area_m2 * c.pressure + variator.secondary_spring_force_N +
+              variator.secondary_centrifugal_N_s2 * c.omega_s.square();
+  apply(Stage::kForce);
+  c.loss_Nm = nuisance[kLossConstant_Nm] + nuisance[kLossPerSpeed_Nms] * c.omega_p;
+  if (run.torque_is_engine) {
+    c.loss_Nm +=
+        variator.primary_inertia_kg_m2 * (run.omega_p.slope + c.slope_p - run.omega_p.slow_slope);
+  }
+  apply(Stage::kDriveline);
+  c.belt_torque = c.torque - c.loss_Nm;
+  c.deformation = nuisance[kDeformationPerkN] * 1e-3 * c.force_N;
+  // Ratio without load, and capacity per clamp force but for what changes the friction.
+  ArrayXd ratio(n), lever_m(n);
+  const double ratio_low = variator.ratio_low * std::exp(nuisance[kLnRatioLow]);
+  const double ratio_overdrive = variator.ratio_overdrive * std::exp(nuisance[kLnRatioOverdrive]);
+  const double gain = 2.0 / std::cos(variator.half_wedge_angle_rad) * std::exp(nuisance[kLnMuMax]);
+  const double lever_low_m = gain * variator.primary_radius_low_m;
+  const double lever_overdrive_m = gain * variator.primary_radius_overdrive_m;
+  for (int k = 0; k < n; ++k) {
+    const bool low = run.stop[static_cast<std::size_t>(k)] == kLowStop;
+    ratio[k] = low ? ratio_low : ratio_overdrive;
+    lever_m[k] = low ? lever_low_m : lever_overdrive_m;
+  }
+  apply(Stage::kRatio);
+  ratio *= (1.0 - c.deformation).max(0.05);
+  if (!is_zero(c.ln_ratio)) ratio *= c.ln_ratio.exp();  // hardly ever there, and slow
+  c.slip = 1.0 - c.omega_s / (c.omega_p * ratio);
+  apply(Stage::kFriction);
+
+  Quantities q;
+  q.slip = std::move(c.slip);
+  q.capacity = lever_m * c.force_N.max(50.0);
+  if (!is_zero(c.ln_friction)) q.capacity *= c.ln_friction.exp();
+  if (run.torque_s.present) {
+    // From the slow copies of all three channels: the inertia's share would else be fitted to the
+    // noise of the speed's slope.
+    q.balance = c.belt_torque + run.torque.slow - run.torque.value -
+                ratio * (run.torque_s.slow + nuisance[kSecondaryInertia_kgm2] * c.slope_s);
+  }
+  if (run.command.present) {
+    q.tracking =
+        run.pressure.value - (1.0 + nuisance[kCommandGain]) * c.track - nuisance[kCommandOffset_Pa];
+  }
+  q.ratio = std::move(ratio);
+  q.deformation = std::move(c.deformation);
+  q.force_N = std::move(c.force_N);
+  q.belt_torque = std::move(c.belt_torque);
+  q.omega_p = std::move(c.omega_p);
+  q.omega_s = std::move(c.omega_s);
+  q.slope_s = std::move(c.slope_s);
+  q.ln_peak_slip = c.ln_peak_slip;
+  q.fall = c.fall;
+  return q;
+}
+
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,232 @@
+#include "tools/diagnose/report/html.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "tools/diagnose/report/json.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+using Rows = std::vector<std::vector<std::string>>;
+
+std::string number(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.4g", value);
+  return buffer;
+}
+
+std::string short_number(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.2g", value);
+  return buffer;
+}
+
+std::string range(double low, double high) { return number(low) + " .. " + number(high); }
+
+std::string probability(double value) { return value > 0.999 ? "> 0.999" : number(value); }
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string out;
+  for (const std::string& each : words) out += (out.empty() ? "" : ", ") + each;
+  return out;
+}
+
+std::string sizes(const Finding& finding) {
+  std::string out;
+  const auto add = [&](const std::string& text) { out += (out.empty() ? "" : "; ") + text; };
+  for (const auto& [name, value] : finding.parameters) {
+    add(name + " = " + number(value.value) + " (" + range(value.low, value.high) + ")");
+  }
+  for (const auto& [name, value] : finding.fixed) add(name + " = " + number(value));
+  return out;
+}
+
+std::string name_of(const Finding& finding) {
+  return finding.effect + (finding.role.empty() ? "" : " (" + finding.role + ")");
+}
+
+std::string sentence(const Finding& finding) {
+  std::string out = name_of(finding) + ": " + finding.equation + ", " + sizes(finding) +
+                    "; probability " + probability(finding.probability) + ".";
+  if (finding.stability) {
+    out += " There in " + number(100.0 * *finding.stability) +
+           " % of the fits without one experiment.";
+  }
+  if (!finding.aliases.empty()) {
+    out += " These data cannot tell it from " + joined(finding.aliases) + ".";
+  }
+  return out;
+}
+
+void add_findings(report::HtmlPage& page, const Diagnosis& d) {
+  if (d.findings.empty()) return;
+  page.heading("What is wrong");
+  Rows rows;
+  for (const Finding& finding : d.findings) {
+    rows.push_back({name_of(finding), finding.equation, sizes(finding),
+                    probability(finding.probability), joined(finding.aliases),
+                    finding.separate_by});
+  }
+  page.table({"effect", "equation", "size (95 %)", "probability", "these data cannot tell it from",
+              "what would"},
+             rows);
+}
+
+// p-values; what chance does once in a thousand tests counts as a failure.
+void add_tests(report::HtmlPage& page, const Diagnosis& d) {
+  constexpr double kFails = 1e-3, kShown = 1e-12;
+  std::vector<std::string> head{"its residual"};
+  std::map<std::string, std::vector<std::string>> cells;
+  int count = 0, failed = 0;
+  for (const auto& [name, signal] : d.baseline) {
+    for (const auto& [test, p] : signal.tests) {
+      std::vector<std::string>& row = cells[test];
+      row.resize(head.size() - 1);
+      row.push_back((p < kFails ? "fails, p " : "p ") + (p < kShown ? "< 1e-12" : short_number(p)));
+      ++count;
+      if (p < kFails) ++failed;
+    }
+    head.push_back(name);
+  }
+  if (count == 0) return;
+  page.paragraph(
+      "The scatter between experiments of a healthy machine lies beyond the noise, too. Tests of "
+      "these residuals, with that scatter and the noise's autocorrelation counted: " +
+      std::to_string(failed) + " of " + std::to_string(count) +
+      " fail (p below 0.001). An empty cell: these data cannot show it there.");
+  Rows rows;
+  for (auto& [test, row] : cells) {
+    const bool plain = test == "whiteness" || test.starts_with("order_spectrum");
+    row.resize(head.size() - 1);
+    row.insert(row.begin(), (plain ? "" : "follows ") + test);
+    rows.push_back(std::move(row));
+  }
+  page.table(head, rows);
+}
+
+void add_gain(std::vector<std::string>& row, const BeforeAfter& gain) {
+  for (const std::string& cell :
+       {number(gain.before), number(gain.after), range(gain.low, gain.high)}) {
+    row.push_back(cell);
+  }
+}
+
+void add_errors(report::HtmlPage& page, const Diagnosis& d) {
+  if (d.baseline.empty()) return;
+  page.heading("The model as given against the data");
+  Rows rows;
+  for (const auto& [name, signal] : d.baseline) {
+    rows.push_back({name, number(signal.rmse), number(signal.noise_floor),
+                    number(100.0 * signal.unexplained_share) + " %"});
+  }
+  page.table({"signal, SI", "error, rms", "noise", "beyond the noise"}, rows);
+  add_tests(page, d);
+  if (!d.held_out.empty()) {
+    page.heading("Errors on experiments that were not used for the fit");
+    if (std::all_of(d.held_out.begin(), d.held_out.end(),
+                    [](const auto& each) { return each.second.before == each.second.after; })) {
+      page.paragraph(d.findings.empty()
+                         ? "Nothing was found that would change them."
+                         : "These signals are averaged over revolutions: what was found changes "
+                           "nothing here, it stands in the order spectra.");
+    }
+    rows.clear();
+    for (const auto& [name, gain] : d.held_out) {
+      rows.push_back({name});
+      add_gain(rows.back(), gain);
+    }
+    if (d.mu_max) {
+      rows.push_back({"mu_max, relative"});
+      add_gain(rows.back(), {d.mu_max->before, d.mu_max->after, d.mu_max->low, d.mu_max->high});
+    }
+    page.table({"signal, SI", "before", "after", "difference (95 %)"}, rows);
+  }
+  if (d.simulation.empty()) return;
+  page.heading("The simulation run forward");
+  page.paragraph(
+      "Integrated over each experiment, driven by what drives the machine there, up to the peak of "
+      "friction, where it ends and begins anew once the belt grips. Before and after: on "
+      "experiments "
+      "that were not used for the fit.");
+  std::vector<std::string> head{"signal, SI", "error as given, rms", "noise"};
+  if (d.simulation.begin()->second.left_out) {
+    head.insert(head.end(), {"before", "after", "difference (95 %)"});
+  }
+  rows.clear();
+  for (const auto& [name, signal] : d.simulation) {
+    rows.push_back({name, number(signal.rmse), number(signal.noise_floor)});
+    if (signal.left_out) add_gain(rows.back(), *signal.left_out);
+    rows.back().resize(head.size());
+  }
+  page.table(head, rows);
+}
+
+void add_tables(report::HtmlPage& page, const Diagnosis& d) {
+  Rows rows;
+  if (!d.reruns.empty()) {
+    page.heading("By the estimator, told the model before and after");
+    std::vector<std::string> head{"experiment", "from, s"};
+    for (const RerunFigure& figure : kRerunFigures) head.emplace_back(figure.heading);
+    for (const Rerun& each : d.reruns) {
+      char from[32];
+      std::snprintf(from, sizeof from, "%.2f", each.start_s);
+      rows.push_back({each.log, from});
+      for (const RerunFigure& figure : kRerunFigures) {
+        rows.back().push_back(figure_text(each, figure));
+      }
+    }
+    page.table(head, rows);
+  }
+  if (!d.not_identifiable.empty()) {
+    page.heading("What these experiments cannot show");
+    rows.clear();
+    for (const NotIdentifiable& each : d.not_identifiable) {
+      std::string sizes;
+      for (const auto& [name, value] : each.smallest_detectable) {
+        sizes += name + " " + number(value) + " ";
+      }
+      rows.push_back({each.effect, sizes, each.reason});
+    }
+    page.table({"effect", "smallest size that would be seen", "why"}, rows);
+  }
+}
+
+}  // namespace
+
+std::string html_text(const Diagnosis& d, const Plots& plots) {
+  report::HtmlPage page("BeltGrip: diagnosis");
+  page.paragraph(headline(d));
+  if (d.verdict == Verdict::kNothingWrong) {
+    page.paragraph(
+        "Nothing stands out from noise and from the scatter between experiments. What these "
+        "experiments could not have shown is listed below.");
+  }
+  for (const Finding& finding : d.findings) page.paragraph(sentence(finding));
+  if (d.unexplained) {
+    page.paragraph("Something that is not in the library acts on " + d.unexplained->acts_on +
+                   " and follows " + joined(d.unexplained->depends_on) + ": " +
+                   number(100.0 * d.unexplained->share) + " % of the residual's energy.");
+  }
+  if (!d.next_experiment.empty()) page.paragraph("Next experiment: " + d.next_experiment + ".");
+  add_findings(page, d);
+  add_errors(page, d);
+  add_tables(page, d);
+  const auto draw = [&](const char* heading, const std::vector<report::Chart>& charts) {
+    if (charts.empty()) return;
+    page.heading(heading);
+    page.charts(charts);
+  };
+  draw("Measured and simulated", plots.signals);
+  draw("Friction", plots.friction);
+  draw("Residual over time", plots.over_time);
+  draw("Residual over what it may depend on", plots.over_variables);
+  draw("Order spectra", plots.orders);
+  if (!d.notes.empty()) {
+    page.heading("Notes");
+    for (const std::string& note : d.notes) page.paragraph(note);
+  }
+  return page.text();
+}
+
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,266 @@
+#include "tools/diagnose/report/json.h"
+
+#include <cstdio>
+
+#include "tools/text/json_writer.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+const char* verdict_text(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kNone:
+      return nullptr;
+    case Verdict::kNothingWrong:
+      return "nothing_wrong";
+    case Verdict::kExplained:
+      return "explained";
+    case Verdict::kUnexplained:
+      return "unexplained";
+  }
+  return nullptr;
+}
+
+void interval(cli::JsonWriter& json, double low, double high) {
+  json.key("ci95").begin_array().value(low).value(high).end_array();
+}
+
+std::string number(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.4g", value);
+  return buffer;
+}
+
+}  // namespace
+
+std::string figure_text(const Rerun& rerun, const RerunFigure& figure) {
+  const auto text = [&](const std::optional<Measured>& side) {
+    return side ? number((*side).*figure.value) : std::string("none");
+  };
+  return text(rerun.before) + " -> " + text(rerun.after);
+}
+
+std::string json_text(const Diagnosis& d) {
+  cli::JsonWriter json;
+  json.begin_object();
+  const char* verdict = verdict_text(d.verdict);
+  json.key("verdict");
+  verdict == nullptr ? json.null() : json.value(verdict);
+  json.field("complete", d.complete);
+  json.field("experiments", d.experiments);
+  json.field("usable_s", 0.1 * d.samples);
+  json.key("baseline").begin_object();
+  for (const auto& [name, signal] : d.baseline) {
+    json.key(name).begin_object();
+    json.field("rmse", signal.rmse).field("noise_floor", signal.noise_floor);
+    json.field("unexplained_share", signal.unexplained_share);
+    json.key("tests").begin_object();
+    for (const auto& [test, p] : signal.tests) json.field(test, p);
+    json.end_object().end_object();
+  }
+  json.end_object();
+  json.key("simulation").begin_object();
+  for (const auto& [name, signal] : d.simulation) {
+    json.key(name).begin_object();
+    json.field("rmse", signal.rmse).field("noise_floor", signal.noise_floor);
+    json.key("held_out");
+    if (signal.left_out) {
+      json.begin_object();
+      json.field("rmse_before", signal.left_out->before);
+      json.field("rmse_after", signal.left_out->after);
+      interval(json, signal.left_out->low, signal.left_out->high);
+      json.end_object();
+    } else {
+      json.null();
+    }
+    json.end_object();
+  }
+  json.end_object();
+  json.key("findings").begin_array();
+  for (const Finding& finding : d.findings) {
+    json.begin_object();
+    json.field("effect", finding.effect);
+    json.key("parameters").begin_object();
+    for (const auto& [name, value] : finding.parameters) {
+      json.key(name).begin_object().field("value", value.value);
+      interval(json, value.low, value.high);
+      json.end_object();
+    }
+    for (const auto& [name, value] : finding.fixed) {
+      json.key(name).begin_object().field("value", value);
+      interval(json, value, value);
+      json.end_object();
+    }
+    json.end_object();
+    if (!finding.role.empty()) json.field("role", finding.role);
+    json.field("probability", finding.probability);
+    if (finding.stability) json.field("stability", *finding.stability);
+    json.key("aliases").begin_array();
+    for (const std::string& alias : finding.aliases) json.value(alias);
+    json.end_array();
+    json.key("separate_by");
+    finding.separate_by.empty() ? json.null() : json.value(finding.separate_by);
+    json.key("gain").begin_object();
+    for (const auto& [name, gain] : finding.gain) {
+      json.key(name).begin_object().field("before", gain.before).field("after", gain.after);
+      interval(json, gain.low, gain.high);
+      json.end_object();
+    }
+    json.end_object().end_object();
+  }
+  json.end_array();
+  json.key("unexplained");
+  if (d.unexplained) {
+    json.begin_object().field("acts_on", d.unexplained->acts_on);
+    json.key("depends_on").begin_array();
+    for (const std::string& role : d.unexplained->depends_on) json.value(role);
+    json.end_array().field("share", d.unexplained->share).end_object();
+  } else {
+    json.null();
+  }
+  json.key("not_identifiable").begin_array();
+  for (const NotIdentifiable& each : d.not_identifiable) {
+    json.begin_object().field("effect", each.effect);
+    json.key("smallest_detectable").begin_object();
+    for (const auto& [name, value] : each.smallest_detectable) json.field(name, value);
+    json.end_object().field("reason", each.reason).end_object();
+  }
+  json.end_array();
+  json.key("held_out").begin_object();
+  for (const auto& [name, gain] : d.held_out) {
+    json.key(name).begin_object();
+    json.field("rmse_before", gain.before).field("rmse_after", gain.after);
+    interval(json, gain.low, gain.high);
+    json.end_object();
+  }
+  if (d.mu_max) {
+    json.key("mu_max").begin_object();
+    json.field("error_before", d.mu_max->before).field("error_after", d.mu_max->after);
+    interval(json, d.mu_max->low, d.mu_max->high);
+    json.end_object();
+  }
+  json.end_object();
+  json.key("reruns").begin_array();
+  for (const Rerun& each : d.reruns) {
+    json.begin_object().field("log", each.log).field("start_s", each.start_s);
+    for (const RerunFigure& figure : kRerunFigures) {
+      json.key(figure.key).begin_object();
+      for (const auto& [when, side] : {std::pair{"before", &each.before}, {"after", &each.after}}) {
+        json.key(when);
+        *side ? json.value((**side).*figure.value) : json.null();
+      }
+      json.end_object();
+    }
+    json.end_object();
+  }
+  json.end_array();
+  json.key("next_experiment");
+  d.next_experiment.empty() ? json.null() : json.value(d.next_experiment);
+  json.key("machine").begin_object();
+  for (const auto& [name, value] : d.machine) {
+    json.key(name).begin_object().field("value", value.value);
+    interval(json, value.low, value.high);
+    json.end_object();
+  }
+  json.end_object();
+  json.key("notes").begin_array();
+  for (const std::string& note : d.notes) json.value(note);
+  json.end_array();
+  json.end_object();
+  return json.take() + "\n";
+}
+
+std::string headline(const Diagnosis& d) {
+  std::string what;
+  switch (d.verdict) {
+    case Verdict::kNone:
+      what = d.complete ? "nothing can be said" : "nothing found so far";
+      break;
+    case Verdict::kNothingWrong:
+      what = "nothing wrong";
+      break;
+    case Verdict::kExplained:
+      what = "explained";
+      break;
+    case Verdict::kUnexplained:
+      what = "unexplained";
+  }
+  return what + " (" + std::to_string(d.experiments) + " experiments, " + number(0.1 * d.samples) +
+         " s usable)" + (d.complete ? "" : ", stopped before the end");
+}
+
+std::string plain_text(const Diagnosis& d) {
+  std::string out = "verdict: " + headline(d) + "\n";
+  for (const auto& [name, signal] : d.baseline) {
+    out += "  " + name + ": the simulation is off by " + number(signal.rmse) + " rms, noise " +
+           number(signal.noise_floor) + "\n";
+  }
+  for (const Finding& finding : d.findings) {
+    out += finding.effect + (finding.role.empty() ? "" : " (" + finding.role + ")") + ": " +
+           finding.equation + "\n";
+    for (const auto& [name, value] : finding.parameters) {
+      out += "  " + name + " = " + number(value.value) + " [" + number(value.low) + ", " +
+             number(value.high) + "]\n";
+    }
+    for (const auto& [name, value] : finding.fixed)
+      out += "  " + name + " = " + number(value) + "\n";
+    out += "  probability " + number(finding.probability) + "\n";
+    if (finding.stability) {
+      out += "  there in " + number(100.0 * *finding.stability) +
+             " % of the fits without one experiment\n";
+    }
+    if (!finding.aliases.empty()) {
+      out += "  these data cannot tell it from:";
+      for (const std::string& alias : finding.aliases) out += " " + alias;
+      out += "\n  what would: " + finding.separate_by + "\n";
+    }
+  }
+  if (d.unexplained) {
+    out += "unexplained: acts on " + d.unexplained->acts_on + ", follows";
+    for (const std::string& role : d.unexplained->depends_on) out += " " + role;
+    out += "\n";
+  }
+  if (!d.held_out.empty()) {
+    out += "on experiments not used for the fit (before -> after, 95 % of the difference):\n";
+  }
+  for (const auto& [name, gain] : d.held_out) {
+    out += "  " + name + ": " + number(gain.before) + " -> " + number(gain.after) + " [" +
+           number(gain.low) + ", " + number(gain.high) + "]\n";
+  }
+  for (const auto& [name, signal] : d.simulation) {
+    if (!signal.left_out) continue;
+    out += "  " + name + ", simulated forward: " + number(signal.left_out->before) + " -> " +
+           number(signal.left_out->after) + " [" + number(signal.left_out->low) + ", " +
+           number(signal.left_out->high) + "]\n";
+  }
+  if (d.mu_max) {
+    out += "  mu_max, relative error: " + number(d.mu_max->before) + " -> " +
+           number(d.mu_max->after) + "\n";
+  }
+  if (!d.reruns.empty()) {
+    out += "by the estimator, told the model before -> after (";
+    for (const RerunFigure& figure : kRerunFigures) {
+      out += (&figure == kRerunFigures.data() ? "" : "; ") + std::string(figure.heading);
+    }
+    out += "):\n";
+  }
+  for (const Rerun& each : d.reruns) {
+    char from[32];
+    std::snprintf(from, sizeof from, ", from %.2f s:", each.start_s);
+    out += "  " + each.log + from;
+    for (const RerunFigure& figure : kRerunFigures) {
+      out += (&figure == kRerunFigures.data() ? " " : "; ") + figure_text(each, figure);
+    }
+    out += "\n";
+  }
+  if (!d.not_identifiable.empty()) {
+    out += "not to be seen in these data:";
+    for (const NotIdentifiable& each : d.not_identifiable) out += " " + each.effect;
+    out += "\n";
+  }
+  if (!d.next_experiment.empty()) out += "next experiment: " + d.next_experiment + "\n";
+  for (const std::string& note : d.notes) out += "note: " + note + "\n";
+  return out;
+}
+
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,412 @@
+#include "tools/diagnose/run/diagnose.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "estimator/physics/clamp_force.h"
+#include "estimator/statistics/distributions.h"
+#include "tools/diagnose/decide/namer.h"
+#include "tools/diagnose/decide/plausibility.h"
+#include "tools/diagnose/infer/engine.h"
+#include "tools/diagnose/infer/gain.h"
+#include "tools/diagnose/infer/parallel.h"
+#include "tools/diagnose/infer/residual_tests.h"
+#include "tools/diagnose/model/curve_family.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+constexpr int kSamplesMin = 100;            // 10 s of usable data
+constexpr std::size_t kExperimentsMin = 3;  // from where on their scatter is known
+constexpr double kDetectable = 5.0;         // sigmas: found with 90 % and more
+constexpr double kRealistic = 3.0;          // in usual sizes: an effect is hardly ever larger
+
+double quantile_975(double degrees) {
+  double low = 0.0, high = 100.0;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (estimator::student_p(middle, degrees) > 0.05 ? low : high) = middle;
+  }
+  return low;
+}
+
+std::string text_of(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.3g", value);
+  return buffer;
+}
+
+class Run {
+ public:
+  explicit Run(Request request) : request_(std::move(request)) {}
+
+  Answer run() {
+    answer_.extended = request_.model;
+    std::vector<ExperimentData> runs;
+    drop_copies(request_.experiments, doubts_);
+    runs.resize(request_.experiments.size());
+    in_parallel(request_.jobs, runs.size(), [&](std::size_t i) {
+      runs[i] = prepare(request_.experiments[i], request_.model.variator);
+    });
+    out().experiments = static_cast<int>(runs.size());
+    for (const ExperimentData& run : runs) {
+      out().samples += run.valid_count;
+      for (const std::string& note : run.notes) out().notes.push_back(note);
+      if (run.valid_count == 0) {
+        out().notes.push_back(run.name + ": " + why_unusable(run));
+      }
+    }
+    drop_uneven_channels(runs, doubts_);
+    check_same_machine(runs, request_.model.variator, doubts_);
+    check_torques(runs, doubts_);
+    if (out().samples < kSamplesMin) {
+      out().notes.push_back("too little data: " + text_of(0.1 * out().samples) +
+                            " s usable, at least 10 s are needed; nothing can be said");
+      nothing_identifiable("too little data");
+      tell_doubts();
+      return std::move(answer_);
+    }
+    check_friction(runs, request_.model.variator, doubts_);
+    progress(0.1, "fit");
+    Engine engine(make_campaign(std::move(runs), request_.model));
+    Naming naming = name_effects(engine, stop(), request_.jobs);
+    progress(0.8, "gain");
+    fill(engine, naming);
+    if (request_.with_plots) {
+      answer_.plots = make_plots(engine.campaign(), naming.nominal.state, naming.hypothesis.state,
+                                 request_.experiments);
+    }
+    progress(1.0, "done");
+    return std::move(answer_);
+  }
+
+ private:
+  Diagnosis& out() { return answer_.diagnosis; }
+  std::function<bool()> stop() const {
+    return request_.stop ? request_.stop : [] { return false; };
+  }
+  void progress(double share, const std::string& what) const {
+    if (request_.progress) request_.progress(share, what);
+  }
+
+  static std::string why_unusable(const ExperimentData& run) {
+    std::string missing;
+    const auto need = [&](const GridSignal& signal, const char* name) {
+      if (!signal.present) missing += (missing.empty() ? "" : ", ") + std::string(name);
+    };
+    need(run.omega_p, "primary_speed");
+    need(run.omega_s, "secondary_speed");
+    need(run.pressure, "secondary_pressure");
+    need(run.torque, "primary_torque or engine_torque");
+    if (!missing.empty()) return "not used: no " + missing;
+    int at_stop = 0;
+    for (const int stop : run.stop) at_stop += stop != kNoStop;
+    if (at_stop == 0) {
+      return "not used: the speed ratio is never near an end stop (units of the speeds, "
+             "ratio_low and ratio_overdrive of [variator]?)";
+    }
+    return "not used: never 1.6 s without gaps, shifts, saturation or run-away at an end stop";
+  }
+
+  void tell_doubts() {
+    out().notes.insert(out().notes.end(), doubts_.notes.begin(), doubts_.notes.end());
+  }
+
+  void nothing_identifiable(const std::string& reason) {
+    std::string last;
+    for (const EffectRow& row : effect_rows()) {
+      if (row.id == last) continue;
+      last = row.id;
+      out().not_identifiable.push_back({std::string(row.id), {}, reason});
+    }
+  }
+
+  void fill(Engine& engine, const Naming& naming) {
+    const Campaign& campaign = engine.campaign();
+    const ModelState& extended = naming.hypothesis.state;
+    out().complete = !stop()();
+    if (!out().complete) {
+      out().notes.emplace_back("stopped before the end: what is not named here may be there");
+    }
+    fill_machine(engine, naming);
+    check_fitted_friction(out().machine, doubts_);
+    tell_doubts();
+    fill_baseline(engine, naming);
+    out().simulation = simulated_signals(campaign, naming.nominal.state);
+    fill_not_identifiable(engine, naming);
+    if (doubts_.impossible) {
+      nothing_identifiable("the data cannot be of one belt as configured");
+      out().verdict = Verdict::kUnexplained;
+      out().unexplained = doubts_.impossible;
+      return;
+    }
+    const auto used = static_cast<std::size_t>(
+        std::count_if(campaign.runs.begin(), campaign.runs.end(),
+                      [](const ExperimentData& run) { return run.valid_count > 0; }));
+    if (used < kExperimentsMin) {
+      out().notes.push_back(
+          "fewer than three experiments: how they scatter is not known, and what "
+          "changes from one to the next (wear, temperature) cannot be seen");
+    }
+    std::vector<int> slots;
+    slots.reserve(naming.accepted.size());
+    for (const Accepted& each : naming.accepted) slots.push_back(each.slot);
+    Campaign held_out = campaign;
+    if (!request_.held_out.empty()) {
+      held_out.runs.clear();
+      for (const SignalTable& table : request_.held_out) {
+        held_out.runs.push_back(prepare(table, request_.model.variator));
+      }
+      held_out.slip_noise_share = estimate_slip_noise_shares(held_out, naming.nominal.state);
+    }
+    const auto gain_over = [&](const Nominal& nominal) -> Gain {
+      if (!request_.held_out.empty()) return held_out_gain(held_out, nominal.state, extended);
+      if (campaign.runs.size() < 3) return {};
+      return left_out_gain(engine, nominal, extended, slots);
+    };
+    const Gain gain = gain_over(naming.nominal);
+    for (const int slot : naming.not_confirmed) {
+      out().notes.push_back(campaign.slots[static_cast<std::size_t>(slot)].label() +
+                            ": fits, but does not help to predict experiments left out of the "
+                            "fit; not named");
+    }
+    // What does not help on the experiments that the user has set aside is no finding either.
+    const auto helps = [&](const Gain& over_sharp) {
+      return over_sharp.better() && !over_sharp.worse(noise_floors(campaign, naming.sharp.state));
+    };
+    const bool refuted = !request_.held_out.empty() && !gain.signals.empty() && !slots.empty() &&
+                         !helps(gain_over(naming.sharp));
+    if (refuted) {
+      out().notes.push_back(
+          "what was found does not help to predict the held-out experiments; not named");
+    }
+    const bool unconfirmed =
+        used < kExperimentsMin && request_.held_out.empty() && !naming.accepted.empty();
+    for (const Accepted& each : naming.accepted) {
+      if (!unconfirmed) break;
+      out().notes.push_back(campaign.slots[static_cast<std::size_t>(each.slot)].label() +
+                            ": fits, but nothing confirms it with fewer than three experiments; "
+                            "not named");
+    }
+    const bool named = !refuted && !unconfirmed;
+    out().held_out = gain.signals;
+    out().mu_max = gain.mu_max;
+    for (const auto& [name, errors] : gain.forward) out().simulation[name].left_out = errors;
+    fill_findings(engine, named ? naming.accepted : std::vector<Accepted>(), naming, gain);
+    if (naming.unknown) {
+      out().unexplained =
+          Unexplained{naming.unknown->acts_on, {naming.unknown->depends_on}, naming.unknown->share};
+    }
+    out().verdict = naming.unknown                   ? Verdict::kUnexplained
+                    : !out().findings.empty()        ? Verdict::kExplained
+                    : out().complete && !unconfirmed ? Verdict::kNothingWrong
+                                                     : Verdict::kNone;
+    propose(engine, naming);
+    answer_.extended = request_.model;
+    const ModelState& stored = !named ? naming.nominal.state : extended;
+    store_machine(stored.nuisance, answer_.extended);
+    for (const Ripple& ripple : naming.ripples) {
+      if (ripple.found) {
+        answer_.extended.effects["speed_ripple"].parameters[ripple.shaft] = ripple.amplitude;
+      }
+    }
+    store_effects(campaign.slots, campaign.switched_on + stored.effects, stored.nuisance,
+                  answer_.extended);
+  }
+
+  void fill_machine(const Engine& engine, const Naming& naming) {
+    const Fit& fit = naming.hypothesis.fit;
+    for (std::size_t j = 0; j < engine.active_nuisances().size(); ++j) {
+      const int p = engine.active_nuisances()[j];
+      const auto i = static_cast<Eigen::Index>(j);
+      double variance = fit.covariance(i, i) * engine.scale(p) * engine.scale(p);
+      if (const int first = first_knot(p); first >= 0) {
+        const Eigen::Index block = i - (p - first);
+        const auto lever = curve_modes().row(p - first);
+        variance = lever.dot(fit.covariance.block(block, block, kShapeKnots, kShapeKnots) *
+                             lever.transpose());
+      }
+      const double sigma = std::sqrt(std::max(variance, 0.0));
+      const double value = naming.hypothesis.state.nuisance[p];
+      const bool ln = p == kLnMuMax || p == kLnPeakSlipOverdrive || p == kLnPeakSlipLow;
+      const auto shown = [&](double v) { return ln ? std::exp(v) : v; };
+      std::string name(engine.campaign().nuisances[static_cast<std::size_t>(p)].name);
+      if (ln) name = name.substr(3);
+      out().machine[name] = {shown(value), shown(value - 1.96 * sigma),
+                             shown(value + 1.96 * sigma)};
+    }
+  }
+
+  void fill_baseline(const Engine& engine, const Naming& naming) {
+    const Campaign& campaign = engine.campaign();
+    std::map<std::string, SignalErrors::Sum> sums;
+    for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+      for (const auto& [name, sum] :
+           signal_errors(campaign, static_cast<int>(e), naming.nominal.state).signal) {
+        sums[name].squares += sum.squares;
+        sums[name].count += sum.count;
+      }
+    }
+    const auto floors = noise_floors(campaign, naming.nominal.state);
+    std::vector<ResidualTest> tests = test_residuals(engine, naming.nominal.state);
+    for (const UnknownGroup& group : naming.nominal_groups) {
+      tests.push_back({group.acts_on, group.depends_on, estimator::chi2_p(group.chi2, 1)});
+    }
+    for (const Ripple& ripple : naming.ripples) {
+      tests.push_back(
+          {"ratio", "order_spectrum_" + ripple.shaft, estimator::chi2_p(ripple.chi2, 1)});
+    }
+    for (const auto& [name, sum] : sums) {
+      if (sum.count == 0.0) continue;
+      BaselineSignal signal;
+      signal.rmse = std::sqrt(sum.squares / sum.count);
+      signal.noise_floor = floors.at(name);
+      signal.unexplained_share =
+          std::max(0.0, 1.0 - std::pow(signal.noise_floor / std::max(signal.rmse, 1e-300), 2.0));
+      const std::string acts_on = name == "secondary_speed"      ? "ratio"
+                                  : name == "secondary_torque"   ? "torque"
+                                  : name == "secondary_pressure" ? "clamp force"
+                                                                 : "friction";
+      for (const ResidualTest& test : tests) {
+        if (test.acts_on == acts_on) signal.tests[test.name] = test.p;
+      }
+      out().baseline[name] = signal;
+    }
+  }
+
+  void fill_findings(const Engine& engine, const std::vector<Accepted>& accepted,
+                     const Naming& naming, const Gain& gain) {
+    const Campaign& campaign = engine.campaign();
+    for (const Accepted& each : accepted) {
+      const Slot& slot = campaign.slots[static_cast<std::size_t>(each.slot)];
+      const auto& h = naming.hypothesis;
+      const double value = h.state.effects[each.slot];
+      const double half = quantile_975(each.degrees) * each.sigma;
+      const auto found = std::find_if(out().findings.begin(), out().findings.end(),
+                                      [&](const Finding& f) { return f.effect == slot.row->id; });
+      Finding& finding = found == out().findings.end() ? out().findings.emplace_back() : *found;
+      finding.effect = slot.row->id;
+      finding.probability = std::max(finding.probability, each.probability);
+      finding.stability = std::min(finding.stability.value_or(1.0), each.stability);
+      finding.separate_by = slot.row->separating;
+      finding.equation = slot.row->equation;
+      finding.acts_on = slot.row->acts_on;
+      finding.role = slot.role;
+      if (slot.counts_experiments()) finding.fixed["at"] = slot.index;
+      const double a = slot.to_contract(value - half, h.state.nuisance);
+      const double b = slot.to_contract(value + half, h.state.nuisance);
+      finding.parameters[std::string(slot.row->parameter)] = {
+          slot.to_contract(value, h.state.nuisance), std::min(a, b), std::max(a, b)};
+      for (const int alias : each.aliases) {
+        const std::string id(campaign.slots[static_cast<std::size_t>(alias)].row->id);
+        if (id != finding.effect && std::find(finding.aliases.begin(), finding.aliases.end(), id) ==
+                                        finding.aliases.end()) {
+          finding.aliases.push_back(id);
+        }
+      }
+      if (finding.effect == "torque_delay" && finding.aliases.empty()) {
+        finding.aliases.emplace_back("channel_skew");  // of the torque: the same thing
+      }
+      finding.gain = gain.signals;
+      if (gain.mu_max) {  // relative error of the friction at the peak
+        finding.gain["mu_max"] = {gain.mu_max->before, gain.mu_max->after, gain.mu_max->low,
+                                  gain.mu_max->high};
+      }
+    }
+    for (const Ripple& ripple : naming.ripples) {
+      if (!ripple.found) continue;
+      const auto found = std::find_if(out().findings.begin(), out().findings.end(),
+                                      [](const Finding& f) { return f.effect == "speed_ripple"; });
+      Finding& finding = found == out().findings.end() ? out().findings.emplace_back() : *found;
+      finding.effect = "speed_ripple";
+      finding.probability = 1.0;
+      finding.equation = "omega_measured = omega_true (1 + a sin(phi + phi0))";
+      finding.acts_on = "speed";
+      finding.parameters[ripple.shaft] = {ripple.amplitude, ripple.amplitude - 1.96 * ripple.sigma,
+                                          ripple.amplitude + 1.96 * ripple.sigma};
+    }
+    for (Finding& finding : out().findings) {
+      if (finding.aliases.empty()) finding.separate_by.clear();
+    }
+  }
+
+  // What an effect would have to be like to be seen; those that hardly ever are that large.
+  void fill_not_identifiable(const Engine& engine, const Naming& naming) {
+    const Campaign& campaign = engine.campaign();
+    std::map<std::string, std::map<std::string, double>> smallest;
+    std::map<std::string, bool> visible;
+    std::map<std::string, double> absorbed;
+    for (const Score& score : naming.last_screen) {
+      const Slot& slot = campaign.slots[static_cast<std::size_t>(score.slot)];
+      const std::string id(slot.row->id), parameter(slot.row->parameter);
+      visible.try_emplace(id, false);
+      if (!(score.in_curve < kInCurveMax)) continue;
+      const double size =
+          score.sigma > 0.0 ? kDetectable * score.sigma : std::numeric_limits<double>::infinity();
+      auto& known = smallest[id];
+      if (!known.contains(parameter) || size < known[parameter]) known[parameter] = size;
+      visible[id] |= size < kRealistic * slot.row->typical;
+      absorbed[id] = std::max(absorbed[id], score.absorbed);
+    }
+    const auto named = [&](std::string_view id) {
+      return std::any_of(naming.accepted.begin(), naming.accepted.end(), [&](const Accepted& each) {
+        return campaign.slots[static_cast<std::size_t>(each.slot)].row->id == id;
+      });
+    };
+    for (const EffectRow& row : effect_rows()) {
+      const std::string id(row.id);
+      const std::vector<NotIdentifiable>& told = out().not_identifiable;
+      const bool again = !told.empty() && told.back().effect == id;  // another parameter of it
+      if (visible.contains(id) || named(id) || again || row.apply == nullptr) continue;
+      out().not_identifiable.push_back({id, {}, "no signal in these data shows it"});
+    }
+    for (const auto& [id, seen] : visible) {
+      if (seen || named(id)) continue;
+      out().not_identifiable.push_back(
+          {id, smallest[id],
+           smallest[id].empty()  ? "no other thing here than a friction curve that runs otherwise"
+           : absorbed[id] > 0.99 ? "absorbed by a fitted constant of the machine"
+                                 : "the experiments hardly move what it depends on"});
+    }
+  }
+
+  void propose(const Engine& engine, const Naming& naming) {
+    for (const Finding& finding : out().findings) {
+      if (!finding.aliases.empty()) {
+        out().next_experiment = finding.separate_by;
+        return;
+      }
+    }
+    if (naming.unknown) {
+      out().next_experiment = "repeat one experiment with only " + naming.unknown->depends_on +
+                              " changed, at three levels, the first one again at the end";
+      return;
+    }
+    if (engine.campaign().runs.size() < 3) {
+      out().next_experiment =
+          "repeat the reference experiment three times: the scatter between "
+          "experiments is not known";
+      return;
+    }
+    if (!out().not_identifiable.empty()) {
+      const std::string& id = out().not_identifiable.front().effect;
+      for (const EffectRow& row : effect_rows()) {
+        if (row.id == id) {
+          out().next_experiment = row.separating;
+          return;
+        }
+      }
+    }
+  }
+
+  Request request_;
+  Answer answer_;
+  Doubts doubts_;
+};
+
+}  // namespace
+
+Answer diagnose(Request request) { return Run(std::move(request)).run(); }
+
+}  // namespace beltgrip::diagnose

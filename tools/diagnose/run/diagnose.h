@@ -1,0 +1,33 @@
+// The whole diagnosis: tables in, one result out.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tools/diagnose/data/diagnosis.h"
+#include "tools/diagnose/data/signal_table.h"
+#include "tools/diagnose/model/model_file.h"
+#include "tools/diagnose/report/plots.h"
+
+namespace beltgrip::diagnose {
+
+struct Request {
+  std::vector<SignalTable> experiments;  // in the order in which they were made
+  std::vector<SignalTable> held_out;     // empty: experiments are held out in turn
+  ModelFile model;
+  bool with_plots = false;
+  int jobs = 1;                // threads; the answer is the same for every number
+  std::function<bool()> stop;  // true: end with what is known
+  std::function<void(double share, const std::string& what)> progress;
+};
+
+struct Answer {
+  Diagnosis diagnosis;
+  ModelFile extended;  // the model with what was found
+  Plots plots;
+};
+
+Answer diagnose(Request request);
+
+}  // namespace beltgrip::diagnose

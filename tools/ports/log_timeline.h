@@ -1,0 +1,48 @@
+// One or several logs as one timeline: merged by stamp, frames of one interface or of all, of one
+// bus or two, stamps made monotonic. A single stamp that leaps ahead of its successor marks a
+// garbled line: the frame is dropped and counted. Where the stamps of a log step back, or ahead by
+// more than ten minutes, its clock was set: time goes on without the step. Memory flat. Tools only.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "can_dbc/frame/can_frame.h"
+#include "can_dbc/log/can_log.h"
+
+namespace beltgrip::sim {
+
+struct TimelineCounters {
+  std::uint64_t frames = 0;       // delivered
+  std::uint64_t frames_bad = 0;   // dropped because of their stamp
+  std::uint64_t clock_steps = 0;  // steps of a log's clock that were taken out
+  std::int64_t first_ns = 0;      // stamp of the first frame delivered
+  std::int64_t last_ns = 0;       // and of the last
+};
+
+struct FrameSelection {
+  std::string interface;            // empty: all
+  std::string further_interface;    // its frames are of bus 1, all others of bus 0; empty: none
+  std::vector<can::CanId> ignored;  // BeltGrip's own frames are no input
+};
+
+class LogTimeline {
+ public:
+  LogTimeline(std::vector<std::unique_ptr<can::LogReader>> logs, FrameSelection selection);
+  ~LogTimeline();
+
+  bool next(can::StampedFrame& frame);
+  const TimelineCounters& counters() const { return counters_; }
+  // Sums over the logs; first_bad of each in turn.
+  can::LogStats stats() const;
+
+ private:
+  class Source;
+  FrameSelection selection_;
+  std::vector<std::unique_ptr<Source>> sources_;
+  TimelineCounters counters_;
+};
+
+}  // namespace beltgrip::sim

@@ -1,0 +1,36 @@
+// The experiments of a log as a page to look at: results in a table, and for each experiment its
+// course over time and its traction curve (the paper's Figures 6 and 7). Tools only.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/report/html_page.h"
+
+namespace beltgrip::report {
+
+inline constexpr std::size_t kPhaseCount = 4;
+
+struct ExperimentCourse {
+  std::string name;                  // of its heading
+  std::vector<std::string> verdict;  // a cell for each of kVerdictHeader
+  // One entry a sample; all of one length.
+  std::vector<double> t_s, mu_star, sigma_star_percent, friction_slope_per_percent;
+  std::vector<std::size_t> phase;  // 0 .. kPhaseCount - 1
+  std::optional<double> stop_s;
+  struct Peak {
+    double mu_max, low, high;  // and the 95 % interval
+  };
+  std::optional<Peak> peak;  // where there is a value
+};
+inline const std::vector<std::string> kVerdictHeader{"experiment",         "outcome",
+                                                     "why it ended",       "mu_max",
+                                                     "95 % interval",      "slip at the stop, %",
+                                                     "slip at the peak, %"};
+
+void add_experiments(HtmlPage& page, const std::vector<ExperimentCourse>& experiments,
+                     const std::array<std::string, kPhaseCount>& phase_names);
+
+}  // namespace beltgrip::report
