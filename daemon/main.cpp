@@ -5,7 +5,6 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -17,6 +16,7 @@
 #include <variant>
 
 #include "can_dbc/text/printable.h"
+#include "daemon/command_line/command_line.h"
 #include "daemon/core/config/config.h"
 #include "daemon/core/config/config_fingerprint.h"
 #include "daemon/core/loop/loop.h"
@@ -337,30 +337,31 @@ int run(const Arguments& arguments) {
 
 int main(int argc, char** argv) {
   Arguments arguments;
-  CLI::App app(
+  command_line::Program app(
       "beltgripd: estimates the belt-pulley friction of a pushbelt variator from CAN signals and "
       "publishes it on the same bus.");
-  app.set_version_flag("--version", "beltgripd " BELTGRIP_VERSION);
+  app.set_version("beltgripd " BELTGRIP_VERSION);
   app.add_option("--config", arguments.config, "configuration file")
-      ->type_name("FILE")
-      ->capture_default_str();
+      .type_name("FILE")
+      .capture_default_str();
   app.add_option("--log-level", arguments.log_level, "what is logged on standard error")
-      ->type_name("LEVEL")
-      ->check(CLI::IsMember(LogSink::level_names()))
-      ->capture_default_str();
+      .type_name("LEVEL")
+      .one_of(LogSink::level_names())
+      .capture_default_str();
   app.add_option("--record", arguments.record,
                  "keep the frames around every experiment and every fault in this folder, at most "
                  "256 MiB of them; beltgrip replay reads them")
-      ->type_name("DIR");
+      .type_name("DIR");
   app.add_flag("--print-default-config", arguments.print_default_config,
                "print every key with default, unit and range, and exit");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& success) {  // --help, --version
-    return app.exit(success);
-  } catch (const CLI::ParseError& error) {
-    complain(std::string(error.what()) + " (see beltgripd --help)");
-    return kUsage;
+  switch (app.parse(argc, argv)) {
+    case command_line::Parsed::kGoOn:
+      break;
+    case command_line::Parsed::kShown:
+      return kDone;
+    case command_line::Parsed::kWrong:
+      complain(app.error() + " (see beltgripd --help)");
+      return kUsage;
   }
   if (arguments.print_default_config) {
     std::fputs(default_config_text().c_str(), stdout);

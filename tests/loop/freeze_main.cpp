@@ -1,7 +1,7 @@
 // Freezes of inputs over the whole request, and false alarms without one: `freeze --help`.
-#include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "daemon/command_line/command_line.h"
 #include "tests/loop/closed_loop.h"
 #include "tests/loop/freeze.h"
 #include "tools/sim/vehicle_scenario.h"
@@ -18,7 +18,7 @@ std::string joined(const std::vector<std::string>& names) {
 
 int main(int argc, char** argv) {
   using namespace beltgrip;
-  CLI::App app{"Inputs that stand still within a request, and false alarms without"};
+  command_line::Program app{"Inputs that stand still within a request, and false alarms without"};
   std::string base = "coast-overdrive", only;
   std::vector<std::string> settings;
   bool coarse = false, engine = false, steady = false, all = false;
@@ -37,7 +37,15 @@ int main(int argc, char** argv) {
   app.add_option("--step", step_s);
   app.add_option("--near", near_s);
   app.add_option("--creep", creep_per_s, "instead of standing still, SI units per second");
-  CLI11_PARSE(app, argc, argv);
+  switch (app.parse(argc, argv)) {
+    case command_line::Parsed::kGoOn:
+      break;
+    case command_line::Parsed::kShown:
+      return 0;
+    case command_line::Parsed::kWrong:
+      std::fprintf(stderr, "%s\n", app.error().c_str());
+      return 64;
+  }
   std::vector<sim::ScenarioLayer> layers;
   for (const std::string& setting : settings) layers.push_back(sim::setting_layer(setting));
   sim::VehicleScenarioResult read = sim::shipped_vehicle_scenario(base.c_str(), layers);

@@ -235,18 +235,18 @@ void run(const Options& options) {
 
 }  // namespace
 
-void add_calibrate(CLI::App& app) {
-  CLI::App* command = app.add_subcommand(
+void add_calibrate(command_line::Command app) {
+  const command_line::Command command = app.add_subcommand(
       "calibrate",
       "End-stop ratios, zero of the pressure, inertia and delays from recorded drives");
   auto options = std::make_shared<Options>();
-  command->add_option("log", options->logs, "CAN logs of drives, all of the same vehicle")
-      ->required();
-  command->add_option("--config", options->config, "BeltGrip's configuration")->required();
-  command->add_option("--json", options->json, "As JSON, '-': standard output");
-  command->add_option("--out", options->out, "The keys as TOML, '-': standard output");
-  command->add_flag("--force", options->force, "Replace the file of --out where it exists");
-  command->callback([options] { run(*options); });
+  command.add_option("log", options->logs, "CAN logs of drives, all of the same vehicle")
+      .required();
+  command.add_option("--config", options->config, "BeltGrip's configuration").required();
+  command.add_option("--json", options->json, "As JSON, '-': standard output");
+  command.add_option("--out", options->out, "The keys as TOML, '-': standard output");
+  command.add_flag("--force", options->force, "Replace the file of --out where it exists");
+  command.callback([options] { run(*options); });
 }
 
 }  // namespace beltgrip::cli

@@ -149,43 +149,45 @@ void demand(const std::string& failure) {
 
 }  // namespace
 
-void add_can(CLI::App& app) {
-  CLI::App* can = app.add_subcommand("can", "Set up a CAN interface, or show its state");
-  can->require_subcommand(1);
+void add_can(command_line::Command app) {
+  const command_line::Command can =
+      app.add_subcommand("can", "Set up a CAN interface, or show its state");
+  can.require_subcommand();
   auto options = std::make_shared<Options>();
   const auto subcommand = [&](const char* name, const char* help) {
-    CLI::App* command = can->add_subcommand(name, help);
-    command->add_option("interface", options->interface, "A CAN interface")->required();
+    const command_line::Command command = can.add_subcommand(name, help);
+    command.add_option("interface", options->interface, "A CAN interface").required();
     return command;
   };
 
   // The variables are those of beltgrip-can@.service; an empty one counts as not given.
-  CLI::App* up = subcommand("up", "Set what is given, then bring it up");
-  up->add_option("--bitrate", options->setting.bitrate, "bit/s")
-      ->envname("CAN_BITRATE")
-      ->check(CLI::Range(1000U, 8'000'000U));
-  up->add_option("--sample-point", options->setting.sample_point,
-                 "Share of a bit's time after which it is read")
-      ->envname("CAN_SAMPLE_POINT")
-      ->check(CLI::Range(0.3, 0.95));
-  up->add_option("--restart-ms", options->setting.restart_ms,
-                 "Milliseconds from bus-off to the restart, 0: none")
-      ->envname("CAN_RESTART_MS")
-      ->check(CLI::Range(0U, 60'000U));
-  up->add_option("--queue-length", options->setting.queue_length,
-                 "Frames that may wait for the controller")
-      ->envname("CAN_QUEUE_LENGTH")
-      ->check(CLI::Range(1, 10'000));
-  up->callback(
+  const command_line::Command up = subcommand("up", "Set what is given, then bring it up");
+  up.add_option("--bitrate", options->setting.bitrate, "bit/s")
+      .envname("CAN_BITRATE")
+      .range(1000U, 8'000'000U);
+  up.add_option("--sample-point", options->setting.sample_point,
+                "Share of a bit's time after which it is read")
+      .envname("CAN_SAMPLE_POINT")
+      .range(0.3, 0.95);
+  up.add_option("--restart-ms", options->setting.restart_ms,
+                "Milliseconds from bus-off to the restart, 0: none")
+      .envname("CAN_RESTART_MS")
+      .range(0U, 60'000U);
+  up.add_option("--queue-length", options->setting.queue_length,
+                "Frames that may wait for the controller")
+      .envname("CAN_QUEUE_LENGTH")
+      .range(1, 10'000);
+  up.callback(
       [options] { demand(daemon::bring_up(link_of(options->interface), options->setting)); });
 
-  subcommand("down", "Take it down")->callback([options] {
+  subcommand("down", "Take it down").callback([options] {
     demand(daemon::bring_down(link_of(options->interface)));
   });
 
-  CLI::App* status = subcommand("status", "State, error counters, bit timing, restarts, drops");
-  status->add_flag("--json", options->json, "As one JSON object; null: nobody can say");
-  status->callback([options] {
+  const command_line::Command status =
+      subcommand("status", "State, error counters, bit timing, restarts, drops");
+  status.add_flag("--json", options->json, "As one JSON object; null: nobody can say");
+  status.callback([options] {
     const CanLink link = link_of(options->interface);
     if (options->json) {
       std::puts(json_text(link).c_str());

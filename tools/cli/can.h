@@ -1,10 +1,10 @@
 // beltgrip can: up, down, status of a CAN interface.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "daemon/command_line/command_line.h"
 
 namespace beltgrip::cli {
 
-void add_can(CLI::App& app);
+void add_can(command_line::Command app);
 
 }  // namespace beltgrip::cli

@@ -2,19 +2,18 @@
 // does the work and throws Failure when it cannot.
 #pragma once
 
-#include <CLI/CLI.hpp>
-
+#include "daemon/command_line/command_line.h"
 #include "tools/cli/exit_codes.h"
 
 namespace beltgrip::cli {
 
-void add_calibrate(CLI::App& app);
-void add_history(CLI::App& app);
-void add_init(CLI::App& app);
-void add_monitor(CLI::App& app);
-void add_replay(CLI::App& app);
-void add_report(CLI::App& app);
-void add_run_demo(CLI::App& app);
-void add_simulate(CLI::App& app);
+void add_calibrate(command_line::Command app);
+void add_history(command_line::Command app);
+void add_init(command_line::Command app);
+void add_monitor(command_line::Command app);
+void add_replay(command_line::Command app);
+void add_report(command_line::Command app);
+void add_run_demo(command_line::Command app);
+void add_simulate(command_line::Command app);
 
 }  // namespace beltgrip::cli

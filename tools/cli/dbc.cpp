@@ -456,9 +456,10 @@ void decode(const std::vector<std::string>& dbc_paths, const std::vector<std::st
 
 }  // namespace
 
-void add_dbc(CLI::App& app) {
-  CLI::App* dbc = app.add_subcommand("dbc", "show, decode with, or check a DBC file");
-  dbc->require_subcommand(1);
+void add_dbc(command_line::Command app) {
+  const command_line::Command dbc =
+      app.add_subcommand("dbc", "show, decode with, or check a DBC file");
+  dbc.require_subcommand();
 
   struct Options {
     std::vector<std::string> dbc_paths;
@@ -471,31 +472,33 @@ void add_dbc(CLI::App& app) {
   };
   const auto options = std::make_shared<Options>();
 
-  CLI::App* show_command = dbc->add_subcommand("show", "print what a DBC file says");
-  show_command->add_option("FILE", options->path, "DBC file")->required();
-  show_command->add_option("--json", options->show_json_path,
-                           "write JSON to this file, - for standard output");
-  show_command->callback([options] { show(options->path, options->show_json_path); });
+  const command_line::Command show_command =
+      dbc.add_subcommand("show", "print what a DBC file says");
+  show_command.add_option("FILE", options->path, "DBC file").required();
+  show_command.add_option("--json", options->show_json_path,
+                          "write JSON to this file, - for standard output");
+  show_command.callback([options] { show(options->path, options->show_json_path); });
 
-  CLI::App* decode_command =
-      dbc->add_subcommand("decode", "print the signals of a log's frames, one JSON line a frame");
-  decode_command->add_option("--dbc", options->dbc_paths, "DBC file; several may be given")
-      ->required()
-      ->allow_extra_args(false);
-  decode_command->add_option(
+  const command_line::Command decode_command =
+      dbc.add_subcommand("decode", "print the signals of a log's frames, one JSON line a frame");
+  decode_command.add_option("--dbc", options->dbc_paths, "DBC file; several may be given")
+      .required()
+      .allow_extra_args(false);
+  decode_command.add_option(
       "LOG", options->log_paths,
       "candump, .asc, .trc or .csv logs, plain, .gz or .zst; - is standard input");
-  decode_command->add_flag("--raw", options->raw, "add the raw values");
-  decode_command->add_option("--json", options->decode_json_path,
-                             "write to this file instead of standard output (-)");
-  decode_command->callback([options] {
+  decode_command.add_flag("--raw", options->raw, "add the raw values");
+  decode_command.add_option("--json", options->decode_json_path,
+                            "write to this file instead of standard output (-)");
+  decode_command.callback([options] {
     decode(options->dbc_paths, options->log_paths, options->raw, options->decode_json_path);
   });
 
-  CLI::App* check_command = dbc->add_subcommand("check", "list every problem of a DBC file");
-  check_command->add_option("FILE", options->path, "DBC file")->required();
-  check_command->add_flag("--strict", options->strict, "refuse warnings too");
-  check_command->callback([options] { check(options->path, options->strict); });
+  const command_line::Command check_command =
+      dbc.add_subcommand("check", "list every problem of a DBC file");
+  check_command.add_option("FILE", options->path, "DBC file").required();
+  check_command.add_flag("--strict", options->strict, "refuse warnings too");
+  check_command.callback([options] { check(options->path, options->strict); });
 }
 
 }  // namespace beltgrip::cli

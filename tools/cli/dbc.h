@@ -2,10 +2,10 @@
 // terms, and what is odd about it.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "daemon/command_line/command_line.h"
 
 namespace beltgrip::cli {
 
-void add_dbc(CLI::App& app);
+void add_dbc(command_line::Command app);
 
 }  // namespace beltgrip::cli

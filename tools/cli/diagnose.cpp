@@ -155,21 +155,21 @@ void run(const Options& options) {
 
 }  // namespace
 
-void add_diagnose(CLI::App& app) {
+void add_diagnose(command_line::Command app) {
   const auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand(
+  const command_line::Command command = app.add_subcommand(
       "diagnose", "shows what the simulation gets wrong, names the cause, extends the model");
-  command->add_option("LOG", options->logs, "one experiment each: .csv, or a log")->required();
-  command->add_option("--config", options->config, "configuration (TOML)")->required();
-  command->add_option("--model", options->model, "model file: what the simulation believes");
-  command->add_option("--held-out", options->held_out, "experiments for the gain only");
-  command->add_option("--json", options->json, "result as JSON; - for standard output");
-  command->add_option("--report", options->report, "result with plots as one HTML file");
-  command->add_option("--model-out", options->model_out, "writes the extended model");
-  command->add_flag("--force", options->force, "replace the file of --model-out where it exists");
-  command->add_option("--jobs", options->jobs, "threads; the same answer for any number")
-      ->check(CLI::Range(1, 256));
-  command->callback([options] { run(*options); });
+  command.add_option("LOG", options->logs, "one experiment each: .csv, or a log").required();
+  command.add_option("--config", options->config, "configuration (TOML)").required();
+  command.add_option("--model", options->model, "model file: what the simulation believes");
+  command.add_option("--held-out", options->held_out, "experiments for the gain only");
+  command.add_option("--json", options->json, "result as JSON; - for standard output");
+  command.add_option("--report", options->report, "result with plots as one HTML file");
+  command.add_option("--model-out", options->model_out, "writes the extended model");
+  command.add_flag("--force", options->force, "replace the file of --model-out where it exists");
+  command.add_option("--jobs", options->jobs, "threads; the same answer for any number")
+      .range(1, 256);
+  command.callback([options] { run(*options); });
 }
 
 }  // namespace beltgrip::cli

@@ -4,5 +4,5 @@
 #include "tools/cli/command.h"
 
 namespace beltgrip::cli {
-void add_diagnose(CLI::App& app);
+void add_diagnose(command_line::Command app);
 }  // namespace beltgrip::cli

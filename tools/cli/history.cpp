@@ -368,17 +368,17 @@ void run(const Options& options) {
 
 }  // namespace
 
-void add_history(CLI::App& app) {
-  CLI::App* command = app.add_subcommand(
+void add_history(command_line::Command app) {
+  const command_line::Command command = app.add_subcommand(
       "history", "The experiments that the daemon has kept, and what they say together");
   auto options = std::make_shared<Options>();
-  command->add_option("file", options->file,
-                      "history.db or its folder (default: the configuration's state_dir, else " +
-                          std::string(kDefaultFolder) + ")");
-  command->add_option("--config", options->config, "BeltGrip's configuration, for its state_dir");
-  command->add_option("--json", options->json, "As JSON lines, '-': standard output");
-  command->add_option("--csv", options->csv, "The experiments as CSV, '-': standard output");
-  command->callback([options] { run(*options); });
+  command.add_option("file", options->file,
+                     "history.db or its folder (default: the configuration's state_dir, else " +
+                         std::string(kDefaultFolder) + ")");
+  command.add_option("--config", options->config, "BeltGrip's configuration, for its state_dir");
+  command.add_option("--json", options->json, "As JSON lines, '-': standard output");
+  command.add_option("--csv", options->csv, "The experiments as CSV, '-': standard output");
+  command.callback([options] { run(*options); });
 }
 
 }  // namespace beltgrip::cli

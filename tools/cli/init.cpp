@@ -207,16 +207,17 @@ void run(const Options& options) {
 
 }  // namespace
 
-void add_init(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("init", "Propose a configuration for DBC files");
+void add_init(command_line::Command app) {
+  const command_line::Command command =
+      app.add_subcommand("init", "Propose a configuration for DBC files");
   auto options = std::make_shared<Options>();
-  command->add_option("dbc", options->dbc, "The vehicle's DBC files")->required();
-  command->add_option("--interface", options->interface, "CAN interface to enter")
-      ->capture_default_str();
-  command->add_option("--out", options->out, "File to write, '-': standard output")
-      ->capture_default_str();
-  command->add_flag("--force", options->force, "Replace a file that exists");
-  command->callback([options] { run(*options); });
+  command.add_option("dbc", options->dbc, "The vehicle's DBC files").required();
+  command.add_option("--interface", options->interface, "CAN interface to enter")
+      .capture_default_str();
+  command.add_option("--out", options->out, "File to write, '-': standard output")
+      .capture_default_str();
+  command.add_flag("--force", options->force, "Replace a file that exists");
+  command.callback([options] { run(*options); });
 }
 
 }  // namespace beltgrip::cli

@@ -19,12 +19,9 @@ namespace {
 // Named in the interfaces, not built yet: known by name so that the answer is an honest one.
 constexpr const char* kLater[] = {"check"};
 
-void add_later(CLI::App& app) {
+void add_later(command_line::Command app) {
   for (const char* name : kLater) {
-    CLI::App* command = app.add_subcommand(name)->group("");
-    command->allow_extras();
-    command->set_help_flag();
-    command->callback([name] {
+    app.add_hidden_subcommand(name).callback([name] {
       throw Failure{kConfiguration, std::string(name) + ": not in this version"};
     });
   }
@@ -49,20 +46,18 @@ std::string one_line(std::string text) {
 }
 
 // The first argument, where it is neither an option nor a subcommand.
-std::string unknown_subcommand(const CLI::App& app, int argc, char** argv) {
-  if (argc < 2 || argv[1][0] == '-') return {};
-  for (const CLI::App* command : app.get_subcommands(nullptr)) {
-    if (command->get_name() == argv[1]) return {};
-  }
+std::string unknown_subcommand(const command_line::Program& app, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-' || app.has_subcommand(argv[1])) return {};
   return argv[1];
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"BeltGrip: measures the belt-pulley friction of a metal pushbelt CVT over CAN."};
-  app.name("beltgrip");
-  app.set_version_flag("--version", "beltgrip " BELTGRIP_VERSION);
-  app.require_subcommand(1);
-  app.get_formatter()->column_width(34);
+  command_line::Program app{
+      "BeltGrip: measures the belt-pulley friction of a metal pushbelt CVT over CAN."};
+  app.set_name("beltgrip");
+  app.set_version("beltgrip " BELTGRIP_VERSION);
+  app.require_subcommand();
+  app.set_column_width(34);
   add_run_demo(app);
   add_init(app);
   add_can(app);
@@ -76,22 +71,22 @@ int run(int argc, char** argv) {
   add_diagnose(app);
   add_report(app);
   add_later(app);
-  for (CLI::App* command : app.get_subcommands(nullptr)) {
-    if (!command->get_group().empty()) {
-      command->set_version_flag("--version", "beltgrip " BELTGRIP_VERSION);
-    }
-  }
+  app.set_version_of_subcommands("beltgrip " BELTGRIP_VERSION);
   if (const std::string name = unknown_subcommand(app, argc, argv); !name.empty()) {
     return fail("unknown subcommand '" + name + "' (see beltgrip --help)", kUsage);
   }
   try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& success) {  // --help, --version
-    return app.exit(success);
-  } catch (const CLI::ParseError& error) {
-    std::string hint = "beltgrip";
-    for (const CLI::App* command : app.get_subcommands()) hint += " " + command->get_name();
-    return fail(one_line(error.what()) + " (see " + hint + " --help)", kUsage);
+    switch (app.parse(argc, argv)) {
+      case command_line::Parsed::kGoOn:
+        break;
+      case command_line::Parsed::kShown:
+        return kDone;
+      case command_line::Parsed::kWrong: {
+        std::string hint = "beltgrip";
+        for (const std::string& name : app.chosen()) hint += " " + name;
+        return fail(one_line(app.error()) + " (see " + hint + " --help)", kUsage);
+      }
+    }
   } catch (const Failure& failure) {
     return fail(failure.text, failure.exit_code);
   }

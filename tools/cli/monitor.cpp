@@ -85,18 +85,18 @@ void run(const Options& options) {
 
 }  // namespace
 
-void add_monitor(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("monitor", "Show BeltGrip's frames on a bus, decoded");
+void add_monitor(command_line::Command app) {
+  const command_line::Command command =
+      app.add_subcommand("monitor", "Show BeltGrip's frames on a bus, decoded");
   auto options = std::make_shared<Options>();
-  command->add_option("bus", options->bus, "A SocketCAN interface")->required();
-  command->add_flag("--json", options->json, "A JSON line for each frame");
-  command
-      ->add_option("--duration", options->duration_s, "Seconds to watch (default: until stopped)")
-      ->check(CLI::Range(1e-3, 1e9));
-  command->add_option("--truth", options->truth,
-                      "truth.json of the simulation that is played onto the bus: shows its times, "
-                      "and its truth beside the result at the end");
-  command->callback([options] { run(*options); });
+  command.add_option("bus", options->bus, "A SocketCAN interface").required();
+  command.add_flag("--json", options->json, "A JSON line for each frame");
+  command.add_option("--duration", options->duration_s, "Seconds to watch (default: until stopped)")
+      .range(1e-3, 1e9);
+  command.add_option("--truth", options->truth,
+                     "truth.json of the simulation that is played onto the bus: shows its times, "
+                     "and its truth beside the result at the end");
+  command.callback([options] { run(*options); });
 }
 
 }  // namespace beltgrip::cli

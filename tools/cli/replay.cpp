@@ -180,29 +180,29 @@ void run(const Options& options) {
 
 }  // namespace
 
-void add_replay(CLI::App& app) {
-  CLI::App* command =
+void add_replay(command_line::Command app) {
+  const command_line::Command command =
       app.add_subcommand("replay", "Run the daemon's pipeline over logs, the stamps are the clock");
   auto options = std::make_shared<Options>();
-  command->add_option("log", options->logs, "candump logs, also .gz and .zst; '-': standard input")
-      ->required();
-  command->add_option("--config", options->config,
-                      "BeltGrip's configuration; required without --bus");
-  command->add_option("--method", options->method, "Instead of the configuration's")
-      ->check(CLI::IsMember({"robust", "paper"}));
-  command->add_option("--interface", options->interface, "Frames of this interface only");
-  command->add_flag("--join", options->join, "The logs are one timeline, not separate runs");
-  command->add_option("--jobs", options->jobs, "Logs at the same time (default: all processors)")
-      ->check(CLI::Range(1, 1024));
-  command->add_option("--json", options->json, "Results as JSON lines, '-': standard output");
-  command->add_option("--trace", options->trace, "Every sample of the experiments as CSV");
-  command->add_option("--log-out", options->log_out,
-                      "What the daemon would have put on the bus, as a candump log");
-  command->add_option("--bus", options->bus, "Play the log onto this bus in real time instead");
-  command->add_option("--speed", options->speed, "Times real time, with --bus")
-      ->capture_default_str()
-      ->check(CLI::Range(1e-3, 1e3));
-  command->callback([options] { run(*options); });
+  command.add_option("log", options->logs, "candump logs, also .gz and .zst; '-': standard input")
+      .required();
+  command.add_option("--config", options->config,
+                     "BeltGrip's configuration; required without --bus");
+  command.add_option("--method", options->method, "Instead of the configuration's")
+      .one_of({"robust", "paper"});
+  command.add_option("--interface", options->interface, "Frames of this interface only");
+  command.add_flag("--join", options->join, "The logs are one timeline, not separate runs");
+  command.add_option("--jobs", options->jobs, "Logs at the same time (default: all processors)")
+      .range(1, 1024);
+  command.add_option("--json", options->json, "Results as JSON lines, '-': standard output");
+  command.add_option("--trace", options->trace, "Every sample of the experiments as CSV");
+  command.add_option("--log-out", options->log_out,
+                     "What the daemon would have put on the bus, as a candump log");
+  command.add_option("--bus", options->bus, "Play the log onto this bus in real time instead");
+  command.add_option("--speed", options->speed, "Times real time, with --bus")
+      .capture_default_str()
+      .range(1e-3, 1e3);
+  command.callback([options] { run(*options); });
 }
 
 }  // namespace beltgrip::cli

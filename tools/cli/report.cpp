@@ -115,16 +115,17 @@ void run(const Options& options) {
 
 }  // namespace
 
-void add_report(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("report", "The experiments of logs as one HTML file");
+void add_report(command_line::Command app) {
+  const command_line::Command command =
+      app.add_subcommand("report", "The experiments of logs as one HTML file");
   auto options = std::make_shared<Options>();
-  command->add_option("log", options->logs, "Logs as for replay")->required();
-  command->add_option("--config", options->config, "BeltGrip's configuration")->required();
-  command->add_option("--method", options->method, "Instead of the configuration's")
-      ->check(CLI::IsMember({"robust", "paper"}));
-  command->add_option("--interface", options->interface, "Frames of this interface only");
-  command->add_option("--out", options->out, "The HTML file")->capture_default_str();
-  command->callback([options] { run(*options); });
+  command.add_option("log", options->logs, "Logs as for replay").required();
+  command.add_option("--config", options->config, "BeltGrip's configuration").required();
+  command.add_option("--method", options->method, "Instead of the configuration's")
+      .one_of({"robust", "paper"});
+  command.add_option("--interface", options->interface, "Frames of this interface only");
+  command.add_option("--out", options->out, "The HTML file").capture_default_str();
+  command.callback([options] { run(*options); });
 }
 
 }  // namespace beltgrip::cli

@@ -213,16 +213,16 @@ void run(const Options& options) {
 
 }  // namespace
 
-void add_run_demo(CLI::App& app) {
-  CLI::App* command = app.add_subcommand(
+void add_run_demo(command_line::Command app) {
+  const command_line::Command command = app.add_subcommand(
       "run-demo",
       "A simulated car, or rig, with the daemon's loop on one bus, in this process, in real time");
   auto options = std::make_shared<Options>();
   options->scenario.scenario = "demo";
-  options->scenario.add_to(*command);
-  command->add_option("--method", options->method, "robust (default) or paper")
-      ->check(CLI::IsMember({"robust", "paper"}));
-  command->callback([options] { run(*options); });
+  options->scenario.add_to(command);
+  command.add_option("--method", options->method, "robust (default) or paper")
+      .one_of({"robust", "paper"});
+  command.callback([options] { run(*options); });
 }
 
 }  // namespace beltgrip::cli

@@ -58,21 +58,21 @@ sim::ScenarioLayer layer_of(const std::string& scenario) {
 
 }  // namespace
 
-void ScenarioOptions::add_to(CLI::App& command) {
+void ScenarioOptions::add_to(command_line::Command command) {
   command
       .add_option("--scenario", scenario,
                   "A shipped scenario (" + shipped_names() + ") or a TOML file")
-      ->capture_default_str();
+      .capture_default_str();
   command.add_option("--belt", belt, "The belt that is mounted: new, worn");
-  command.add_option("--seed", seed, "Seed of the sensor noise")->capture_default_str();
+  command.add_option("--seed", seed, "Seed of the sensor noise").capture_default_str();
   command.add_option("--start", start_s, "Leave out the first seconds")
-      ->capture_default_str()
-      ->check(CLI::Range(0.0, 1e6));
+      .capture_default_str()
+      .range(0.0, 1e6);
   command.add_option("--duration", duration_s, "Seconds from the start (default: to the end)")
-      ->check(CLI::Range(1e-3, 1e6));
+      .range(1e-3, 1e6);
   command.add_option("--set", settings, "A value of the scenario, e.g. clamp.ramp_N_per_s=100")
-      ->type_name("KEY=VALUE")
-      ->allow_extra_args(false);
+      .type_name("KEY=VALUE")
+      .allow_extra_args(false);
 }
 
 sim::Scenario ScenarioOptions::load() const {

@@ -1,11 +1,11 @@
 // The options that choose and change a scenario, shared by simulate and run-demo. Tools only.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "daemon/command_line/command_line.h"
 #include "tools/sim/scenario.h"
 #include "tools/sim/vehicle_parameters.h"
 
@@ -19,7 +19,7 @@ struct ScenarioOptions {
   double duration_s = 0.0;  // 0: to the end
   std::vector<std::string> settings;
 
-  void add_to(CLI::App& command);
+  void add_to(command_line::Command command);
   // Throws Failure: 66 no such scenario, 78 its content.
   sim::Scenario load() const;
   // True for a scenario of the virtual vehicle, which load_vehicle takes instead.

@@ -203,31 +203,31 @@ void run(const Options& options) {
 
 }  // namespace
 
-void add_simulate(CLI::App& app) {
-  CLI::App* command = app.add_subcommand(
+void add_simulate(command_line::Command app) {
+  const command_line::Command command = app.add_subcommand(
       "simulate",
       "Drive a virtual vehicle, or a rig, with the daemon on the other side of its bus");
   auto options = std::make_shared<Options>();
-  options->scenario.add_to(*command);
-  command->add_option("--out-dir", options->out_dir,
-                      "Write trace.log, vehicle.dbc, beltgrip.toml and truth.json there");
-  command->add_flag("--force", options->force, "Replace files of --out-dir that exist");
-  command->add_option("--log-out", options->log_out, "Write the log alone, '-': standard output");
-  command->add_option("--json", options->json,
-                      "Results and truth as JSON lines, '-': standard output");
-  command->add_option("--bus", options->bus,
-                      "In real time on this bus, for a daemon there; prints the truth at the end");
-  command->add_option("--model", options->model,
-                      "What the machine really is: a model file, on top of the scenario");
+  options->scenario.add_to(command);
+  command.add_option("--out-dir", options->out_dir,
+                     "Write trace.log, vehicle.dbc, beltgrip.toml and truth.json there");
+  command.add_flag("--force", options->force, "Replace files of --out-dir that exist");
+  command.add_option("--log-out", options->log_out, "Write the log alone, '-': standard output");
+  command.add_option("--json", options->json,
+                     "Results and truth as JSON lines, '-': standard output");
+  command.add_option("--bus", options->bus,
+                     "In real time on this bus, for a daemon there; prints the truth at the end");
+  command.add_option("--model", options->model,
+                     "What the machine really is: a model file, on top of the scenario");
   command
-      ->add_option("--experiment", options->experiment,
-                   "Its place among several experiments, for the wear of --model")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 100000));
-  command->add_option("--speed", options->speed, "Times real time, with --bus")
-      ->capture_default_str()
-      ->check(CLI::Range(1e-3, 1e3));
-  command->callback([options] { run(*options); });
+      .add_option("--experiment", options->experiment,
+                  "Its place among several experiments, for the wear of --model")
+      .capture_default_str()
+      .range(0, 100000);
+  command.add_option("--speed", options->speed, "Times real time, with --bus")
+      .capture_default_str()
+      .range(1e-3, 1e3);
+  command.callback([options] { run(*options); });
 }
 
 }  // namespace beltgrip::cli

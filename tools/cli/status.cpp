@@ -134,13 +134,14 @@ void show(const nlohmann::ordered_json& status) {
 
 }  // namespace
 
-void add_status(CLI::App& app) {
-  CLI::App* command = app.add_subcommand("status", "What a running beltgripd sees and measures");
+void add_status(command_line::Command app) {
+  const command_line::Command command =
+      app.add_subcommand("status", "What a running beltgripd sees and measures");
   auto options = std::make_shared<Options>();
-  command->add_option("interface", options->interface, "Its interface, where several run");
-  command->add_option("--socket", options->socket, "Its socket, where it is not a service");
-  command->add_flag("--json", options->json, "As one JSON object");
-  command->callback([options] {
+  command.add_option("interface", options->interface, "Its interface, where several run");
+  command.add_option("--socket", options->socket, "Its socket, where it is not a service");
+  command.add_flag("--json", options->json, "As one JSON object");
+  command.callback([options] {
     const std::string path = socket_path(*options);
     const std::string text = ask(path);
     const auto status = nlohmann::ordered_json::parse(text, nullptr, false);

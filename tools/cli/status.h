@@ -1,10 +1,10 @@
 // beltgrip status: asks a running beltgripd.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "daemon/command_line/command_line.h"
 
 namespace beltgrip::cli {
 
-void add_status(CLI::App& app);
+void add_status(command_line::Command app);
 
 }  // namespace beltgrip::cli

@@ -3,7 +3,6 @@
 //
 // The first runs seeded cases, one line of JSON each into FILE; a second call goes on where the
 // first ended. The summary goes to standard output; exit status 1 when a promise was broken.
-#include <CLI/CLI.hpp>
 
 #include <atomic>
 #include <chrono>
@@ -14,6 +13,7 @@
 #include <sstream>
 #include <thread>
 
+#include "daemon/command_line/command_line.h"
 #include "tests/loop/silence.h"
 #include "tests/statistics/campaign/campaign_run.h"
 #include "tests/statistics/campaign/campaign_summary.h"
@@ -149,16 +149,24 @@ int run(const Options& options) {
 
 int main(int argc, char** argv) {
   beltgrip::test::Options options;
-  CLI::App app{"The fault campaign: seeded faults against the closed loop"};
-  app.add_option("--seeds", options.seeds, "How many")->capture_default_str();
-  app.add_option("--from", options.from, "The first")->capture_default_str();
-  app.add_option("--jobs", options.jobs, "Threads")->capture_default_str();
+  beltgrip::command_line::Program app{"The fault campaign: seeded faults against the closed loop"};
+  app.add_option("--seeds", options.seeds, "How many").capture_default_str();
+  app.add_option("--from", options.from, "The first").capture_default_str();
+  app.add_option("--jobs", options.jobs, "Threads").capture_default_str();
   app.add_option("--out", options.out, "Results, one line each; goes on with what is there");
   app.add_option("--case", options.files, "Run kept cases");
   app.add_option("--show", options.show, "Print the case of a seed as a file");
   app.add_option("--worst", options.worst, "Folder for the ten worst cases, as files");
   app.add_flag("--silence", options.silence, "Silence at every 5 ms of a ramp");
-  CLI11_PARSE(app, argc, argv);
+  switch (app.parse(argc, argv)) {
+    case beltgrip::command_line::Parsed::kGoOn:
+      break;
+    case beltgrip::command_line::Parsed::kShown:
+      return 0;
+    case beltgrip::command_line::Parsed::kWrong:
+      std::fprintf(stderr, "%s\n", app.error().c_str());
+      return 64;
+  }
   try {
     return beltgrip::test::run(options);
   } catch (const std::exception& error) {
