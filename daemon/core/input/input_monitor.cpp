@@ -407,6 +407,18 @@ void InputMonitor::update(MonoTime t, FaultSet& faults) noexcept {
   }
 }
 
+double InputMonitor::value_or(Role role, double otherwise, bool& fresh) const noexcept {
+  if (!is_bound(role)) return otherwise;
+  fresh = fresh && quality(role) == SignalQuality::kValid;
+  return history(role).empty() ? otherwise : history(role).newest_value();
+}
+
+double InputMonitor::value_if_known(Role role) const noexcept {
+  bool known = is_bound(role);
+  const double value = value_or(role, 0.0, known);
+  return known ? value : 0.0;
+}
+
 bool InputMonitor::all_valid() const noexcept {
   return std::all_of(required().begin(), required().end(),
                      [&](Role role) { return quality(role) == SignalQuality::kValid; });

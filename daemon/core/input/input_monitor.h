@@ -67,6 +67,10 @@ class InputMonitor {
   SignalQuality quality(Role role) const noexcept { return row(role).quality; }
   bool is_bound(Role role) const noexcept { return row(role).binding != nullptr; }
   const SignalHistory& history(Role role) const noexcept { return row(role).history; }
+  // The newest value; `otherwise` where the configuration has no such role, or none has come. fresh
+  // falls where the role is bound and its quality is not kValid.
+  double value_or(Role role, double otherwise, bool& fresh) const noexcept;
+  double value_if_known(Role role) const noexcept;  // 0: it is not
   // Of the signal's own frames: configured, from the DBC, or learned; nothing until then. Learned,
   // it is the middle of kLearnIntervals; where the signal is multiplexed, the longest but one, as
   // pages need not come evenly.

@@ -25,6 +25,7 @@ class Sampler {
 
   // may_settle: the delay may change now (no experiment runs).
   const estimator::VariatorSample& sample(MonoTime t, bool may_settle) noexcept;
+  const estimator::VariatorSample& newest() const noexcept { return sample_; }
   std::optional<Duration> delay() const noexcept { return delay_; }
 
  private:

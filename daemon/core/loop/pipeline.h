@@ -15,30 +15,11 @@
 #include "daemon/core/config/config.h"
 #include "daemon/core/experiment/experiment.h"
 #include "daemon/core/input/input_monitor.h"
+#include "daemon/core/loop/sample_report.h"
 #include "estimator/belt/belt_history.h"
 #include "estimator/method/slip_curve_estimator.h"
 
 namespace beltgrip::daemon {
-
-// Everything one sample decided: for log, trace, recorder and tests.
-struct SampleReport {
-  MonoTime t = 0;
-  State state = State::kInhibited;
-  bool in_experiment = false;
-  bool macro_slip_stop = false;
-  estimator::StopReason stop_reason = estimator::StopReason::kNone;  // while macro_slip_stop
-  StopCause stop_cause;                                              // beside it
-  estimator::VariatorSample sample;
-  estimator::CurveEstimate curve;
-  bool new_result = false;               // an experiment has come to its outcome with this sample
-  ExperimentResult result;               // the last one; outcome kNone before the first
-  std::uint32_t faults = 0;              // fault_bit()s of faults.h
-  std::uint32_t foreign_identifier = 0;  // the last one that a foreign sender used
-  std::optional<Role> frozen;    // with fault InputFrozen: which input it is, where that is known
-  std::uint32_t inhibits = 0;    // inhibit_bit()s of arming.h, triggers "coast_down" and "steady"
-  double request_force_N = 0.0;  // as asked for with this sample; 0: no request stands
-  double ramp_N_per_s = 0.0;     // of the request that stands
-};
 
 // The newest value of a role, as received.
 struct SignalObservation {

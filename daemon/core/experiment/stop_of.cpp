@@ -1,0 +1,103 @@
+#include "daemon/core/experiment/stop_of.h"
+
+#include "daemon/core/experiment/arming.h"
+
+namespace beltgrip::daemon {
+
+using estimator::StopReason;
+
+Stop stop_of(SafetyVerdict verdict, double figure, double limit) noexcept {
+  constexpr double kPercent = 100.0;
+  const auto percent = [&](const char* what) {
+    return StopCause{
+        .what = what, .figure = kPercent * figure, .limit = kPercent * limit, .unit = "%"};
+  };
+  const auto in = [&](const char* what, const char* unit) {
+    return StopCause{.what = what, .figure = figure, .limit = limit, .unit = unit};
+  };
+  switch (verdict) {
+    case SafetyVerdict::kSlip:
+      return {StopReason::kSlip, percent("slip since the start")};
+    case SafetyVerdict::kSlipSpeed:
+      return {StopReason::kSlip, in("slip speed", "m/s")};
+    case SafetyVerdict::kEnergy:
+      return {StopReason::kSlipEnergy, in("slip energy", "J")};
+    case SafetyVerdict::kSpeed: {
+      StopCause cause = in("falls to", "rad/s");
+      cause.role = Role::kPrimarySpeed;
+      return {StopReason::kEngineSpeed, cause};
+    }
+    case SafetyVerdict::kSecondary: {
+      StopCause cause = in("stands still or turns back", "rad/s");
+      cause.role = Role::kSecondarySpeed;
+      return {StopReason::kInputs, cause};
+    }
+    case SafetyVerdict::kEngine: {
+      StopCause cause = percent("leaves the primary speed by");
+      cause.role = Role::kEngineSpeed;
+      return {StopReason::kEngineSpeed, cause};
+    }
+    case SafetyVerdict::kDuration:
+      return {StopReason::kTime, {.what = "the request stands for too long"}};
+    case SafetyVerdict::kFloor:
+      return {StopReason::kForceFloor, in("request below its floor", "N")};
+    case SafetyVerdict::kPause:
+      return {StopReason::kInputs, {.what = "a request too soon after the last"}};
+    case SafetyVerdict::kRise:
+    case SafetyVerdict::kRate:
+      return {StopReason::kInputs, {.what = "the request itself rises or falls too fast"}};
+    default:
+      return {StopReason::kInputs, {}};
+  }
+}
+
+Stop stop_of(std::uint32_t inhibits) noexcept {
+  if ((inhibits & inhibit_bit(Inhibit::kUnreachable)) != 0) {
+    return {StopReason::kForceFloor, {.what = "the force floor lies above the peak's force"}};
+  }
+  if ((inhibits & inhibit_bit(Inhibit::kGrip)) != 0) {
+    return {StopReason::kSlip,
+            {.what = "friction has fallen: the own force hardly holds the belt"}};
+  }
+  if ((inhibits & inhibit_bit(Inhibit::kQuiet)) != 0) {
+    return {StopReason::kInputs,
+            {.what = "moves too seldom to show that it stands still, and so does engine_speed",
+             .role = Role::kPrimarySpeed}};
+  }
+  if ((inhibits & inhibit_bit(Inhibit::kForce)) != 0) {
+    return {StopReason::kTime, {.what = "the controller's own force did not come to rest"}};
+  }
+  if ((inhibits & inhibit_bit(Inhibit::kRamp)) != 0) {
+    return {StopReason::kTime, {.what = "no ramp keeps the slip limits in the worst case"}};
+  }
+  return {StopReason::kTime, {.what = "the ramp would last longer than the coast-down"}};
+}
+
+Stop stop_of(const estimator::CurveEstimate& curve) noexcept {
+  const auto because = [&](const StopCause& cause) { return Stop{curve.stop, cause}; };
+  switch (curve.stop) {
+    case StopReason::kSlope:
+      return because({.what = "friction no longer rises with slip: slope",
+                      .figure = curve.friction_slope,
+                      .unit = "1/%"});
+    case StopReason::kSlip:
+    case StopReason::kSlipRate:
+      return because(
+          {.what = "slip runs away, at", .figure = curve.sigma_star_percent, .unit = "%"});
+    case StopReason::kInputs:
+      return because({.what = "an input stands still, or reads what no belt does: mu*",
+                      .figure = curve.mu_star});
+    case StopReason::kTorque:
+      return because({.what = "torque near zero or of the other sign",
+                      .figure = curve.torque_p_Nm,
+                      .unit = "Nm"});
+    case StopReason::kRatio:
+      return because({.what = "slip that no end stop explains",
+                      .figure = curve.sigma_star_percent,
+                      .unit = "%"});
+    default:
+      return because({});
+  }
+}
+
+}  // namespace beltgrip::daemon
