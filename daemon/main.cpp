@@ -23,7 +23,6 @@
 #include "daemon/core/loop/pipeline.h"
 #include "daemon/core/loop/reload.h"
 #include "daemon/core/observe/event.h"
-#include "daemon/core/observe/history_link.h"
 #include "daemon/core/observe/observation.h"
 #include "daemon/io/bus_claim.h"
 #include "daemon/io/flight_recorder.h"
@@ -263,9 +262,7 @@ int run(const Arguments& arguments) {
     log.info("no state directory: results are not kept");
   }
   HistoryRings rings;
-  HistoryLink link(rings, pipeline, sinks, tap.get());
   ReloadSlot reload_slot;
-  ReloadLink reload_link(reload_slot, pipeline, *bus.port, link, tap.get());
   log.info(prepare_real_time());
   ServiceNotify service;
   std::string no_status;
@@ -303,9 +300,9 @@ int run(const Arguments& arguments) {
   }
   Housekeeper housekeeper(events, rings, history.get(), log, stop_fd, on_stop, on_turn);
 
-  const LoopCounters loop =
-      run_loop(*bus.port, pipeline, config.estimator.sample_rate_hz,
-               estimator::StopReason::kShutdown, &reload_link, &meters, tap.get());
+  const LoopCounters loop = run_loop(*bus.port, pipeline, config.estimator.sample_rate_hz,
+                                     estimator::StopReason::kShutdown, &sinks, &meters, tap.get(),
+                                     {.history = &rings, .reload = &reload_slot});
 
   housekeeper.stop();
   if (recorder != nullptr) recorder->stop();

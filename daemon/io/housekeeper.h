@@ -8,8 +8,8 @@
 #include <functional>
 #include <thread>
 
+#include "daemon/core/loop/history_rings.h"
 #include "daemon/core/observe/event.h"
-#include "daemon/core/observe/history_link.h"
 #include "daemon/io/history_keeper.h"
 #include "daemon/io/log_sink.h"
 

@@ -19,12 +19,13 @@ constexpr Duration kBeforeTheEnd = kSecond / 2;
 class Loop {
  public:
   Loop(Port& port, Pipeline& pipeline, double sample_rate_hz, SampleSink* sink, LoopMeters* meters,
-       RecordTap* tap) noexcept
+       RecordTap* tap, const Exchange& exchange) noexcept
       : port_(port),
         pipeline_(pipeline),
         sink_(sink),
         meters_(meters),
         tap_(tap),
+        exchange_(exchange),
         period_(std::llround(static_cast<double>(kSecond) / sample_rate_hz)),
         next_(port.now()),
         buses_(static_cast<std::uint8_t>(pipeline.bus_count())) {
@@ -95,20 +96,44 @@ class Loop {
       meters_->counters = counters_;
     }
     if (tap_ != nullptr) tap_->sampled(report);
-    watch(report);  // before the sink, which may put another pipeline in its place
     if (sink_ != nullptr) sink_->on_report(report);
+    watch();
+    hand_out_result();
+    learn();
+    reload();
     next_ += period_;
   }
 
-  void watch(const SampleReport& report) noexcept {
-    const bool busy = report.state == State::kRamping || report.state == State::kEvaluating ||
-                      report.new_result || report.sample.usable || report.curve.usable;
-    const bool other = report.state != rest_.state || report.faults != rest_.faults ||
-                       report.inhibits != rest_.inhibits ||
-                       report.macro_slip_stop != rest_.macro_slip_stop;
-    if (busy || other) changed_ = next_;
-    rest_ = {report.state, report.faults, report.inhibits, report.macro_slip_stop};
-    report_ = &report;
+  void watch() noexcept {
+    const Pulse now = pipeline_.pulse();
+    if (now.busy || now != pulse_) changed_ = next_;
+    pulse_ = now;
+  }
+
+  void hand_out_result() noexcept {
+    const ExperimentResult* result = pipeline_.new_result();
+    if (result == nullptr) return;
+    reload_from_ = next_ + Exchange::kAfterResult;
+    if (exchange_.history != nullptr) exchange_.history->results.push(*result);
+  }
+
+  void learn() noexcept {
+    if (exchange_.history == nullptr) return;
+    estimator::LearnedFriction learned;
+    while (exchange_.history->learned.pop(learned)) {
+      if (tap_ != nullptr) tap_->learned(next_, learned);
+      pipeline_.learn(learned);
+    }
+  }
+
+  void reload() noexcept {
+    if (exchange_.reload == nullptr || pulse_.in_experiment || next_ < reload_from_) return;
+    Reload* taken = exchange_.reload->take();
+    if (taken == nullptr) return;
+    if (tap_ != nullptr) tap_->reloaded(next_);
+    pipeline_.give_way_to(taken->pipeline, taken->keeps_results);
+    port_.select(taken->wanted);
+    exchange_.reload->give_back(taken);
   }
 
   void leave_out_silence() noexcept {
@@ -119,7 +144,7 @@ class Loop {
     if (samples <= 0) return;
     next_ += samples * period_;
     pipeline_.on_silence(samples);
-    if (sink_ != nullptr) sink_->on_silence(*report_, samples);
+    if (sink_ != nullptr) sink_->on_silence(pipeline_.report(), samples);
   }
 
   void end(estimator::StopReason reason) noexcept {
@@ -129,6 +154,7 @@ class Loop {
     const SampleReport& report = pipeline_.on_end(now, reason, outbox_);
     send();
     if (sink_ != nullptr) sink_->on_report(report);
+    hand_out_result();
   }
 
   void send() noexcept {
@@ -149,20 +175,16 @@ class Loop {
   SampleSink* sink_;
   LoopMeters* meters_;
   RecordTap* tap_;
+  Exchange exchange_;
   Duration period_;
   MonoTime next_;
   MonoTime due_ = 0;                            // of the sample under way, before any were given up
   std::array<BusState, kBusMax> bus_states_{};  // kActive
   std::uint8_t buses_;
   LoopCounters counters_;
-  struct Rest {
-    State state = State::kInhibited;
-    std::uint32_t faults = 0, inhibits = 0;
-    bool macro_slip_stop = false;
-  };
-  Rest rest_;                             // of the last sample
-  MonoTime changed_ = next_;              // when it became so, or a frame came
-  const SampleReport* report_ = nullptr;  // the pipeline's, of the last sample
+  Pulse pulse_;               // of the last sample
+  MonoTime changed_ = next_;  // when it became so, or a frame came
+  MonoTime reload_from_ = 0;
   Outbox outbox_;
   std::array<RxFrame, kBatch> frames_{};
 };
@@ -171,8 +193,8 @@ class Loop {
 
 LoopCounters run_loop(Port& port, Pipeline& pipeline, double sample_rate_hz,
                       estimator::StopReason end_reason, SampleSink* sink, LoopMeters* meters,
-                      RecordTap* tap) noexcept {
-  return Loop(port, pipeline, sample_rate_hz, sink, meters, tap).run(end_reason);
+                      RecordTap* tap, const Exchange& exchange) noexcept {
+  return Loop(port, pipeline, sample_rate_hz, sink, meters, tap, exchange).run(end_reason);
 }
 
 }  // namespace beltgrip::daemon

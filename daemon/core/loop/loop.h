@@ -5,8 +5,10 @@
 
 #include "daemon/core/base/latency_histogram.h"
 #include "daemon/core/base/port.h"
+#include "daemon/core/loop/history_rings.h"
 #include "daemon/core/loop/pipeline.h"
 #include "daemon/core/loop/record_tap.h"
+#include "daemon/core/loop/reload.h"
 
 namespace beltgrip::daemon {
 
@@ -32,6 +34,16 @@ struct LoopMeters {
   LatencyHistogram frame_age;        // from a frame's stamp to its turn here
 };
 
+// What the loop exchanges with the helper thread between two samples, each a step of its own, after
+// the sample's report has gone out: results and what the history learns of them; then another
+// configuration, unless an experiment runs or its result may still be on its way to the history.
+struct Exchange {
+  static constexpr Duration kAfterResult = kSecond;
+
+  HistoryRings* history = nullptr;
+  ReloadSlot* reload = nullptr;
+};
+
 // The sample grid starts at port.now() as it is when run_loop is called: the first frame's stamp
 // for a Port in log time. Samples that could not be taken in time are taken late, in order and with
 // the frames that had come by their instants, so a late loop decides what a punctual one would
@@ -39,6 +51,7 @@ struct LoopMeters {
 // more: it costs the same however long it is.
 LoopCounters run_loop(Port& port, Pipeline& pipeline, double sample_rate_hz,
                       estimator::StopReason end_reason, SampleSink* sink,
-                      LoopMeters* meters = nullptr, RecordTap* tap = nullptr) noexcept;
+                      LoopMeters* meters = nullptr, RecordTap* tap = nullptr,
+                      const Exchange& exchange = {}) noexcept;
 
 }  // namespace beltgrip::daemon

@@ -210,7 +210,28 @@ const SampleReport& Pipeline::Parts::make_report(const Publication& published,
   return report;
 }
 
+const SampleReport& Pipeline::report() const noexcept { return parts_->report; }
+
 // --- between two samples --------------------------------------------------------------------
+
+Pulse Pipeline::pulse() const noexcept {
+  const Parts& parts = *parts_;
+  const ExperimentStage& experiment = parts.experiment;
+  const State state = experiment.state();
+  return {.state = state,
+          .in_experiment = experiment.runs(),
+          .macro_slip_stop = experiment.macro_slip_stop(),
+          .faults = parts.faults.bits(),
+          .inhibits = experiment.inhibits(),
+          .busy = state == State::kRamping || state == State::kEvaluating ||
+                  experiment.new_result() || parts.input.sample().usable ||
+                  parts.estimate.curve().usable};
+}
+
+const ExperimentResult* Pipeline::new_result() const noexcept {
+  const ExperimentStage& experiment = parts_->experiment;
+  return experiment.new_result() ? &experiment.result() : nullptr;
+}
 
 void Pipeline::learn(const estimator::LearnedFriction& learned) noexcept {
   parts_->known.learn(learned);

@@ -38,6 +38,17 @@ struct PipelineCounters {
   UdsCounters diagnostics;
 };
 
+// What the loop itself goes by: whether anything changes, and whether an experiment runs.
+struct Pulse {
+  State state = State::kInhibited;
+  bool in_experiment = false;
+  bool macro_slip_stop = false;
+  std::uint32_t faults = 0;
+  std::uint32_t inhibits = 0;
+  bool busy = false;  // samples come, or a result has
+  friend bool operator==(const Pulse&, const Pulse&) = default;
+};
+
 class Pipeline {
  public:
   explicit Pipeline(const Config& config);
@@ -60,6 +71,10 @@ class Pipeline {
   // The end (stop request, end of a log): ends a running experiment and leaves the last frames. Its
   // report has no sample of its own (sample.usable is false).
   const SampleReport& on_end(MonoTime t, estimator::StopReason reason, Outbox& outbox) noexcept;
+  // Of the last sample.
+  const SampleReport& report() const noexcept;
+  Pulse pulse() const noexcept;
+  const ExperimentResult* new_result() const noexcept;  // nullptr: it brought none
   // What all experiments together say, from the next sample on: MinClampForce rests on it.
   void learn(const estimator::LearnedFriction& learned) noexcept;
   // Between two samples, while no experiment runs: this becomes `next`, which has not been used

@@ -9,7 +9,6 @@
 
 #include "daemon/core/base/port.h"
 #include "daemon/core/config/config.h"
-#include "daemon/core/loop/loop.h"
 #include "daemon/core/loop/pipeline.h"
 
 namespace beltgrip::daemon {
@@ -48,28 +47,6 @@ class ReloadSlot {
  private:
   std::atomic<Reload*> offered_{nullptr};
   std::atomic<Reload*> taken_{nullptr};
-};
-
-// After each sample: puts what is offered in force, unless an experiment runs or its result may
-// still be on its way to the history.
-class ReloadLink final : public SampleSink {
- public:
-  static constexpr Duration kAfterResult = kSecond;
-
-  // next: where the reports go on to. It is done with a report before its pipeline goes. tap: of
-  // the flight recorder, where there is one.
-  ReloadLink(ReloadSlot& slot, Pipeline& pipeline, Port& port, SampleSink& next,
-             RecordTap* tap = nullptr) noexcept
-      : slot_(slot), pipeline_(pipeline), port_(port), next_(next), tap_(tap) {}
-  void on_report(const SampleReport& report) noexcept override;
-
- private:
-  ReloadSlot& slot_;
-  Pipeline& pipeline_;
-  Port& port_;
-  SampleSink& next_;
-  RecordTap* tap_;
-  MonoTime not_before_ = 0;
 };
 
 }  // namespace beltgrip::daemon

@@ -10,7 +10,6 @@
 #include <set>
 
 #include "can_dbc/frame/e2e.h"
-#include "daemon/core/observe/history_link.h"
 #include "daemon/core/publish/own_frames.h"
 #include "tests/daemon/frame_player.h"
 #include "tests/daemon/test_vehicle.h"
@@ -206,8 +205,8 @@ TEST(Pipeline, MinimumClampForceRestsOnTheHistoryWhereThereIsOne) {
   test::FramePlayer port(drive_frames({}));
   test::ReportKeeper keeper;
   Pipeline pipeline(config);
-  HistoryLink link(rings, pipeline, keeper);
-  run_loop(port, pipeline, config.estimator.sample_rate_hz, StopReason::kTraceEnd, &link);
+  run_loop(port, pipeline, config.estimator.sample_rate_hz, StopReason::kTraceEnd, &keeper, nullptr,
+           nullptr, {.history = &rings});
   Played run{port.sent, keeper.reports, keeper.results, pipeline.counters()};
 
   std::size_t before = 0;

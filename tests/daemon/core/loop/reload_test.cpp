@@ -45,7 +45,7 @@ class Helper final : public SampleSink {
   Helper(SampleSink& next, std::function<void(const SampleReport&)> act)
       : next_(next), act_(std::move(act)) {}
   void on_report(const SampleReport& report) noexcept override {
-    act_(report);  // before the link, which may replace the report's pipeline
+    act_(report);
     next_.on_report(report);
   }
 
@@ -66,10 +66,9 @@ Played run_with(const Config& config, std::vector<can::StampedFrame> frames, Rel
   test::FramePlayer port(std::move(frames));
   test::ReportKeeper keeper;
   Pipeline pipeline(config);
-  ReloadLink link(slot, pipeline, port, keeper);
-  Helper helper(link, act);
+  Helper helper(keeper, act);
   run_loop(port, pipeline, config.estimator.sample_rate_hz, estimator::StopReason::kTraceEnd,
-           &helper);
+           &helper, nullptr, nullptr, {.reload = &slot});
   return {port.sent, keeper.reports, keeper.results, pipeline.counters()};
 }
 
@@ -258,12 +257,11 @@ TEST(Reload, AHundredOfThemAllocateNothingOnTheLoopsThread) {
   Pipeline pipeline(config);
   ReloadSlot slot;
   Nothing nothing;
-  ReloadLink link(slot, pipeline, port, nothing);
-  Sink sink(link, slot, ready, used);
+  Sink sink(nothing, slot, ready, used);
   {
     const test::AllocGuard guard;
     run_loop(port, pipeline, config.estimator.sample_rate_hz, estimator::StopReason::kTraceEnd,
-             &sink);
+             &sink, nullptr, nullptr, {.reload = &slot});
     EXPECT_EQ(test::AllocGuard::allocations(), 0U);
     EXPECT_EQ(test::AllocGuard::frees(), 0U);
   }
