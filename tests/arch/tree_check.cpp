@@ -78,6 +78,16 @@ const std::array kCodeRules{
              {"daemon/io/can_socket.cpp"},
              R"(\b(sendmsg|sendmmsg|sendto|pwrite|writev)\s*\(|(^|[^\w>])::write\s*\()",
              "one place writes to a socket"},
+    // So the force that is asked for never passes through a report, and nothing decides by one.
+    TextRule{{"daemon/core/input/", "daemon/core/estimate/", "daemon/core/experiment/",
+              "daemon/core/guard/", "daemon/core/publish/"},
+             {},
+             R"(\bSampleReport\b|#include\s*"daemon/core/(loop|observe)/)",
+             "a sample's report is put together last, and no stage knows it"},
+    TextRule{{"daemon/core/loop/pipeline", "daemon/core/loop/loop."},
+             {},
+             R"(\breport(\(\)|_)?\.\w+\s*(?![\w.\s]*=[^=]))",
+             "a sample's report is written here and read by nobody"},
     TextRule{
         {"estimator/", "daemon/core/"},
         // Start-up only; constructors and factories elsewhere say std::make_unique.

@@ -100,7 +100,12 @@ INSTANTIATE_TEST_SUITE_P(
                     Planted{"estimator/a.cpp", "auto* p = new Sample;"},
                     Planted{"estimator/a.cpp", "samples.push_back(s);"},
                     Planted{"daemon/core/loop/pipeline.cpp", "std::function<void()> f;"},
-                    Planted{"daemon/core/loop/loop.cpp", "throw 1;"}));
+                    Planted{"daemon/core/loop/loop.cpp", "throw 1;"},
+                    Planted{"daemon/core/publish/a.h", "void collect(const SampleReport& report);"},
+                    Planted{"daemon/core/experiment/a.cpp",
+                            "#include \"daemon/core/loop/pipeline.h\""},
+                    Planted{"daemon/core/loop/pipeline.cpp",
+                            "now.clamp.secondary_force_N = report.request_force_N;"}));
 
 // In pieces, so that they are not found in this file.
 INSTANTIATE_TEST_SUITE_P(Texts, Violation,
