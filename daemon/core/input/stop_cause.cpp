@@ -5,33 +5,46 @@
 #include <cmath>
 #include <string_view>
 
+#include "daemon/core/base/named.h"
+
 namespace beltgrip::daemon {
+
+using estimator::StopReason;
 
 namespace {
 
-// What the reason alone says.
-constexpr std::array<std::string_view, estimator::kStopReasonCount> kWords{
-    "",
-    "friction no longer rises with slip",
-    "mu_max is known well enough",
-    "too much slip",
-    "slip grows too fast",
-    "too much slip energy",
-    "the request has stood for as long as it may",
-    "the force has come to its floor",
-    "engine and primary speed no longer go together, or are too low",
-    "the torque went to zero, changed its sign or left its band",
-    "speeds and torque do not fit the ratio at the end stop",
-    "an input was lost, or read what cannot be",
-    "permission withdrawn",
-    "the driver acted",
-    "the bus, or the frames on it",
-    "the program was stopped",
-    "the log ended",
-    "the clamping force does not follow the request",
-    "an input stands still",
-    "too little slip is left",
-    "the clamping force answers later than configured"};
+struct ReasonRow {
+  StopReason value;  // wire value
+  std::string_view name;
+  std::string_view words;  // what the reason alone says
+};
+constexpr std::array<ReasonRow, estimator::kStopReasonCount> kReasons{
+    {{StopReason::kNone, "None", ""},
+     {StopReason::kSlope, "Slope", "friction no longer rises with slip"},
+     {StopReason::kConfidence, "Confidence", "mu_max is known well enough"},
+     {StopReason::kSlip, "Slip", "too much slip"},
+     {StopReason::kSlipRate, "SlipRate", "slip grows too fast"},
+     {StopReason::kSlipEnergy, "SlipEnergy", "too much slip energy"},
+     {StopReason::kTime, "Time", "the request has stood for as long as it may"},
+     {StopReason::kForceFloor, "ForceFloor", "the force has come to its floor"},
+     {StopReason::kEngineSpeed, "EngineSpeed",
+      "engine and primary speed no longer go together, or are too low"},
+     {StopReason::kTorque, "Torque", "the torque went to zero, changed its sign or left its band"},
+     {StopReason::kRatio, "Ratio", "speeds and torque do not fit the ratio at the end stop"},
+     {StopReason::kInputs, "Inputs", "an input was lost, or read what cannot be"},
+     {StopReason::kPermission, "Permission", "permission withdrawn"},
+     {StopReason::kDriver, "Driver", "the driver acted"},
+     {StopReason::kBus, "Bus", "the bus, or the frames on it"},
+     {StopReason::kShutdown, "Shutdown", "the program was stopped"},
+     {StopReason::kTraceEnd, "TraceEnd", "the log ended"},
+     {StopReason::kClampNotFollowed, "ClampNotFollowed",
+      "the clamping force does not follow the request"},
+     {StopReason::kInputFrozen, "InputFrozen", "an input stands still"},
+     {StopReason::kRoom, "Room", "too little slip is left"},
+     {StopReason::kLag, "Lag", "the clamping force answers later than configured"}}};
+static_assert(in_wire_order(kReasons));
+
+const ReasonRow& row_of(StopReason reason) { return kReasons.at(static_cast<std::size_t>(reason)); }
 
 std::string rounded(double value) {
   std::array<char, 32> text;
@@ -42,11 +55,12 @@ std::string rounded(double value) {
 
 }  // namespace
 
-std::string cause_text(estimator::StopReason reason, const StopCause& cause) {
+std::string_view stop_reason_name(StopReason reason) { return row_of(reason).name; }
+
+std::string cause_text(StopReason reason, const StopCause& cause) {
   std::string text;
   if (cause.role) text = std::string(role_name(*cause.role)) + ": ";
-  text += cause.what != nullptr ? std::string_view(cause.what)
-                                : kWords.at(static_cast<std::size_t>(reason));
+  text += cause.what != nullptr ? std::string_view(cause.what) : row_of(reason).words;
   const std::string unit = *cause.unit == '\0' ? "" : std::string(" ") + cause.unit;
   if (std::isfinite(cause.figure)) text += " " + rounded(cause.figure) + unit;
   if (std::isfinite(cause.limit)) text += ", limit " + rounded(cause.limit) + unit;

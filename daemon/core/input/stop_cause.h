@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "daemon/core/config/config.h"
 #include "estimator/method/slip_curve_estimator.h"
@@ -24,6 +25,9 @@ struct Stop {
   StopCause cause;
   explicit operator bool() const noexcept { return reason != estimator::StopReason::kNone; }
 };
+
+// As in BeltGrip's frames, the journal, the history, `status` and `replay`.
+std::string_view stop_reason_name(estimator::StopReason reason);
 
 // "secondary_pressure: stands still 0.21 s, limit 0.15 s". Never empty but with reason kNone.
 // Allocates: not on the real-time thread.

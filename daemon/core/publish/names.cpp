@@ -3,31 +3,46 @@
 #include <array>
 #include <cstddef>
 
+#include "daemon/core/base/named.h"
+
 namespace beltgrip::daemon {
 
 namespace {
 
-constexpr std::array<std::string_view, kStateCount> kStates{
-    "Inhibited", "Idle", "Settling", "Ramping", "Releasing", "Evaluating", "Cooldown", "Fault"};
-constexpr std::array<std::string_view, 4> kOutcomes{"None", "Completed", "Inconclusive", "Aborted"};
-constexpr std::array<std::string_view, estimator::kStopReasonCount> kReasons{
-    "None",        "Slope",      "Confidence",  "Slip",     "SlipRate", "SlipEnergy",
-    "Time",        "ForceFloor", "EngineSpeed", "Torque",   "Ratio",    "Inputs",
-    "Permission",  "Driver",     "Bus",         "Shutdown", "TraceEnd", "ClampNotFollowed",
-    "InputFrozen", "Room",       "Lag"};
-constexpr std::array<std::string_view, 4> kPhases{"Quiet", "Excited", "Peak", "MacroSlip"};
-constexpr std::array<std::string_view, 3> kKinds{"None", "Value", "LowerBound"};
+using estimator::PeakKind;
+using estimator::Phase;
+
+constexpr std::array<Named<State>, kStateCount> kStates{{{State::kInhibited, "Inhibited"},
+                                                         {State::kIdle, "Idle"},
+                                                         {State::kSettling, "Settling"},
+                                                         {State::kRamping, "Ramping"},
+                                                         {State::kReleasing, "Releasing"},
+                                                         {State::kEvaluating, "Evaluating"},
+                                                         {State::kCooldown, "Cooldown"},
+                                                         {State::kFault, "Fault"}}};
+constexpr std::array<Named<Outcome>, 4> kOutcomes{{{Outcome::kNone, "None"},
+                                                   {Outcome::kCompleted, "Completed"},
+                                                   {Outcome::kInconclusive, "Inconclusive"},
+                                                   {Outcome::kAborted, "Aborted"}}};
+constexpr std::array<Named<Phase>, 4> kPhases{{{Phase::kQuiet, "Quiet"},
+                                               {Phase::kExcited, "Excited"},
+                                               {Phase::kPeak, "Peak"},
+                                               {Phase::kMacroSlip, "MacroSlip"}}};
+constexpr std::array<Named<PeakKind>, 3> kKinds{{{PeakKind::kNone, "None"},
+                                                 {PeakKind::kValue, "Value"},
+                                                 {PeakKind::kLowerBound, "LowerBound"}}};
+static_assert(in_wire_order(kStates) && in_wire_order(kOutcomes) && in_wire_order(kPhases) &&
+              in_wire_order(kKinds));
 
 template <std::size_t kCount, typename Enum>
-std::string_view at(const std::array<std::string_view, kCount>& names, Enum value) {
-  return names[static_cast<std::size_t>(value)];
+std::string_view at(const std::array<Named<Enum>, kCount>& names, Enum value) {
+  return names[static_cast<std::size_t>(value)].name;
 }
 
 }  // namespace
 
 std::string_view state_name(State state) { return at(kStates, state); }
 std::string_view outcome_name(Outcome outcome) { return at(kOutcomes, outcome); }
-std::string_view stop_reason_name(estimator::StopReason reason) { return at(kReasons, reason); }
 std::string_view phase_name(estimator::Phase phase) { return at(kPhases, phase); }
 std::string_view kind_name(estimator::PeakKind kind) { return at(kKinds, kind); }
 std::string_view direction_name(estimator::Direction direction) {
