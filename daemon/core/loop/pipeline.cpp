@@ -130,11 +130,9 @@ const SampleReport& Pipeline::on_sample(MonoTime t, Outbox& outbox) noexcept {
     parts.publish_result(parts.evaluation.peak());
   }
 
-  Outbox wanted;
   const Publication publication = parts.publication();
-  parts.output.collect(t, publication, wanted);
-  parts.input.poll(t, wanted);
-  parts.output.pass(t, wanted, outbox, parts.faults);
+  parts.input.poll(t, parts.output.collect(t, publication));
+  parts.output.pass(t, outbox, parts.faults);
   parts.count_frames();
   parts.t = t;
   return parts.make_report(publication, sample.usable);
@@ -149,10 +147,9 @@ const SampleReport& Pipeline::on_end(MonoTime t, StopReason reason, Outbox& outb
     parts.publish_result(concluded ? parts.evaluation.peak() : estimator::PeakEstimate{});
   }
   parts.experiment.go_idle(t);
-  Outbox wanted;
   const Publication publication = parts.publication();
-  parts.output.collect_all(t, publication, wanted);
-  parts.output.pass(t, wanted, outbox, parts.faults);
+  parts.output.collect_all(t, publication);
+  parts.output.pass(t, outbox, parts.faults);
   parts.count_frames();
   parts.t = t;
   return parts.make_report(publication, false);

@@ -68,15 +68,14 @@ void OutputStage::ask_again(MonoTime t, const FaultSet& faults) noexcept {
   if (!faults.has(Fault::kForeignSender)) publisher_.repeat_inactive();
 }
 
-void OutputStage::pass(MonoTime t, const Outbox& wanted, Outbox& outbox,
-                       FaultSet& faults) noexcept {
-  for (std::size_t i = 0; i < wanted.size; ++i) {
-    if (!gate_.permits(wanted.frames[i], wanted.bus[i], t)) {
+void OutputStage::pass(MonoTime t, Outbox& outbox, FaultSet& faults) noexcept {
+  for (std::size_t i = 0; i < wanted_.size; ++i) {
+    if (!gate_.permits(wanted_.frames[i], wanted_.bus[i], t)) {
       faults.latch(Fault::kFrameRefused);
       continue;
     }
-    outbox.push(wanted.frames[i], wanted.bus[i]);
-    if (is_clamp(wanted.frames[i], wanted.bus[i]) && !clamp_unconfirmed_) {
+    outbox.push(wanted_.frames[i], wanted_.bus[i]);
+    if (is_clamp(wanted_.frames[i], wanted_.bus[i]) && !clamp_unconfirmed_) {
       clamp_unconfirmed_ = true;
       clamp_sent_ = t;
     }

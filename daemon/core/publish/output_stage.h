@@ -26,15 +26,18 @@ class OutputStage {
   // Before a request: a controller that has seen no inactive frame refuses it.
   void announce() noexcept { publisher_.repeat_inactive(); }
 
-  // Adds to wanted what is due at t; collect_all everything, before the end.
-  void collect(MonoTime t, const Publication& publication, Outbox& wanted) noexcept {
-    publisher_.collect(t, publication, wanted);
+  // What is due at t; collect_all: everything, before the end. Others may add to it.
+  Outbox& collect(MonoTime t, const Publication& publication) noexcept {
+    wanted_.size = 0;
+    publisher_.collect(t, publication, wanted_);
+    return wanted_;
   }
-  void collect_all(MonoTime t, const Publication& publication, Outbox& wanted) noexcept {
-    publisher_.collect_all(t, publication, wanted);
+  void collect_all(MonoTime t, const Publication& publication) noexcept {
+    wanted_.size = 0;
+    publisher_.collect_all(t, publication, wanted_);
   }
-  // Hands on what the gate permits.
-  void pass(MonoTime t, const Outbox& wanted, Outbox& outbox, FaultSet& faults) noexcept;
+  // Hands on what the gate permits of it.
+  void pass(MonoTime t, Outbox& outbox, FaultSet& faults) noexcept;
 
   // Nobody has confirmed what was asked: it may not be on the bus at all.
   bool unconfirmed(MonoTime t) const noexcept;
@@ -50,6 +53,7 @@ class OutputStage {
   FrameIdentifiers identifiers_;
   Publisher publisher_;
   TxGate gate_;
+  Outbox wanted_;                         // kept: to make one anew costs a thousand instructions
   std::uint64_t refused_before_ = 0;      // under the configurations before this one
   bool clamp_unconfirmed_ = false;        // a clamp frame waits for its echo
   MonoTime clamp_sent_ = 0;               // the first that waits
