@@ -36,8 +36,8 @@ void ExperimentRecord::reset() noexcept {
   held_count_ = 0;
   last_held_s_ = 0.0;
   first_force_N_ = 0.0;
-  torque_stepped_ = false;
-  torque_stepped_s_ = smooth_force_N_ = lowest_force_N_ = lowest_force_s_ = 0.0;
+  torque_stepped_s_ = std::numeric_limits<double>::infinity();
+  smooth_force_N_ = lowest_force_N_ = lowest_force_s_ = 0.0;
   last_t_s_ = 0.0;
   last_omega_rad_s_ = 1.0;
 }
@@ -75,8 +75,7 @@ bool ExperimentRecord::step(const Cell& sample) noexcept {
     if (first_force_N_ <= 0.0) first_force_N_ = force_N;
     if (force_N < kLowered * first_force_N_ &&
         torque_watch_.step(sample.torque_Nm, slip, slip_noise(), torque_)) {
-      if (!torque_stepped_) torque_stepped_s_ = sample.t_s;
-      torque_stepped_ = true;
+      torque_stepped_s_ = std::min(torque_stepped_s_, sample.t_s);
     }
   }
   omega_p_.step(sample.t_s, sample.omega_p_rad_s, 0.0);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "estimator/reading/step_watch.h"
@@ -47,10 +48,10 @@ class ExperimentRecord {
                                                                 : cell.clamp_force_N;
   }
   double duration_s() const noexcept { return last_t_s_; }
-  // The torque's reading has stepped since the clamp force began to fall, and before it came back.
-  bool torque_stepped() const noexcept {
-    return torque_stepped_ && torque_stepped_s_ < lowered_until_s() - kTakingUp_s;
-  }
+  // When the torque's reading first stepped since the clamp force began to fall; infinite: never.
+  double torque_stepped_s() const noexcept { return torque_stepped_s_; }
+  // Until when that says anything of the reading: then the force comes back.
+  double torque_counts_until_s() const noexcept { return lowered_until_s() - kTakingUp_s; }
   // When the clamp force was at its lowest, if it has been raised since; else infinity.
   double lowered_until_s() const noexcept;
 
@@ -71,8 +72,7 @@ class ExperimentRecord {
   double last_held_s_ = 0.0;
   StepWatch torque_watch_;
   double first_force_N_ = 0.0;
-  bool torque_stepped_ = false;
-  double torque_stepped_s_ = 0.0;
+  double torque_stepped_s_ = std::numeric_limits<double>::infinity();
   double smooth_force_N_ = 0.0;
   double lowest_force_N_ = 0.0, lowest_force_s_ = 0.0;
   double last_t_s_ = 0.0;

@@ -7,8 +7,7 @@
 #include "estimator/physics/clamp_force.h"
 #include "estimator/physics/sensor_error.h"
 #include "estimator/physics/units.h"
-#include "estimator/reading/frozen_reading.h"
-#include "estimator/reading/glitch_gate.h"
+#include "estimator/reading/channel_reading.h"
 #include "estimator/record/experiment_record.h"
 #include "estimator/robust/after_stop.h"
 #include "estimator/robust/follow_on.h"
@@ -71,14 +70,10 @@ class RobustEstimator final : public SlipCurveEstimator {
         force_step_(settings.sample_rate_hz,
                     variator.secondary_piston_area_m2 * settings.pressure_step_Pa),
         peak_forecast_(settings.sample_rate_hz),
-        pressure_reading_(settings.sample_rate_hz),
-        torque_reading_(settings.sample_rate_hz),
-        omega_p_reading_(settings.sample_rate_hz),
-        omega_s_reading_(settings.sample_rate_hz),
-        omega_p_gate_(settings.sample_rate_hz),
-        omega_s_gate_(settings.sample_rate_hz),
-        torque_gate_(settings.sample_rate_hz),
-        torque_is_sensor_(!settings.torque_is_engine) {
+        pressure_(settings.sample_rate_hz),
+        torque_(settings.sample_rate_hz, settings.torque_is_engine),
+        omega_p_(settings.sample_rate_hz),
+        omega_s_(settings.sample_rate_hz) {
     RobustEstimator::reset();
   }
 
@@ -87,13 +82,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     excitation_.reset();
     record_.reset();
     force_step_.reset();
-    pressure_reading_.reset();
-    torque_reading_.reset();
-    omega_p_reading_.reset();
-    omega_s_reading_.reset();
-    omega_p_gate_.reset();
-    omega_s_gate_.reset();
-    torque_gate_.reset();
+    for (ChannelReading* each : {&pressure_, &torque_, &omega_p_, &omega_s_}) each->reset();
     out_ = {};
     peak_ = {};
     first_t_ns_ = 0;
@@ -103,7 +92,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     narrow_ = 0;
     first_mu_ = first_force_N_ = 0.0;
     started_ = concluding_ = concluded_ = false;
-    waiting_ = refitting_ = stepped_ = force_stepped_ = speed_jumped_ = false;
+    waiting_ = refitting_ = stepped_ = false;
   }
 
   const CurveEstimate& step(const VariatorSample& read) noexcept override {
@@ -130,12 +119,14 @@ class RobustEstimator final : public SlipCurveEstimator {
       detector_.reset(traction_, inertia_kg_m2_);
       peak_forecast_.reset(traction_, inertia_kg_m2_);
     }
-    pressure_reading_.step(read.secondary_pressure_Pa);
-    torque_reading_.step(read.torque_Nm);
-    omega_p_reading_.step(read.omega_p_rad_s);
-    omega_s_reading_.step(read.omega_s_rad_s);
+    pressure_.follow(read.secondary_pressure_Pa);
+    torque_.follow(read.torque_Nm);
+    omega_p_.follow(read.omega_p_rad_s);
+    omega_s_.follow(read.omega_s_rad_s);
     const Cell cell = cell_of(sample);
-    force_stepped_ |= force_step_.step(cell, record_.slip_noise(), record_.force());
+    if (force_step_.step(cell, record_.slip_noise(), record_.force())) {
+      pressure_.take_step(cell.t_s);
+    }
     if (record_.step(cell)) decide();
     if (peak_forecast_.step()) expect();
     return out_;
@@ -208,11 +199,12 @@ class RobustEstimator final : public SlipCurveEstimator {
     };
     const double slip = std::max(kGlitchSlip, least(record_.slip_noise()) / kPercent);
     VariatorSample clean = sample;
-    clean.omega_p_rad_s = omega_p_gate_.step(sample.omega_p_rad_s, slip, 0.0);
-    clean.omega_s_rad_s = omega_s_gate_.step(sample.omega_s_rad_s, slip, 0.0);
+    clean.omega_p_rad_s = omega_p_.without_glitch(sample.omega_p_rad_s, slip, 0.0);
+    clean.omega_s_rad_s = omega_s_.without_glitch(sample.omega_s_rad_s, slip, 0.0);
     clean.torque_Nm =
-        torque_gate_.step(sample.torque_Nm, kGlitchTorque, least(record_.torque_noise()));
-    speed_jumped_ |= omega_p_gate_.jumped() || omega_s_gate_.jumped();
+        torque_.without_glitch(sample.torque_Nm, kGlitchTorque, least(record_.torque_noise()));
+    if (omega_p_.jumped()) omega_p_.take_step(record_.duration_s());
+    if (omega_s_.jumped()) omega_s_.take_step(record_.duration_s());
     return clean;
   }
 
@@ -236,11 +228,11 @@ class RobustEstimator final : public SlipCurveEstimator {
     if (first_force_N_ <= 0.0) first_force_N_ = out_.clamp_force_N;
     // Slip that grows while neither the force is lowered nor mu* climbs: a channel stands still.
     const bool still =
-        pressure_reading_.frozen() ||
+        pressure_.verdict() == ReadingVerdict::kFrozen ||
         (out_.mu_star < kClimb * first_mu_ && out_.clamp_force_N > kLowered * first_force_N_);
     if ((out_.stop == StopReason::kSlope && still) ||
         (out_.stop != StopReason::kNone &&
-         (torque_frozen() || speed_frozen() || !is_possible(out_.mu_star, reading_reach_)))) {
+         (stands_still() || !is_possible(out_.mu_star, reading_reach_)))) {
       out_.stop = StopReason::kInputs;
     }
     out_.friction_slope = detector_.slope();
@@ -256,14 +248,14 @@ class RobustEstimator final : public SlipCurveEstimator {
     peak_forecast_.collect(record_);
   }
 
-  // What an engine's controller computes may stand still, a sensor's torque does not.
-  bool torque_frozen() const noexcept {
-    return torque_is_sensor_ && (torque_reading_.frozen() ||
-                                 (torque_reading_.never_moved() && omega_p_reading_.moves()));
-  }
-  // Slip and inertia torque that are not there, in their place.
-  bool speed_frozen() const noexcept {
-    return omega_p_reading_.frozen() || omega_s_reading_.frozen();
+  // A torque that never moved is none where the shafts move. Slip and inertia torque that are not
+  // there come in the place of a speed that stands still.
+  bool stands_still() const noexcept {
+    const ReadingVerdict torque = torque_.verdict();
+    return torque == ReadingVerdict::kFrozen ||
+           (torque == ReadingVerdict::kNeverMoved && omega_p_.moves()) ||
+           omega_p_.verdict() == ReadingVerdict::kFrozen ||
+           omega_s_.verdict() == ReadingVerdict::kFrozen;
   }
 
   // What the curve so far says of its top, with the sensors' constant errors; enough for a stop?
@@ -344,7 +336,7 @@ class RobustEstimator final : public SlipCurveEstimator {
   }
 
   void judge() noexcept {
-    if (out_.stop == StopReason::kRatio || torque_frozen() || speed_frozen()) return;
+    if (out_.stop == StopReason::kRatio || stands_still()) return;
     if (out_.stop == StopReason::kInputs) {
       peak_.impossible = !is_possible(out_.mu_star, reading_reach_);
       peak_.mu_refused = peak_.impossible ? out_.mu_star : 0.0;
@@ -412,7 +404,8 @@ class RobustEstimator final : public SlipCurveEstimator {
   }
 
   bool contradictory(const PeakFitResult& fit) const noexcept {
-    return record_.torque_stepped() || force_stepped_ || speed_jumped_ ||
+    return record_.torque_stepped_s() < record_.torque_counts_until_s() ||
+           pressure_.has_stepped() || omega_p_.has_stepped() || omega_s_.has_stepped() ||
            after_stop_.swung_back() ||
            (fit.valid && follow_on_.stood_still(fit.mu, traction_, inertia_kg_m2_)) ||
            fit.below_chord > kChordDeviations || fit.residuals.innovation > kInnovation ||
@@ -435,9 +428,7 @@ class RobustEstimator final : public SlipCurveEstimator {
   std::size_t next_after_ = 0;  // to join the record
   PeakFit fit_;
   PeakForecast peak_forecast_;
-  FrozenReading pressure_reading_, torque_reading_, omega_p_reading_, omega_s_reading_;
-  GlitchGate omega_p_gate_, omega_s_gate_, torque_gate_;
-  bool torque_is_sensor_;
+  ChannelReading pressure_, torque_, omega_p_, omega_s_;
   CurveEstimate out_;
   PeakEstimate peak_;
   double traction_ = 0.0;  // mu* = traction T_p / F_s
@@ -447,11 +438,9 @@ class RobustEstimator final : public SlipCurveEstimator {
   double expected_noise_low_ = 0.0, expected_noise_high_ = 0.0;
   int narrow_ = 0;  // forecasts in a row within confidence_width
   bool started_ = false, concluding_ = false, concluded_ = false;
-  bool waiting_ = false;        // for what comes after the stop
-  bool refitting_ = false;      // with it
-  bool stepped_ = false;        // since the last conclude()
-  bool force_stepped_ = false;  // its reading
-  bool speed_jumped_ = false;   // the reading of one
+  bool waiting_ = false;    // for what comes after the stop
+  bool refitting_ = false;  // with it
+  bool stepped_ = false;    // since the last conclude()
 };
 
 }  // namespace

@@ -1,0 +1,90 @@
+// One verdict on each reading: what moves is trusted, what stops is frozen, what steps keeps its
+// time.
+#include "estimator/reading/channel_reading.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace beltgrip::estimator {
+namespace {
+
+constexpr double kRate_hz = 100.0;
+
+// No two values are equal.
+double live(int i) { return 100.0 + std::sin(0.7 * i); }
+
+void follow_live(ChannelReading& channel, int samples) {
+  for (int i = 0; i < samples; ++i) channel.follow(live(i));
+}
+void follow_level(ChannelReading& channel, int samples) {
+  for (int i = 0; i < samples; ++i) channel.follow(100.0);
+}
+
+TEST(ChannelReading, WhatMovesIsTrusted) {
+  ChannelReading channel(kRate_hz);
+  follow_live(channel, 200);
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kTrusted);
+  EXPECT_TRUE(channel.moves());
+  EXPECT_TRUE(std::isinf(channel.stepped_s()));
+}
+
+TEST(ChannelReading, WhatMovedAndStandsStillIsFrozenUntilItMovesAgain) {
+  ChannelReading channel(kRate_hz);
+  follow_live(channel, 200);
+  follow_level(channel, 15);  // the first of them is a change
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kTrusted);
+  follow_level(channel, 1);
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kFrozen);
+  channel.follow(100.5);
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kTrusted);
+}
+
+TEST(ChannelReading, WhatNeverMovedIsSaidSoAfterFiveSeconds) {
+  ChannelReading channel(kRate_hz);
+  follow_level(channel, 500);
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kTrusted);
+  follow_level(channel, 1);
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kNeverMoved);
+}
+
+TEST(ChannelReading, WhatIsComputedMayRest) {
+  ChannelReading channel(kRate_hz, true);
+  follow_live(channel, 200);
+  follow_level(channel, 1000);
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kTrusted);
+}
+
+TEST(ChannelReading, AStepKeepsItsFirstTimeAlsoWhereItStandsStillThen) {
+  ChannelReading channel(kRate_hz);
+  follow_live(channel, 200);
+  channel.take_step(3.0);
+  channel.take_step(5.0);
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kStepped);
+  EXPECT_EQ(channel.stepped_s(), 3.0);
+  follow_level(channel, 100);
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kFrozen);
+  EXPECT_TRUE(channel.has_stepped());
+  channel.reset();
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kTrusted);
+  EXPECT_FALSE(channel.has_stepped());
+}
+
+// It is held for 50 ms; what stays where it went is true, and the channel has jumped.
+TEST(ChannelReading, AGlitchIsLeftOutAndAJumpIsNot) {
+  ChannelReading channel(kRate_hz);
+  const auto value_of = [&](double value) { return channel.without_glitch(value, 0.005, 0.0); };
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(value_of(100.0), 100.0);
+  EXPECT_NEAR(value_of(150.0), 100.0, 1e-9);
+  EXPECT_EQ(value_of(100.0), 100.0);
+  for (int i = 0; i < 100; ++i) value_of(100.0);
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_NEAR(value_of(150.0), 100.0, 1e-9);
+    EXPECT_FALSE(channel.jumped());
+  }
+  EXPECT_EQ(value_of(150.0), 150.0);
+  EXPECT_TRUE(channel.jumped());
+}
+
+}  // namespace
+}  // namespace beltgrip::estimator
