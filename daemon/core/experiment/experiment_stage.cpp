@@ -328,7 +328,6 @@ void ExperimentStage::release(const Now& now) noexcept {
 }
 
 Action ExperimentStage::apply(const Transition& transition, const Now& now) noexcept {
-  state_ = transition.next;
   switch (transition.action) {
     case Action::kNone:
     case Action::kPublish:
@@ -359,10 +358,11 @@ Action ExperimentStage::apply(const Transition& transition, const Now& now) noex
       break;
     case Action::kOver:
       macro_slip_stop_ = false;
-      if (state_ == State::kFault) now.faults.latch(Fault::kClampStuck);
+      if (transition.next == State::kFault) now.faults.latch(Fault::kClampStuck);
       arming_.reset();
       break;
   }
+  state_ = transition.next;  // after it is said why: what is lost depends on what was going on
   if (state_ != State::kRamping && request_.standing()) request_.end(now.t);
   return transition.action;
 }

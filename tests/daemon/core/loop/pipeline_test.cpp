@@ -302,6 +302,25 @@ TEST(Pipeline, ALostInputAbortsWithinItsStaleTime) {
   }
 }
 
+// Every frame comes, but a primary speed of zero gives no sample: the abort says so.
+TEST(Pipeline, AReadingThatGivesNoSampleIsNamedAsTheCause) {
+  auto frames = drive_frames({});
+  const MonoTime stopped = frames.front().t_ns + 3 * kSecond;
+  for (can::StampedFrame& each : frames) {
+    if (each.frame.id.value == 0x100U && each.t_ns >= stopped) {
+      each.frame = test::speeds_frame(0.0, 300.0);
+    }
+  }
+  const Played run = run_frames(test::vehicle_config(), frames);
+  ASSERT_EQ(run.results.size(), 1U);
+  const ExperimentResult& result = run.results[0];
+  EXPECT_EQ(result.outcome, Outcome::kAborted);
+  EXPECT_EQ(result.stop_reason, StopReason::kInputs);
+  EXPECT_EQ(result.cause.role, Role::kPrimarySpeed);
+  const std::string text = cause_text(result.stop_reason, result.cause);
+  EXPECT_TRUE(text.starts_with("primary_speed: reads what gives no sample for 0.")) << text;
+}
+
 TEST(Pipeline, AShortGapDoesNotAbort) {
   auto frames = drive_frames({});
   const MonoTime from = frames.front().t_ns + 3 * kSecond;
