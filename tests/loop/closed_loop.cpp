@@ -11,6 +11,7 @@
 #include "daemon/core/loop/loop.h"
 #include "tests/loop/detectable.h"
 #include "tests/support/invariants.h"
+#include "tools/sim/configuration.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/vehicle_port.h"
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "tools/sim/vehicle_bus.h"
+#include "tools/sim/configuration.h"
 
 namespace beltgrip::test {
 

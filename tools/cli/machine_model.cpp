@@ -36,18 +36,18 @@ void shape(const MachineEffects& effects, sim::FrictionCurve& curve) {
 
 }  // namespace
 
-void apply_model(const std::string& path, sim::Scenario& scenario) {
+void apply_model(const std::string& path, sim::RigScenario& scenario) {
   const bool low = scenario.variator.ratio < 1.0;
   estimator::VariatorParameters variator;
   variator.half_wedge_angle_rad = scenario.variator.half_wedge_angle_rad;
   (low ? variator.ratio_low : variator.ratio_overdrive) = scenario.variator.ratio;
-  variator.secondary_piston_area_m2 = scenario.secondary_piston_area_m2;
-  variator.secondary_spring_force_N = scenario.secondary_spring_force_N;
+  variator.secondary_piston_area_m2 = scenario.variator.secondary_piston_area_m2;
+  variator.secondary_spring_force_N = scenario.variator.secondary_spring_force_N;
   const ModelFile model = read(path, variator);
   scenario.variator.half_wedge_angle_rad = model.variator.half_wedge_angle_rad;
   scenario.variator.ratio = low ? model.variator.ratio_low : model.variator.ratio_overdrive;
-  scenario.secondary_piston_area_m2 = model.variator.secondary_piston_area_m2;
-  scenario.secondary_spring_force_N = model.variator.secondary_spring_force_N;
+  scenario.variator.secondary_piston_area_m2 = model.variator.secondary_piston_area_m2;
+  scenario.variator.secondary_spring_force_N = model.variator.secondary_spring_force_N;
   take(model.driveline, "deformation_per_kN", scenario.variator.deformation_per_N, 1e-3);
   sim::FrictionCurve& belt = scenario.belts.at(scenario.belt);
   take(model.friction, "mu_max", belt.mu_max);
@@ -58,6 +58,7 @@ void apply_model(const std::string& path, sim::Scenario& scenario) {
   scenario.effects = daemon::whole_machine(rest);
   scenario.effects.centrifugal_N_s2 += model.variator.secondary_centrifugal_N_s2;
   shape(scenario.effects, belt);
+  scenario.sensors.add(scenario.effects);
 }
 
 void apply_model(const std::string& path, sim::VehicleScenario& scenario) {
@@ -90,25 +91,7 @@ void apply_model(const std::string& path, sim::VehicleScenario& scenario) {
   MachineEffects& effects = scenario.effects;
   effects = daemon::whole_machine(rest);
   shape(effects, scenario.belt.overdrive);
-
-  // A channel that leads makes all others lag.
-  sim::SensorParameters& sensors = scenario.sensors;
-  const double lead_s =
-      std::max({0.0, -effects.primary_speed_delay_s, -effects.secondary_speed_delay_s,
-                -effects.torque_delay_s, -effects.pressure_delay_s});
-  sensors.primary_speed.delay_s += lead_s + effects.primary_speed_delay_s;
-  sensors.secondary_speed.delay_s += lead_s + effects.secondary_speed_delay_s;
-  sensors.torque.delay_s += lead_s + effects.torque_delay_s;
-  sensors.pressure.delay_s += lead_s + effects.pressure_delay_s;
-  sensors.engine_speed.delay_s += lead_s;
-  sensors.primary_speed.gain += effects.primary_speed_scale;
-  sensors.secondary_speed.gain += effects.secondary_speed_scale;
-  sensors.torque.gain += effects.torque_gain;
-  sensors.torque.bias += effects.torque_bias_Nm;
-  sensors.pressure.gain += effects.pressure_gain;
-  sensors.pressure.bias += effects.pressure_offset_Pa;
-  sensors.primary_ripple += effects.primary_ripple;
-  sensors.secondary_ripple += effects.secondary_ripple;
+  scenario.sensors.add(effects);
 }
 
 }  // namespace beltgrip::cli

@@ -4,13 +4,13 @@
 
 #include <string>
 
-#include "tools/sim/scenario.h"
+#include "tools/sim/rig_scenario.h"
 #include "tools/sim/vehicle_parameters.h"
 
 namespace beltgrip::cli {
 
 // Throw Failure: 66 no such file, 78 its content.
-void apply_model(const std::string& path, sim::Scenario& scenario);
+void apply_model(const std::string& path, sim::RigScenario& scenario);
 void apply_model(const std::string& path, sim::VehicleScenario& scenario);
 
 }  // namespace beltgrip::cli

@@ -13,7 +13,7 @@
 #include "tools/cli/own_frame_view.h"
 #include "tools/cli/stop_signals.h"
 #include "tools/cli/verdict.h"
-#include "tools/sim/rig_source.h"
+#include "tools/sim/configuration.h"
 
 namespace beltgrip::cli {
 

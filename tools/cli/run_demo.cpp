@@ -23,9 +23,9 @@
 #include "tools/cli/scenario_options.h"
 #include "tools/cli/simulate_vehicle.h"
 #include "tools/cli/verdict.h"
+#include "tools/sim/configuration.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/rig_source.h"
-#include "tools/sim/vehicle_bus.h"
 #include "tools/sim/vehicle_port.h"
 
 namespace beltgrip::cli {
@@ -178,7 +178,7 @@ void run_rig(const Options& options) {
   const double start_s = options.scenario.start_s > 0.0 ? options.scenario.start_s : kLateStart_s;
   const double end_s =
       start_s + (options.scenario.duration_s > 0.0 ? options.scenario.duration_s : kRig_s);
-  const sim::Scenario scenario = options.scenario.load();
+  const sim::RigScenario scenario = options.scenario.load();
   const daemon::Config config =
       load_configuration_text(sim::rig_configuration(scenario, kBus, "vehicle.dbc"),
                               sim::shipped("paper-rig.dbc"), options.method);

@@ -15,7 +15,6 @@ namespace beltgrip::cli {
 
 namespace {
 
-constexpr const char* kBase = "paper-rig.toml";
 constexpr std::string_view kSuffix = ".toml";
 
 std::string shipped_names() {
@@ -56,6 +55,24 @@ sim::ScenarioLayer layer_of(const std::string& scenario) {
   return bounded({scenario, text.str()});
 }
 
+// The file and the settings of the command line on it.
+std::vector<sim::ScenarioLayer> given_layers(const std::string& scenario,
+                                             const std::vector<std::string>& settings) {
+  std::vector<sim::ScenarioLayer> layers{layer_of(scenario)};
+  for (const std::string& setting : settings) layers.push_back(setting_of(setting));
+  return layers;
+}
+
+template <typename Scenario>
+Scenario right(sim::ScenarioResult<Scenario> result) {
+  if (!result.errors.empty()) {
+    std::string text;
+    for (const std::string& error : result.errors) text += (text.empty() ? "" : "\n") + error;
+    throw Failure{kConfiguration, text};
+  }
+  return std::move(result.scenario);
+}
+
 }  // namespace
 
 void ScenarioOptions::add_to(command_line::Command command) {
@@ -75,18 +92,10 @@ void ScenarioOptions::add_to(command_line::Command command) {
       .allow_extra_args(false);
 }
 
-sim::Scenario ScenarioOptions::load() const {
-  std::vector<sim::ScenarioLayer> layers{{kBase, std::string(sim::shipped(kBase))}};
-  layers.push_back(layer_of(scenario));
-  for (const std::string& setting : settings) layers.push_back(setting_of(setting));
+sim::RigScenario ScenarioOptions::load() const {
+  std::vector<sim::ScenarioLayer> layers = given_layers(scenario, settings);
   if (!belt.empty()) layers.push_back({"--belt " + belt, "belt = \"" + belt + "\""});
-  sim::ScenarioResult result = sim::parse_scenario(layers);
-  if (!result.errors.empty()) {
-    std::string text;
-    for (const std::string& error : result.errors) text += (text.empty() ? "" : "\n") + error;
-    throw Failure{kConfiguration, text};
-  }
-  return std::move(result.scenario);
+  return right(sim::parse_rig_scenario(layers));
 }
 
 bool ScenarioOptions::is_vehicle() const {
@@ -98,18 +107,11 @@ sim::VehicleScenario ScenarioOptions::load_vehicle() const {
     throw Failure{kUsage,
                   "--belt and --start are for the rig; a vehicle takes --set belt.mu_max=..."};
   }
-  std::vector<sim::ScenarioLayer> layers{layer_of(scenario)};
-  for (const std::string& setting : settings) layers.push_back(setting_of(setting));
+  std::vector<sim::ScenarioLayer> layers = given_layers(scenario, settings);
   if (duration_s > 0.0) {
     layers.push_back(sim::setting_layer("run.duration_s=" + std::to_string(duration_s)));
   }
-  sim::VehicleScenarioResult result = sim::parse_vehicle_scenario(layers);
-  if (!result.errors.empty()) {
-    std::string text;
-    for (const std::string& error : result.errors) text += (text.empty() ? "" : "\n") + error;
-    throw Failure{kConfiguration, text};
-  }
-  return std::move(result.scenario);
+  return right(sim::parse_vehicle_scenario(layers));
 }
 
 double ScenarioOptions::end_s() const {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "daemon/command_line/command_line.h"
-#include "tools/sim/scenario.h"
+#include "tools/sim/rig_scenario.h"
 #include "tools/sim/vehicle_parameters.h"
 
 namespace beltgrip::cli {
@@ -21,7 +21,7 @@ struct ScenarioOptions {
 
   void add_to(command_line::Command command);
   // Throws Failure: 66 no such scenario, 78 its content.
-  sim::Scenario load() const;
+  sim::RigScenario load() const;
   // True for a scenario of the virtual vehicle, which load_vehicle takes instead.
   bool is_vehicle() const;
   sim::VehicleScenario load_vehicle() const;

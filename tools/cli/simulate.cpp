@@ -18,9 +18,9 @@
 #include "tools/cli/stop_signals.h"
 #include "tools/cli/verdict.h"
 #include "tools/ports/replay_port.h"
+#include "tools/sim/configuration.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/rig_source.h"
-#include "tools/sim/vehicle_bus.h"
 #include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
@@ -92,8 +92,8 @@ class RigLog final : public can::LogReader {
 
 // With results: the daemon's loop runs over the frames; else they are only written.
 Run run_rig(const Options& options, std::FILE* log, bool results) {
-  const sim::Scenario scenario = options.scenario.load();
-  const sim::Scenario machine = options.machine(scenario);
+  const sim::RigScenario scenario = options.scenario.load();
+  const sim::RigScenario machine = options.machine(scenario);
   sim::RigSource source(machine, options.scenario.seed, options.scenario.start_s,
                         options.scenario.end_s());
   Run run;

@@ -12,6 +12,7 @@
 #include "tools/cli/configuration.h"
 #include "tools/cli/exit_codes.h"
 #include "tools/cli/stop_signals.h"
+#include "tools/sim/configuration.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/vehicle_port.h"
 #include "tools/text/json_writer.h"
@@ -132,7 +133,9 @@ DriveResult drive_with_daemon(const sim::VehicleScenario& believed,
 }
 
 VehicleNode::VehicleNode(const sim::VehicleScenario& scenario, std::uint64_t seed)
-    : seed_(seed), vehicle_(scenario, seed), frames_(sim::vehicle_database(), scenario, seed) {}
+    : seed_(seed),
+      vehicle_(scenario, seed),
+      frames_(sim::vehicle_database(), sim::kVehicleBus, scenario, seed) {}
 
 bool VehicleNode::advance(std::int64_t now_ns, std::span<const daemon::RxFrame> received,
                           std::vector<can::CanFrame>& out) {

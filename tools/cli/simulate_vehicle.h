@@ -10,7 +10,7 @@
 
 #include "daemon/core/base/port.h"
 #include "tools/cli/replay_run.h"
-#include "tools/sim/vehicle_bus.h"
+#include "tools/sim/bus.h"
 #include "tools/sim/vehicle_parameters.h"
 #include "tools/sim/vehicle_simulation.h"
 
@@ -47,7 +47,7 @@ class VehicleNode {
  private:
   std::uint64_t seed_;
   sim::VehicleSimulation vehicle_;
-  sim::VehicleBus frames_;
+  sim::Bus frames_;
   std::vector<can::StampedFrame> waiting_;
 };
 

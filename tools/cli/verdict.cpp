@@ -27,7 +27,7 @@ void line(std::FILE* out, const char* what, const std::string& measured, const s
 
 }  // namespace
 
-Truth make_truth(const sim::Scenario& scenario, std::uint64_t seed, std::int64_t first_frame_ns,
+Truth make_truth(const sim::RigScenario& scenario, std::uint64_t seed, std::int64_t first_frame_ns,
                  const sim::RigSimulation& simulation) {
   return {scenario.name,     scenario.belt, seed, first_frame_ns, scenario.friction().mu_max,
           simulation.truth()};

@@ -9,7 +9,7 @@
 
 #include "tools/cli/own_frame_view.h"
 #include "tools/sim/rig_simulation.h"
-#include "tools/sim/scenario.h"
+#include "tools/sim/rig_scenario.h"
 
 namespace beltgrip::cli {
 
@@ -21,7 +21,7 @@ struct Truth {
   std::vector<sim::ExperimentTruth> experiments;
 };
 
-Truth make_truth(const sim::Scenario& scenario, std::uint64_t seed, std::int64_t first_frame_ns,
+Truth make_truth(const sim::RigScenario& scenario, std::uint64_t seed, std::int64_t first_frame_ns,
                  const sim::RigSimulation& simulation);
 std::string truth_json(const Truth& truth);
 // Throws Failure: 66 missing, 65 not the truth of a simulation.

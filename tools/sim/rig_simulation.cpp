@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "tools/sim/friction_factor.h"
 
@@ -12,11 +11,10 @@ namespace {
 constexpr double kStall_rad_s = 5.0;
 }
 
-RigSimulation::RigSimulation(const Scenario& scenario)
-    : scenario_(scenario),
+RigSimulation::RigSimulation(const RigScenario& scenario)
+    : Simulation(scenario),
+      scenario_(scenario),
       plant_(scenario.variator, scenario.friction()),
-      step_ns_(std::llround(scenario.step_s * 1e9)),
-      step_s_(static_cast<double>(step_ns_) * 1e-9),
       command_force_N_(scenario.start_force_N),
       clamp_force_N_(scenario.start_force_N),
       clamping_(scenario.effects, step_s_),
@@ -35,11 +33,13 @@ RigSimulation::RigSimulation(const Scenario& scenario)
   signals_.omega_s_rad_s = plant_.state().omega_s_rad_s;
   signals_.torque_p_Nm = controller_torque_Nm_;
   signals_.torque_s_Nm = load_torque_Nm_;
-  signals_.pressure_Pa = signals_.pressure_command_Pa = pressure_Pa(clamp_force_N_);
+  signals_.secondary_pressure_Pa = signals_.secondary_pressure_command_Pa =
+      pressure_Pa(clamp_force_N_);
 }
 
 double RigSimulation::pressure_Pa(double clamp_force_N) const {
-  return (clamp_force_N - scenario_.secondary_spring_force_N) / scenario_.secondary_piston_area_m2;
+  return (clamp_force_N - scenario_.variator.secondary_spring_force_N) /
+         scenario_.variator.secondary_piston_area_m2;
 }
 
 // Between the torque flange and the belt.
@@ -65,9 +65,9 @@ void RigSimulation::act(bool begin) {
                        (1.0 - e.deformation_per_kN * kN - e.deformation_per_kN2 * kN * kN) *
                        (1.0 - e.tilt_per_Nm * signals_.torque_p_Nm) *
                        std::exp(low ? crept_ : -crept_);
-  friction_factor_ = friction_factor(
-      e, {signals_.oil_degC, signals_.omega_p_rad_s, belt_force_N_, low ? 1.0 : 0.0,
-          static_cast<double>(now_ns_) * 1e-9, slip_energy_kJ_, scenario_.experiment});
+  friction_factor_ =
+      friction_factor(e, {signals_.oil_degC, signals_.omega_p_rad_s, belt_force_N_, low ? 1.0 : 0.0,
+                          seconds(), slip_energy_kJ_, scenario_.experiment});
   plant_.set_factors(ratio, friction_factor_);
 }
 
@@ -78,7 +78,7 @@ double RigSimulation::sigma_star() const {
 
 // The operator: hold, lower, notice the slip, let go, rest, and again.
 void RigSimulation::operate() {
-  const double now_s = static_cast<double>(now_ns_) * 1e-9;
+  const double now_s = seconds();
   const double in_mode_s = now_s - mode_since_s_;
   const auto enter = [&](RigMode mode) {
     signals_.mode = mode;
@@ -117,8 +117,8 @@ void RigSimulation::operate() {
       }
       break;
   }
-  command_force_N_ =
-      std::clamp(command_force_N_, scenario_.secondary_spring_force_N, scenario_.start_force_N);
+  command_force_N_ = std::clamp(command_force_N_, scenario_.variator.secondary_spring_force_N,
+                                scenario_.start_force_N);
 }
 
 void RigSimulation::observe(double slip_before, double sigma_star_before) {
@@ -131,7 +131,7 @@ void RigSimulation::observe(double slip_before, double sigma_star_before) {
   const bool has_peak = scenario_.friction().shape != CurveShape::kSaturating;
   if (has_peak && !truth.peak_s && slip >= peak_slip) {
     const double share = (peak_slip - slip_before) / std::max(slip - slip_before, 1e-12);
-    truth.peak_s = static_cast<double>(now_ns_) * 1e-9 - (1.0 - share) * step_s_;
+    truth.peak_s = seconds() - (1.0 - share) * step_s_;
     truth.slip_peak_percent = scenario_.friction().peak_slip_percent;
     truth.sigma_star_peak_percent =
         100.0 * (sigma_star_before + share * (sigma - sigma_star_before));
@@ -139,7 +139,7 @@ void RigSimulation::observe(double slip_before, double sigma_star_before) {
   }
   truth.sigma_star_max_percent = std::max(truth.sigma_star_max_percent, 100.0 * sigma);
   if (!noticed_s_ && 100.0 * sigma >= scenario_.operator_slip_percent) {
-    noticed_s_ = static_cast<double>(now_ns_) * 1e-9;
+    noticed_s_ = seconds();
   }
 }
 
@@ -166,21 +166,15 @@ void RigSimulation::step() {
   now_ns_ += step_ns_;
 
   const PlantState& state = plant_.state();
-  signals_.omega_p_rad_s = state.omega_p_rad_s;
-  signals_.omega_s_rad_s = state.omega_s_rad_s;
   // The flange sits between the machine's rotor and the pulley; the rotor holds the inertia.
   const PlantOutput belt = plant_.output(belt_force_N_);
   const double acceleration = (state.omega_p_rad_s - omega_p_before) / step_s_;
   signals_.torque_p_Nm = belt.torque_p_Nm + loss_Nm(acceleration);
   slip_energy_kJ_ += 1e-3 * std::abs(belt.torque_p_Nm * belt.slip) * state.omega_p_rad_s * step_s_;
-  const auto turned = [&](double angle, double omega) {
-    return std::fmod(angle + omega * step_s_, 2.0 * std::numbers::pi);
-  };
-  signals_.angle_p_rad = turned(signals_.angle_p_rad, state.omega_p_rad_s);
-  signals_.angle_s_rad = turned(signals_.angle_s_rad, state.omega_s_rad_s);
+  turn(state.omega_p_rad_s, state.omega_s_rad_s);
   signals_.torque_s_Nm = load_torque_Nm_;
-  signals_.pressure_Pa = pressure_Pa(clamp_force_N_);
-  signals_.pressure_command_Pa = pressure_Pa(command_force_N_);
+  signals_.secondary_pressure_Pa = pressure_Pa(clamp_force_N_);
+  signals_.secondary_pressure_command_Pa = pressure_Pa(command_force_N_);
   observe(slip_before, sigma_star_before);
   // A shaft that nearly stands: the rig's own protection switches off, and slip is no longer
   // defined.

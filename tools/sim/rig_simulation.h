@@ -8,31 +8,11 @@
 #include <vector>
 
 #include "tools/sim/clamp_effects.h"
-#include "tools/sim/scenario.h"
+#include "tools/sim/rig_parameters.h"
+#include "tools/sim/simulation.h"
 #include "tools/sim/variator_plant.h"
 
 namespace beltgrip::sim {
-
-enum class RigMode : std::uint8_t {
-  kHold,
-  kLowering,
-  kRestoring,
-  kRest
-};  // wire values of RigMode
-
-// True values of what the rig's sensors measure, SI.
-struct RigSignals {
-  double omega_p_rad_s = 0.0;
-  double omega_s_rad_s = 0.0;
-  double torque_p_Nm = 0.0;  // flange between drive machine and primary pulley
-  double torque_s_Nm = 0.0;  // flange between secondary pulley and load machine
-  double pressure_Pa = 0.0;
-  double pressure_command_Pa = 0.0;
-  double oil_degC = 0.0;
-  double angle_p_rad = 0.0;  // of the shafts
-  double angle_s_rad = 0.0;
-  RigMode mode = RigMode::kHold;
-};
 
 // One experiment as it really was. sigma_star is eq. (3) without noise: slip plus deformation.
 struct ExperimentTruth {
@@ -46,17 +26,13 @@ struct ExperimentTruth {
   double sigma_star_max_percent = 0.0;
 };
 
-class RigSimulation {
+class RigSimulation final : public Simulation {
  public:
-  explicit RigSimulation(const Scenario& scenario);
+  explicit RigSimulation(const RigScenario& scenario);
 
-  void step();
-  bool finished() const { return finished_; }
-  // False once the plant's state has become infinite or not a number: the run is void.
-  bool finite() const { return plant_.finite(); }
-  std::int64_t now_ns() const { return now_ns_; }
-  std::int64_t step_ns() const { return step_ns_; }
-  const RigSignals& signals() const { return signals_; }
+  void step() override;
+  bool finished() const override { return finished_; }
+  bool finite() const override { return plant_.finite(); }
   const std::vector<ExperimentTruth>& truth() const { return truth_; }
 
  private:
@@ -67,11 +43,8 @@ class RigSimulation {
   double loss_Nm(double acceleration_rad_s2) const;
   void act(bool begin);
 
-  Scenario scenario_;
+  RigScenario scenario_;
   VariatorPlant plant_;
-  std::int64_t step_ns_;
-  double step_s_;
-  std::int64_t now_ns_ = 0;
   double load_torque_Nm_ = 0.0;
   double controller_torque_Nm_ = 0.0;  // integral part
   double command_force_N_;
@@ -81,11 +54,9 @@ class RigSimulation {
   double reference_force_N_;  // at the start, for the creep of the ratio
   double crept_ = 0.0;        // share of the ratio
   double friction_factor_ = 1.0;
-  double slip_energy_kJ_ = 0.0;
   double mode_since_s_ = 0.0;
   std::optional<double> noticed_s_;
   double cycles_left_;
-  RigSignals signals_;
   std::vector<ExperimentTruth> truth_;
   bool finished_ = false;
 };

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "can_dbc/frame/can_frame.h"
-#include "tools/sim/rig_bus.h"
+#include "tools/sim/bus.h"
 #include "tools/sim/rig_simulation.h"
 
 namespace beltgrip::sim {
@@ -22,7 +22,7 @@ struct NonFiniteState {
 class RigSource {
  public:
   // Frames from start_s to end_s of the scenario's time.
-  RigSource(const Scenario& scenario, std::uint64_t seed, double start_s, double end_s);
+  RigSource(const RigScenario& scenario, std::uint64_t seed, double start_s, double end_s);
 
   // False at the end. Throws NonFiniteState.
   bool next(can::StampedFrame& frame);
@@ -31,16 +31,11 @@ class RigSource {
  private:
   std::uint64_t seed_;
   RigSimulation simulation_;
-  RigBus bus_;
+  Bus bus_;
   std::int64_t start_ns_;
   std::int64_t end_ns_;
   std::vector<can::StampedFrame> waiting_;
   std::size_t taken_ = 0;
 };
-
-// The rig's DBC, and the configuration of BeltGrip that fits the scenario.
-const can::Database& rig_database();
-std::string rig_configuration(const Scenario& scenario, const std::string& interface,
-                              const std::string& dbc_file);
 
 }  // namespace beltgrip::sim

@@ -28,12 +28,30 @@ std::string number_text(double value) {
   return {buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr};
 }
 
+ScenarioLayer setting_layer(const std::string& key_and_value) {
+  ScenarioLayer layer{"--set " + key_and_value, key_and_value};
+  const auto equals = key_and_value.find('=');
+  if (equals == std::string::npos) return layer;
+  try {
+    static_cast<void>(toml::parse(key_and_value));
+  } catch (const toml::parse_error&) {
+    layer.text = key_and_value.substr(0, equals) + "=\"" + key_and_value.substr(equals + 1) + "\"";
+  }
+  return layer;
+}
+
 struct ScenarioReader::Impl {
   // Takes the value of a key; reports a wrong one by the text that follows "found ...".
   using Take = std::function<std::string(const toml::node&)>;
 
+  std::string unknown;
   std::map<std::string, Take> keys;
   std::map<std::string, std::function<void(ScenarioReader*)>> rows;
+  struct Sections {
+    std::string unknown;
+    std::function<void(const std::string&, ScenarioReader&)> begin;
+  };
+  std::map<std::string, Sections> sections;
   std::map<std::string, std::string> positions;  // of the last value of each key
   std::string source;
 
@@ -68,11 +86,30 @@ struct ScenarioReader::Impl {
     std::size_t index = 0;
     for (const toml::node& row : *array) {
       positions[row_name(name, index++)] = place(row);
-      ScenarioReader reader;
+      ScenarioReader reader(unknown);
       begin(&reader);
       reader.impl_->source = source;
-      reader.impl_->apply_table(*row.as_table(), "", name + ".", reader.errors_);
-      errors.insert(errors.end(), reader.errors_.begin(), reader.errors_.end());
+      reader.impl_->apply_table(*row.as_table(), "", name + ".", errors);
+    }
+  }
+
+  void apply_sections(const std::string& name, const toml::node& node, const Sections& kind,
+                      std::vector<std::string>& errors) {
+    const toml::table* sections_of_file = node.as_table();
+    if (sections_of_file == nullptr) {
+      errors.push_back(wrong(node, name, "sections [" + name + ".NAME]"));
+      return;
+    }
+    for (const auto& [key, section] : *sections_of_file) {
+      const std::string shown = name + "." + std::string(key.str());
+      if (!section.is_table()) {
+        errors.push_back(wrong(section, shown, "a section [" + shown + "]"));
+        continue;
+      }
+      ScenarioReader reader(kind.unknown);
+      kind.begin(std::string(key.str()), reader);
+      reader.impl_->source = source;
+      reader.impl_->apply_table(*section.as_table(), "", shown + ".", errors);
     }
   }
 
@@ -88,12 +125,14 @@ struct ScenarioReader::Impl {
       const std::string shown = shown_prefix + std::string(key.str());
       if (const auto row = rows.find(name); row != rows.end()) {
         apply_rows(shown, node, row->second, errors);
-      } else if (const auto value = keys.find(name); value != keys.end()) {
+      } else if (const auto many = sections.find(name); many != sections.end()) {
+        apply_sections(shown, node, many->second, errors);
+      } else if (const auto value = keys.find(name); value != keys.end() && !node.is_table()) {
         positions[name] = place(node);
         const std::string expected = value->second(node);
         if (!expected.empty()) errors.push_back(wrong(node, shown, expected));
       } else if (!is_section(name)) {
-        errors.push_back(place(node) + ": " + shown + ": is not a key of a vehicle scenario");
+        errors.push_back(place(node) + ": " + shown + ": is not a key of " + unknown);
       } else if (const toml::table* section = node.as_table()) {
         apply_table(*section, name + ".", shown + ".", errors);
       } else {
@@ -103,7 +142,9 @@ struct ScenarioReader::Impl {
   }
 };
 
-ScenarioReader::ScenarioReader() : impl_(std::make_unique<Impl>()) {}
+ScenarioReader::ScenarioReader(std::string unknown) : impl_(std::make_unique<Impl>()) {
+  impl_->unknown = std::move(unknown);
+}
 ScenarioReader::~ScenarioReader() = default;
 
 void ScenarioReader::number(std::string name, double& target, double minimum, double maximum,
@@ -156,6 +197,12 @@ void ScenarioReader::choice(std::string name, std::vector<std::string> choices,
 
 void ScenarioReader::rows(std::string name, std::function<void(ScenarioReader* row)> begin) {
   impl_->rows[std::move(name)] = std::move(begin);
+}
+
+void ScenarioReader::sections(
+    std::string name, std::string unknown,
+    std::function<void(const std::string& any, ScenarioReader& section)> begin) {
+  impl_->sections[std::move(name)] = {std::move(unknown), std::move(begin)};
 }
 
 void ScenarioReader::apply(const ScenarioLayer& layer) {

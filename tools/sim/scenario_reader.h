@@ -8,13 +8,20 @@
 #include <string>
 #include <vector>
 
-#include "tools/sim/scenario.h"
-
 namespace beltgrip::sim {
+
+struct ScenarioLayer {
+  std::string source;  // name for messages
+  std::string text;    // TOML
+};
+
+// "key=value" of the command line as a layer; text needs no quotes there.
+ScenarioLayer setting_layer(const std::string& key_and_value);
 
 class ScenarioReader {
  public:
-  ScenarioReader();
+  // What is said of a key that none has named: "is not a key of ...".
+  explicit ScenarioReader(std::string unknown);
   ~ScenarioReader();
 
   // Values of the file between minimum and maximum; target = value * factor + shift.
@@ -28,6 +35,9 @@ class ScenarioReader {
   // [[name]]: a later layer replaces all rows. begin(nullptr) forgets them; otherwise it appends
   // one and names its keys to the reader it is given.
   void rows(std::string name, std::function<void(ScenarioReader* row)> begin);
+  // [name.ANY]: a later layer adds to them. begin names the keys of the one that is called `any`.
+  void sections(std::string name, std::string unknown,
+                std::function<void(const std::string& any, ScenarioReader& section)> begin);
 
   void apply(const ScenarioLayer& layer);
   // An error about a key as a whole, at the place where its value came from.

@@ -6,16 +6,16 @@
 
 namespace beltgrip::sim {
 
-VariatorPlant::VariatorPlant(const VariatorModel& model, const FrictionCurve& friction)
-    : model_(model),
+VariatorPlant::VariatorPlant(const VariatorParameters& variator, const FrictionCurve& friction)
+    : variator_(variator),
       friction_(friction),
-      cos_wedge_(std::cos(model.half_wedge_angle_rad)),
-      primary_radius_m_(
-          estimator::running_radii(model.ratio, model.belt_length_m, model.centre_distance_m)
-              .primary_m) {}
+      cos_wedge_(std::cos(variator.half_wedge_angle_rad)),
+      primary_radius_m_(estimator::running_radii(variator.ratio, variator.belt_length_m,
+                                                 variator.centre_distance_m)
+                            .primary_m) {}
 
 double VariatorPlant::ratio_at(double clamp_force_N) const {
-  return ratio_factor_ * model_.ratio * (1.0 - model_.deformation_per_N * clamp_force_N);
+  return ratio_factor_ * variator_.ratio * (1.0 - variator_.deformation_per_N * clamp_force_N);
 }
 
 FrictionPoint VariatorPlant::friction_now(double slip) const {
@@ -25,8 +25,8 @@ FrictionPoint VariatorPlant::friction_now(double slip) const {
 
 double VariatorPlant::drag_Nm(double omega_s_rad_s) const {
   // Smooth through standstill: full drag from about 1 rad/s on.
-  return model_.secondary_drag_Nm * std::tanh(omega_s_rad_s) +
-         model_.secondary_drag_Nm_s * omega_s_rad_s;
+  return variator_.secondary_loss_Nm * std::tanh(omega_s_rad_s) +
+         variator_.secondary_loss_Nm_s * omega_s_rad_s;
 }
 
 bool VariatorPlant::settle(double omega_p_rad_s, double torque_p_Nm, double clamp_force_N) {
@@ -78,17 +78,18 @@ VariatorPlant::Derivative VariatorPlant::derivative(const PlantState& state,
   const double drive = input.drive_torque_Nm +
                        input.drive_torque_slope_Nm_s * (state.omega_p_rad_s - omega_p_start_rad_s);
   const double t = std::tanh(state.omega_s_rad_s);
-  const double drag_per_s = model_.secondary_drag_Nm * (1.0 - t * t) + model_.secondary_drag_Nm_s;
+  const double drag_per_s =
+      variator_.secondary_loss_Nm * (1.0 - t * t) + variator_.secondary_loss_Nm_s;
 
   Derivative d;
-  d.p = (drive - torque_p) / model_.primary_inertia_kg_m2;
+  d.p = (drive - torque_p) / variator_.primary_inertia_kg_m2;
   d.s = (torque_p / ratio - drag_Nm(state.omega_s_rad_s) - input.load_torque_Nm) /
-        model_.secondary_inertia_kg_m2;
+        variator_.secondary_inertia_kg_m2;
   d.pp = (input.drive_torque_slope_Nm_s - torque_p_per_slip * slip_per_p) /
-         model_.primary_inertia_kg_m2;
-  d.ps = -torque_p_per_slip * slip_per_s / model_.primary_inertia_kg_m2;
-  d.sp = torque_p_per_slip * slip_per_p / ratio / model_.secondary_inertia_kg_m2;
-  d.ss = (torque_p_per_slip * slip_per_s / ratio - drag_per_s) / model_.secondary_inertia_kg_m2;
+         variator_.primary_inertia_kg_m2;
+  d.ps = -torque_p_per_slip * slip_per_s / variator_.primary_inertia_kg_m2;
+  d.sp = torque_p_per_slip * slip_per_p / ratio / variator_.secondary_inertia_kg_m2;
+  d.ss = (torque_p_per_slip * slip_per_s / ratio - drag_per_s) / variator_.secondary_inertia_kg_m2;
   return d;
 }
 

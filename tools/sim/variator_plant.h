@@ -9,21 +9,9 @@
 // implicit two-stage Rosenbrock method of order 2 that is stable for any step (L-stable).
 #pragma once
 
-#include "tools/sim/friction_curve.h"
+#include "tools/sim/world.h"
 
 namespace beltgrip::sim {
-
-struct VariatorModel {
-  double belt_length_m = 0.0;
-  double centre_distance_m = 0.0;
-  double half_wedge_angle_rad = 0.0;
-  double ratio = 0.0;              // r_g0 at the end stop, no clamp force
-  double deformation_per_N = 0.0;  // c
-  double primary_inertia_kg_m2 = 0.0;
-  double secondary_inertia_kg_m2 = 0.0;
-  double secondary_drag_Nm = 0.0;    // bearings and seals, at any speed
-  double secondary_drag_Nm_s = 0.0;  // and in proportion to speed
-};
 
 struct PlantState {
   double omega_p_rad_s = 0.0;
@@ -49,7 +37,7 @@ struct PlantOutput {
 
 class VariatorPlant {
  public:
-  VariatorPlant(const VariatorModel& model, const FrictionCurve& friction);
+  VariatorPlant(const VariatorParameters& variator, const FrictionCurve& friction);
 
   // Settles both shafts on the micro-slip branch for this torque: false when friction cannot carry
   // it.
@@ -80,7 +68,7 @@ class VariatorPlant {
   Derivative derivative(const PlantState& state, const PlantInput& input,
                         double omega_p_start_rad_s) const;
 
-  VariatorModel model_;
+  VariatorParameters variator_;
   FrictionCurve friction_;
   double cos_wedge_;
   double primary_radius_m_;

@@ -1,42 +1,13 @@
-// What a virtual vehicle is made of: plain values in SI, as read from a scenario file. The values
+// What a car has around its variator: plain values in SI, as read from a scenario file. The values
 // themselves are in tools/scenarios/coast-overdrive.toml, which every other vehicle scenario is
 // laid on. Simulation only.
 #pragma once
 
-#include <array>
-#include <cstdint>
-#include <string>
 #include <vector>
 
-#include "estimator/physics/machine_effects.h"
-#include "tools/sim/fault_script.h"
-#include "tools/sim/friction_curve.h"
+#include "tools/sim/world.h"
 
 namespace beltgrip::sim {
-
-struct VariatorParameters {
-  double belt_length_m = 0.0;
-  double centre_distance_m = 0.0;
-  double half_wedge_angle_rad = 0.0;
-  double ratio_low = 0.0;  // geometric ratio R_p / R_s at the end stops, no force
-  double ratio_overdrive = 0.0;
-  double deformation_per_N = 0.0;   // r_g falls by this share per N of secondary force
-  double deformation_per_Nm = 0.0;  // and per Nm of belt torque
-  double secondary_piston_area_m2 = 0.0;
-  double secondary_spring_force_N = 0.0;
-  double secondary_centrifugal_N_s2 = 0.0;
-  double primary_piston_area_m2 = 0.0;
-  double primary_centrifugal_N_s2 = 0.0;
-  double primary_inertia_kg_m2 = 0.0;  // pulley and turbine, without the engine
-  double secondary_inertia_kg_m2 = 0.0;
-  double primary_loss_Nm = 0.0;        // bearings, between shaft and belt
-  double primary_loss_Nm_per_N = 0.0;  // and in proportion to the clamp
-  double secondary_loss_Nm = 0.0;
-  double secondary_loss_Nm_s = 0.0;
-  double shift_gain = 0.0;         // Delta of variator-facts 3.4
-  double force_ratio_slope = 0.0;  // ln(F_p / F_s) in equilibrium per ln(r_g)
-  double force_ratio_load = 0.0;   // and per share of the torque capacity in use
-};
 
 struct BeltParameters {
   FrictionCurve overdrive;     // curve at 80 degC, 3 kN, 105 rad/s
@@ -111,22 +82,6 @@ struct DriverParameters {
   std::vector<DriverStep> steps;  // in order of time
 };
 
-struct ChannelError {
-  double noise = 0.0;  // one standard deviation, SI
-  double bias = 0.0;
-  double gain = 0.0;
-  double delay_s = 0.0;
-  double resolution = 0.0;  // SI; 0: that of the DBC
-};
-
-struct SensorParameters {
-  ChannelError primary_speed, secondary_speed, engine_speed, torque, pressure, temperature;
-  double primary_ripple = 0.0;  // amplitude once per turn, share of the speed
-  double secondary_ripple = 0.0;
-  double frame_delay_s = 0.0;
-  double frame_jitter_s = 0.0;
-};
-
 // What BeltGrip's configuration says of the vehicle beside its geometry.
 struct KnownOfVehicle {
   bool steady = false;            // trigger "steady" instead of "coast_down"
@@ -140,23 +95,14 @@ struct KnownOfVehicle {
   double cooldown_m = 0.0;
 };
 
-struct VehicleScenario {
-  std::string name;
-  double duration_s = 0.0;
-  double step_s = 0.0;
-  VariatorParameters variator;
+struct VehicleScenario : World {
   BeltParameters belt;
   EngineParameters engine;
   VehicleBody body;
   HydraulicParameters hydraulics;
   TcuParameters tcu;
   DriverParameters driver;
-  SensorParameters sensors;
   KnownOfVehicle known;
-  std::vector<FaultStep> faults;
-  // What the machine has beyond the above; a model file says it. The controller does not know.
-  estimator::MachineEffects effects;
-  int experiment = 0;  // its place among several, for wear
 };
 
 }  // namespace beltgrip::sim

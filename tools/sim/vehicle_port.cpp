@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "can_dbc/frame/e2e.h"
+#include "tools/sim/configuration.h"
 
 namespace beltgrip::sim {
 
@@ -24,7 +25,7 @@ constexpr std::uint8_t kActive = 0x40;
 
 VehiclePort::VehiclePort(const VehicleScenario& scenario, std::uint64_t seed, Observers observers)
     : vehicle_(scenario, seed),
-      bus_(vehicle_database(), scenario, seed),
+      bus_(vehicle_database(), kVehicleBus, scenario, seed),
       observers_(std::move(observers)),
       transmission_(seed, "transmission") {}
 

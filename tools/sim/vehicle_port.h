@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "daemon/core/base/port.h"
-#include "tools/sim/vehicle_bus.h"
+#include "tools/sim/bus.h"
 #include "tools/sim/vehicle_simulation.h"
 
 namespace beltgrip::sim {
@@ -59,7 +59,7 @@ class VehiclePort final : public daemon::Port {
   const FaultStep* active(FaultKind kind) const;
 
   VehicleSimulation vehicle_;
-  VehicleBus bus_;
+  Bus bus_;
   Observers observers_;
   Random transmission_;
   std::int64_t now_ns_ = 0;

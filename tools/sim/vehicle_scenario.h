@@ -6,15 +6,12 @@
 #include <string_view>
 #include <vector>
 
-#include "tools/sim/scenario.h"
+#include "tools/sim/scenario_keys.h"
 #include "tools/sim/vehicle_parameters.h"
 
 namespace beltgrip::sim {
 
-struct VehicleScenarioResult {
-  VehicleScenario scenario;
-  std::vector<std::string> errors;  // empty: the scenario can run
-};
+using VehicleScenarioResult = ScenarioResult<VehicleScenario>;
 
 // True for a file that says plant = "vehicle".
 bool is_vehicle_scenario(std::string_view toml);

@@ -22,8 +22,8 @@ double slowness(const HydraulicParameters& hydraulics, double oil_degC) {
 }  // namespace
 
 VehicleSimulation::VehicleSimulation(const VehicleScenario& scenario, std::uint64_t seed)
-    : scenario_(scenario),
-      faults_(scenario.faults),
+    : Simulation(scenario),
+      scenario_(scenario),
       driver_(scenario.driver, scenario.duration_s, seed),
       engine_(scenario.engine),
       plant_(scenario),
@@ -31,10 +31,8 @@ VehicleSimulation::VehicleSimulation(const VehicleScenario& scenario, std::uint6
       secondary_(scenario.hydraulics, scenario.step_s),
       primary_(scenario.hydraulics, scenario.step_s),
       clamping_(scenario.effects, scenario.step_s),
-      step_ns_(std::llround(scenario.step_s * 1e9)),
       end_ns_(std::llround(scenario.duration_s * 1e9)),
-      cycle_ns_(std::llround(scenario.tcu.cycle_s * 1e9)),
-      step_s_(static_cast<double>(step_ns_) * 1e-9) {
+      cycle_ns_(std::llround(scenario.tcu.cycle_s * 1e9)) {
   const double speed = scenario.driver.start_speed_m_s;
   const double omega_s = speed * scenario.body.final_drive / scenario.body.wheel_radius_m;
   const double ratio = std::clamp(omega_s / scenario.tcu.coast_engine_speed_rad_s,
@@ -78,7 +76,7 @@ void VehicleSimulation::control(double t_s, const DriverOutput& driver) {
 }
 
 void VehicleSimulation::step() {
-  const double t_s = static_cast<double>(now_ns_) * 1e-9;
+  const double t_s = seconds();
   const HydraulicParameters& hydraulics = scenario_.hydraulics;
   DriverOutput driver = driver_.step(std::max(t_s, 0.0), plant_.speed_m_s(), step_s_);
   if (const FaultStep* fault = faults_.active(FaultKind::kAccelerator, t_s)) {
@@ -130,13 +128,8 @@ void VehicleSimulation::step() {
   slip_energy_kJ_ += 1e-3 * plant_.output().slip_power_W * step_s_;
   now_ns_ += step_ns_;
 
+  turn(state.omega_p_rad_s, state.omega_s_rad_s);
   signals_.omega_e_rad_s = state.omega_e_rad_s;
-  signals_.omega_p_rad_s = state.omega_p_rad_s;
-  signals_.omega_s_rad_s = state.omega_s_rad_s;
-  signals_.angle_p_rad =
-      std::fmod(signals_.angle_p_rad + state.omega_p_rad_s * step_s_, 2.0 * std::numbers::pi);
-  signals_.angle_s_rad =
-      std::fmod(signals_.angle_s_rad + state.omega_s_rad_s * step_s_, 2.0 * std::numbers::pi);
   signals_.torque_e_Nm = engine_.reported_torque_Nm();
   signals_.accelerator = driver.accelerator;
   signals_.secondary_pressure_Pa = p_s;
@@ -154,7 +147,7 @@ void VehicleSimulation::step() {
   truth_.engine_running = engine_.running();
   truth_.stalls = engine_.stalls();
   count_coast_downs(driver);
-  observe(static_cast<double>(now_ns_) * 1e-9);
+  observe(seconds());
 }
 
 void VehicleSimulation::count_coast_downs(const DriverOutput& driver) {

@@ -9,33 +9,14 @@
 
 #include "can_dbc/frame/can_frame.h"
 #include "tools/sim/clamp_effects.h"
-#include "tools/sim/fault_script.h"
 #include "tools/sim/hydraulic_actuator.h"
+#include "tools/sim/simulation.h"
 #include "tools/sim/tcu_model.h"
 #include "tools/sim/vehicle_driver.h"
 #include "tools/sim/vehicle_engine.h"
 #include "tools/sim/vehicle_plant.h"
 
 namespace beltgrip::sim {
-
-// True values of what the vehicle's sensors measure, SI.
-struct VehicleSignals {
-  double omega_e_rad_s = 0.0;
-  double omega_p_rad_s = 0.0;
-  double omega_s_rad_s = 0.0;
-  double angle_p_rad = 0.0;
-  double angle_s_rad = 0.0;
-  double torque_e_Nm = 0.0;  // as the engine's controller knows it
-  double accelerator = 0.0;
-  double secondary_pressure_Pa = 0.0;
-  double primary_pressure_Pa = 0.0;
-  double secondary_pressure_command_Pa = 0.0;
-  double oil_degC = 0.0;
-  double speed_m_s = 0.0;
-  double brake_pressed = 0.0;
-  double lockup_closed = 0.0;
-  double experiment_permitted = 0.0;
-};
 
 // What no sensor sees.
 struct VehicleTruth {
@@ -67,22 +48,18 @@ struct RequestTruth {
   double force_min_N = 0.0;
 };
 
-class VehicleSimulation {
+class VehicleSimulation final : public Simulation {
  public:
   VehicleSimulation(const VehicleScenario& scenario, std::uint64_t seed);
 
-  void step();
+  void step() override;
   // A frame that reaches the transmission controller at t_ns.
   void deliver(const can::CanFrame& frame, std::int64_t t_ns);
-  bool finished() const { return now_ns_ >= end_ns_; }
-  bool finite() const { return plant_.finite(); }
-  std::int64_t now_ns() const { return now_ns_; }
-  std::int64_t step_ns() const { return step_ns_; }
-  const VehicleSignals& signals() const { return signals_; }
+  bool finished() const override { return now_ns_ >= end_ns_; }
+  bool finite() const override { return plant_.finite(); }
   const VehicleTruth& truth() const { return truth_; }
   const std::vector<RequestTruth>& requests() const { return requests_; }
   const TcuOutput& tcu() const { return tcu_.output(); }
-  const FaultScript& faults() const { return faults_; }
   const VehicleScenario& scenario() const { return scenario_; }
 
  private:
@@ -91,7 +68,6 @@ class VehicleSimulation {
   void count_coast_downs(const DriverOutput& driver);
 
   VehicleScenario scenario_;
-  FaultScript faults_;
   VehicleDriver driver_;
   VehicleEngine engine_;
   VehiclePlant plant_;
@@ -100,17 +76,12 @@ class VehicleSimulation {
   HydraulicActuator primary_;
   ClampEffects clamping_;
   CoulombPlay play_;
-  std::int64_t step_ns_;
   std::int64_t end_ns_;
   std::int64_t cycle_ns_;
   std::int64_t next_cycle_ns_ = 0;
-  std::int64_t now_ns_ = 0;
-  double step_s_;
   std::deque<can::StampedFrame> to_tcu_;
-  VehicleSignals signals_;
   VehicleTruth truth_;
   double coasting_s_ = 0.0;
-  double slip_energy_kJ_ = 0.0;
   std::vector<RequestTruth> requests_;
 };
 

@@ -7,9 +7,11 @@
 #include <limits>
 #include <numbers>
 
+#include "tools/sim/configuration.h"
 #include "tools/sim/friction_curve.h"
 #include "tools/sim/random.h"
 #include "tools/sim/resources.h"
+#include "tools/sim/rig_scenario.h"
 #include "tools/sim/rig_simulation.h"
 #include "tools/sim/rig_source.h"
 
@@ -19,10 +21,10 @@ namespace {
 constexpr double kWedge_rad = 11.0 * std::numbers::pi / 180.0;
 constexpr double kPrimaryRadius_m = 0.07837;  // variator-geometry table: overdrive, 703 mm, 168 mm
 
-Scenario rig(const std::vector<std::string>& settings = {}) {
-  std::vector<ScenarioLayer> layers{{"paper-rig.toml", std::string(*resource("paper-rig.toml"))}};
+RigScenario rig(const std::vector<std::string>& settings = {}) {
+  std::vector<ScenarioLayer> layers;
   for (const std::string& setting : settings) layers.push_back(setting_layer(setting));
-  ScenarioResult result = parse_scenario(layers);
+  RigScenarioResult result = parse_rig_scenario(layers);
   EXPECT_TRUE(result.errors.empty()) << result.errors.front();
   return result.scenario;
 }
@@ -68,7 +70,7 @@ TEST(FrictionCurve, SlopeIsTheDerivative) {
 }
 
 TEST(Plant, SettlesWhereFrictionCarriesTheTorque) {
-  const Scenario s = rig();
+  const RigScenario s = rig();
   VariatorPlant plant(s.variator, s.friction());
   ASSERT_TRUE(plant.settle(105.0, 50.0, 5300.0));
   const PlantOutput out = plant.output(5300.0);
@@ -83,7 +85,7 @@ TEST(Plant, SettlesWhereFrictionCarriesTheTorque) {
 
 // At constant torque the peak comes when 2 mu_max F R_p / cos(theta) is the torque on the belt. The
 // load is constant on the secondary side: the primary torque follows the ratio's deformation.
-double quasi_static_peak_s(const Scenario& s) {
+double quasi_static_peak_s(const RigScenario& s) {
   const double c = s.variator.deformation_per_N;
   double force_N = 3000.0;
   for (int i = 0; i < 50; ++i) {
@@ -98,7 +100,7 @@ TEST(PaperRig, PeakComesWhenTheForceNoLongerCarries) {
   // A light load machine follows at once; the paper's heavy one is late by what its deceleration
   // gives back to the belt.
   for (const char* belt : {"new", "worn"}) {
-    const Scenario light =
+    const RigScenario light =
         rig({"belt=\"" + std::string(belt) + "\"", "driveline.secondary_inertia_kg_m2=0.005"});
     RigSimulation simulation(light);
     run(simulation);
@@ -113,9 +115,9 @@ TEST(PaperRig, LooksLikeThePapersExperiment) {
   double force_before_N = 0.0;
   while (!simulation.finished()) {
     simulation.step();
-    const RigSignals& signals = simulation.signals();
+    const Signals& signals = simulation.signals();
     const double t_s = static_cast<double>(simulation.now_ns()) * 1e-9;
-    const double force_N = 500.0 + 0.0113 * signals.pressure_Pa;
+    const double force_N = 500.0 + 0.0113 * signals.secondary_pressure_Pa;
     if (t_s > 10.0 && t_s < 80.0) {
       torque_sum += signals.torque_p_Nm;
       count += 1.0;
@@ -147,9 +149,9 @@ TEST(PaperRig, MeasuredFrictionPeaksAtTheBeltsMaximum) {
     double mu_star_max = 0.0;
     while (!simulation.finished()) {
       simulation.step();
-      const RigSignals& signals = simulation.signals();
+      const Signals& signals = simulation.signals();
       if (signals.mode != RigMode::kLowering) continue;
-      const double force_N = 500.0 + 0.0113 * signals.pressure_Pa;
+      const double force_N = 500.0 + 0.0113 * signals.secondary_pressure_Pa;
       mu_star_max = std::max(mu_star_max, signals.torque_p_Nm * std::cos(kWedge_rad) /
                                               (2.0 * kPrimaryRadius_m * force_N));
     }
@@ -161,8 +163,8 @@ TEST(PaperRig, MeasuredFrictionPeaksAtTheBeltsMaximum) {
 
 TEST(Plant, MacroSlipGrowsWithTheTorqueDeficit) {
   // Far beyond the peak friction is constant: d(slip)/dt = deficit / (J r_g omega_p).
-  Scenario s = rig({"driveline.secondary_drag_Nm=0", "driveline.secondary_drag_Nm_s=0",
-                    "belts.new.fall_per_percent=0"});
+  RigScenario s = rig({"driveline.secondary_drag_Nm=0", "driveline.secondary_drag_Nm_s=0",
+                       "belts.new.fall_per_percent=0"});
   VariatorPlant plant(s.variator, s.friction());
   ASSERT_TRUE(plant.settle(105.0, 49.9, 3000.0));
   PlantInput input;
@@ -181,7 +183,7 @@ TEST(Plant, MacroSlipGrowsWithTheTorqueDeficit) {
 }
 
 TEST(Plant, IntegratorIsOfSecondOrderAndStableWhenStiff) {
-  Scenario s = rig({"belts.new.curve=magic_formula"});
+  RigScenario s = rig({"belts.new.curve=magic_formula"});
   const auto omega_after = [&](double step_s, double time_s) {
     VariatorPlant plant(s.variator, s.friction());
     EXPECT_TRUE(plant.settle(105.0, 30.0, 5000.0));
@@ -217,7 +219,7 @@ TEST(PaperRig, OverrunIsTheMirrorImageButForTheDeformation) {
     ASSERT_TRUE(simulation.finite());
     ASSERT_FALSE(simulation.finished());
   }
-  const RigSignals& signals = simulation.signals();
+  const Signals& signals = simulation.signals();
   EXPECT_LT(signals.torque_p_Nm, 0.0);
   const double sigma = 1.0 - signals.omega_s_rad_s / signals.omega_p_rad_s / 2.25;
   EXPECT_NEAR(sigma, 1.0 - 1.02 * (1.0 - 1.818e-6 * 2980.0), 2e-4);
@@ -249,7 +251,7 @@ TEST(PaperRig, AShaftThatStallsEndsTheRun) {
 }
 
 TEST(RigSource, AStateThatIsNoLongerFiniteNamesSeedAndTime) {
-  Scenario scenario = rig();
+  RigScenario scenario = rig();
   scenario.speed_controller_Nm = std::numeric_limits<double>::infinity();
   RigSource source(scenario, 42, 0.0, 1e9);
   can::StampedFrame frame;
@@ -284,6 +286,36 @@ TEST(Random, HasTheMomentsOfItsDistributionAndIndependentStreams) {
   EXPECT_NE(Random(1, "PrimarySpeed").uniform(), other.uniform());
   // Fixed for ever: the first number of a stream, worked out once by an independent program.
   EXPECT_EQ(Random(0, "").uniform(), 0x1.c4415072f63b9p-1);
+}
+
+// Frames of the first seconds with that identifier.
+std::vector<can::CanFrame> frames_of(const RigScenario& scenario, std::uint32_t id) {
+  RigSource source(scenario, 1, 0.0, 3.0);
+  std::vector<can::CanFrame> out;
+  can::StampedFrame frame;
+  while (source.next(frame)) {
+    if (frame.frame.id.value == id) out.push_back(frame.frame);
+  }
+  return out;
+}
+
+TEST(RigBus, HasTheFaultsAndSensorErrorsOfACar) {
+  const can::MessageDef& torque =
+      *std::find_if(rig_database().messages.begin(), rig_database().messages.end(),
+                    [](const can::MessageDef& message) { return message.name == "RIG_Torque"; });
+  const auto right = frames_of(rig(), torque.id.value);
+  const auto silent =
+      frames_of(rig({"fault=[{kind=\"frame_silent\",channel=\"RIG_Torque\",at_s=1,for_s=1}]"}),
+                torque.id.value);
+  EXPECT_NEAR(static_cast<double>(silent.size()), 2.0 / 3.0 * static_cast<double>(right.size()),
+              1.0);
+  const auto biased = frames_of(rig({"sensors.torque_gain=0.1"}), torque.id.value);
+  const can::SignalCodec codec(torque.signals.front());
+  ASSERT_EQ(torque.signals.front().name, "PrimaryTorque");
+  ASSERT_EQ(biased.size(), right.size());
+  for (std::size_t i = 0; i < right.size(); ++i) {
+    EXPECT_NEAR(codec.decode(biased[i].payload()) - codec.decode(right[i].payload()), 5.0, 0.1);
+  }
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // Scenario files: every mistake is named with file, line, key and reason; settings go on top.
-#include "tools/sim/scenario.h"
+#include "tools/sim/rig_scenario.h"
 
 #include <gtest/gtest.h>
 
@@ -9,14 +9,12 @@
 namespace beltgrip::sim {
 namespace {
 
-ScenarioLayer base() { return {"paper-rig.toml", std::string(*resource("paper-rig.toml"))}; }
-
 TEST(Scenario, ShippedOnesAreRight) {
   int scenarios = 0;
   for (const std::string_view name : resource_names()) {
     if (!name.ends_with(".toml") || is_vehicle_scenario(*resource(name))) continue;
     ++scenarios;
-    const auto result = parse_scenario({base(), {std::string(name), std::string(*resource(name))}});
+    const auto result = parse_rig_scenario({{std::string(name), std::string(*resource(name))}});
     EXPECT_TRUE(result.errors.empty()) << name << ": " << result.errors.front();
     EXPECT_EQ(result.scenario.name + ".toml", name);
   }
@@ -25,12 +23,11 @@ TEST(Scenario, ShippedOnesAreRight) {
 
 TEST(Scenario, LaterLayersWin) {
   const auto result =
-      parse_scenario({base(),
-                      {"mine.toml", "belt = \"worn\"\n[clamp]\nramp_N_per_s = 100\n"},
-                      setting_layer("clamp.ramp_N_per_s=50"),
-                      setting_layer("belts.worn.mu_max=0.09"),
-                      setting_layer("operator.action=hold"),
-                      setting_layer("variator.half_wedge_angle_deg=12")});
+      parse_rig_scenario({{"mine.toml", "belt = \"worn\"\n[clamp]\nramp_N_per_s = 100\n"},
+                          setting_layer("clamp.ramp_N_per_s=50"),
+                          setting_layer("belts.worn.mu_max=0.09"),
+                          setting_layer("operator.action=hold"),
+                          setting_layer("variator.half_wedge_angle_deg=12")});
   ASSERT_TRUE(result.errors.empty()) << result.errors.front();
   EXPECT_EQ(result.scenario.belt, "worn");
   EXPECT_EQ(result.scenario.ramp_N_per_s, 50.0);
@@ -48,7 +45,7 @@ struct Mistake {
 class ScenarioMistake : public testing::TestWithParam<Mistake> {};
 
 TEST_P(ScenarioMistake, IsNamed) {
-  const auto result = parse_scenario({base(), {"mine.toml", GetParam().text}});
+  const auto result = parse_rig_scenario({{"mine.toml", GetParam().text}});
   ASSERT_EQ(result.errors.size(), 1u);
   EXPECT_TRUE(result.errors[0].starts_with(GetParam().place)) << result.errors[0];
   EXPECT_NE(result.errors[0].find(GetParam().reason), std::string::npos) << result.errors[0];
@@ -85,11 +82,19 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"[sensors]\nframe_jitter_s = 0.002\n",
                 "mine.toml:2: sensors.frame_jitter_s: found 0.002", "overtake"},
         Mistake{"[run]\nstep_s = 0.01\n", "mine.toml:2: run.step_s: found 0.01", "1 kHz"},
+        Mistake{"[belt]\nmu_max = 0.1\n", "mine.toml:1: belt: ", "plant = \"vehicle\""},
+        Mistake{"[variator]\nratio_low = 0.4\n", "mine.toml:2: variator.ratio_low: ", "not a key"},
+        Mistake{"[[fault]]\nkind = \"brake\"\n", "mine.toml:1: fault: found kind = \"brake\"",
+                "a rig has no driver"},
+        Mistake{"[[fault]]\nkind = \"signal_bias\"\nafter_request = true\n",
+                "mine.toml:1: fault: found after_request", "nobody asks a rig"},
+        Mistake{"[[fault]]\nkind = \"signal_bias\"\nchannel = \"EngineSpeed\"\n",
+                "mine.toml:1: fault: found channel = \"EngineSpeed\"", "PrimarySpeed, "},
         Mistake{"x = [1,\n", "mine.toml:", "not TOML"}));
 
 TEST(Scenario, AllMistakesAreListed) {
-  const auto result = parse_scenario(
-      {base(), {"mine.toml", "x = 1\ny = 2\n[run]\nstep_s = 0\n"}, setting_layer("z.z=3")});
+  const auto result = parse_rig_scenario(
+      {{"mine.toml", "x = 1\ny = 2\n[run]\nstep_s = 0\n"}, setting_layer("z.z=3")});
   EXPECT_EQ(result.errors.size(), 4u);
   EXPECT_EQ(result.errors.back().substr(0, 14), "--set z.z=3: z");
 }

@@ -1,6 +1,7 @@
 // The vehicle as a whole: scenarios do what their headers say, the controller obeys and lets go,
 // the same seed gives the same bytes, faults are faults, a state that is no number ends the run.
 #include "tools/sim/vehicle_simulation.h"
+#include "tools/sim/configuration.h"
 
 #include <gtest/gtest.h>
 
@@ -59,7 +60,7 @@ TEST(Scenarios, CoastOverdriveIsWhatItSays) {
   double fit_s = 0.0;
   while (!vehicle.finished()) {
     vehicle.step();
-    const VehicleSignals& s = vehicle.signals();
+    const Signals& s = vehicle.signals();
     const double speed_km_h = 3.6 * s.speed_m_s;
     if (speed_km_h < 60.0 || speed_km_h > 70.0 || seconds(vehicle) < 4.5) continue;
     fit_s += 5e-4;
@@ -79,7 +80,7 @@ TEST(Scenarios, UnreachableIsOutOfReach) {
   int permitted = 0;
   while (!vehicle.finished()) {
     vehicle.step();
-    const VehicleSignals& s = vehicle.signals();
+    const Signals& s = vehicle.signals();
     if (s.experiment_permitted < 0.5 || s.torque_e_Nm > -15.0) continue;
     ++permitted;
     const double floor_N = 500.0 + 0.0113 * 1e5 + 9.5e-3 * s.omega_s_rad_s * s.omega_s_rad_s;
@@ -122,7 +123,7 @@ TEST(Scenarios, CityMeetsEverythingThatInhibits) {
   while (!vehicle.finished()) {
     vehicle.step();
     ASSERT_TRUE(vehicle.finite());
-    const VehicleSignals& s = vehicle.signals();
+    const Signals& s = vehicle.signals();
     ASSERT_LT(std::abs(vehicle.truth().belt.slip), 0.10) << seconds(vehicle);
     if (s.speed_m_s < 0.1) ++seen["standing"];
     if (s.brake_pressed > 0.5) ++seen["brake"];

@@ -1,0 +1,152 @@
+#include "tools/sim/configuration.h"
+
+#include <cstdio>
+#include <numbers>
+
+#include "can_dbc/dbc/parser.h"
+#include "estimator/physics/variator_geometry.h"
+#include "tools/sim/resources.h"
+
+namespace beltgrip::sim {
+
+const can::Database& rig_database() {
+  static const can::Database database = can::parse_dbc(shipped("paper-rig.dbc")).database;
+  return database;
+}
+
+std::string rig_configuration(const RigScenario& scenario, const std::string& interface,
+                              const std::string& dbc_file) {
+  const auto& v = scenario.variator;
+  const auto radii = estimator::running_radii(v.ratio, v.belt_length_m, v.centre_distance_m);
+  const char* const stop = v.ratio < 1.0 ? "low" : "overdrive";
+  char text[2200];
+  std::snprintf(
+      text, sizeof text,
+      "# BeltGrip on the simulated rig (scenario %s).\n"
+      "\n"
+      "[bus]\n"
+      "interface = \"%s\"\n"
+      "dbc       = [\"%s\"]\n"
+      "\n"
+      "[signals]\n"
+      "primary_speed      = \"RIG_Speed.PrimarySpeed\"\n"
+      "secondary_speed    = \"RIG_Speed.SecondarySpeed\"\n"
+      "secondary_pressure = \"RIG_Pressure.SecondaryPressure\"\n"
+      "primary_torque     = \"RIG_Torque.PrimaryTorque\"      # a torque flange: measured\n"
+      "secondary_torque   = \"RIG_Torque.SecondaryTorque\"\n"
+      "oil_temperature    = \"RIG_State.OilTemperature\"\n"
+      "experiment_active  = \"RIG_State.ExperimentActive\"\n"
+      "\n"
+      "[variator]\n"
+      "half_wedge_angle_deg       = %.6g\n"
+      "ratio_%s = %.6g\n"
+      "primary_radius_%s_m = %.4f\n"
+      "secondary_piston_area_m2   = %.6g\n"
+      "secondary_spring_force_N   = %.6g\n"
+      "secondary_centrifugal_N_s2 = 0\n"
+      "\n"
+      "[sensors]   # those of a test bench, calibrated against each other\n"
+      "primary_speed      = { bias_rad_s = 0, gain = 0 }\n"
+      "secondary_speed    = { bias_rad_s = 0, gain = 0 }\n"
+      "secondary_pressure = { bias_Pa = 0, gain = 0 }\n"
+      "primary_torque     = { bias_Nm = 0, gain = 0 }\n"
+      "\n"
+      "[estimator]\n"
+      "method = \"robust\"\n"
+      "\n"
+      "[experiment]\n"
+      "trigger = \"%s\"\n"
+      "control = \"observe\"\n"
+      "ratio   = \"%s\"\n",
+      scenario.name.c_str(), interface.c_str(), dbc_file.c_str(),
+      v.half_wedge_angle_rad * 180.0 / std::numbers::pi, stop, v.ratio, stop, radii.primary_m,
+      v.secondary_piston_area_m2, v.secondary_spring_force_N,
+      scenario.cycles > 1.5 ? "signal" : "always", stop);
+  return text;
+}
+
+const can::Database& vehicle_database() {
+  static const can::Database database = can::parse_dbc(shipped("vehicle.dbc")).database;
+  return database;
+}
+
+std::string vehicle_configuration(const VehicleScenario& scenario, const std::string& interface,
+                                  const std::string& dbc_file) {
+  const VariatorParameters& v = scenario.variator;
+  const KnownOfVehicle& known = scenario.known;
+  const auto radius = [&v](double ratio) {
+    return estimator::running_radii(ratio, v.belt_length_m, v.centre_distance_m).primary_m;
+  };
+  char text[4096];
+  std::snprintf(text, sizeof text,
+                "# BeltGrip in the simulated vehicle (scenario %s).\n"
+                "\n"
+                "[bus]\n"
+                "interface = \"%s\"\n"
+                "dbc       = [\"%s\"]\n"
+                "\n"
+                "[signals]\n"
+                "primary_speed        = \"TCU_Speed.PrimarySpeed\"\n"
+                "secondary_speed      = \"TCU_Speed.SecondarySpeed\"\n"
+                "secondary_pressure   = \"TCU_Pressure.SecondaryPressure\"\n"
+                "engine_torque        = { signal = \"ECU_Engine.EngineTorque\", offset = %.6g }\n"
+                "engine_speed         = \"ECU_Engine.EngineSpeed\"\n"
+                "accelerator_pedal    = \"ECU_Engine.AcceleratorPedal\"\n"
+                "oil_temperature      = \"TCU_State.OilTemperature\"\n"
+                "lockup_closed        = \"TCU_State.LockupClosed\"\n"
+                "experiment_permitted = \"TCU_State.ExperimentPermitted\"\n"
+                "vehicle_speed        = \"ESP_Vehicle.VehicleSpeed\"\n"
+                "brake_pressed        = \"ESP_Vehicle.BrakePressed\"\n"
+                "\n"
+                "[protection]\n"
+                "ECU_Engine   = { counter = \"EngineCounter\", crc = \"EngineCrc\", data_id = "
+                "0x110 }\n"
+                "TCU_Speed    = { counter = \"SpeedCounter\", crc = \"SpeedCrc\", data_id = 0x120 "
+                "}\n"
+                "TCU_Pressure = { counter = \"PressureCounter\", crc = \"PressureCrc\", data_id = "
+                "0x130 }\n"
+                "TCU_State    = { counter = \"StateCounter\", crc = \"StateCrc\", data_id = 0x140 "
+                "}\n"
+                "ESP_Vehicle  = { counter = \"VehicleCounter\", crc = \"VehicleCrc\", data_id = "
+                "0x210 }\n"
+                "\n"
+                "[sensors]\n"
+                "primary_speed      = { bias_rad_s = 0, gain = 0 }\n"
+                "secondary_speed    = { bias_rad_s = 0, gain = 0 }\n"
+                "engine_torque      = { bias_Nm = %.6g, gain = %.6g }\n"
+                "secondary_pressure = { bias_Pa = %.6g, gain = %.6g }\n"
+                "\n"
+                "[variator]\n"
+                "half_wedge_angle_deg       = %.6g\n"
+                "ratio_low                  = %.6g\n"
+                "ratio_overdrive            = %.6g\n"
+                "primary_radius_overdrive_m = %.5f\n"
+                "primary_radius_low_m       = %.5f\n"
+                "secondary_piston_area_m2   = %.6g\n"
+                "secondary_spring_force_N   = %.6g\n"
+                "secondary_centrifugal_N_s2 = %.6g\n"
+                "primary_inertia_kg_m2      = %.6g\n"
+                "\n"
+                "[experiment]\n"
+                "trigger = \"%s\"\n"
+                "control = \"command\"\n"
+                "ratio   = \"either\"\n"
+                "secondary_pressure_floor_Pa = %.6g\n"
+                "actuator_dead_time_s        = %.6g\n"
+                "actuator_lag_s              = %.6g\n"
+                "cooldown_s                  = %.6g\n"
+                "cooldown_m                  = %.6g\n",
+                scenario.name.c_str(), interface.c_str(), dbc_file.c_str(), known.torque_offset_Nm,
+                known.torque_bias_Nm, known.torque_gain, known.pressure_bias_Pa,
+                known.pressure_gain, v.half_wedge_angle_rad * 180.0 / std::numbers::pi, v.ratio_low,
+                v.ratio_overdrive, radius(v.ratio_overdrive), radius(v.ratio_low),
+                v.secondary_piston_area_m2, v.secondary_spring_force_N,
+                v.secondary_centrifugal_N_s2,
+                scenario.engine.inertia_kg_m2 + v.primary_inertia_kg_m2,
+                known.steady ? "steady" : "coast_down", scenario.hydraulics.pressure_floor_Pa,
+                1.2 * scenario.hydraulics.dead_time_s, 1.2 * scenario.hydraulics.lag_s,
+                known.cooldown_s, known.cooldown_m);
+  return text;
+}
+
+}  // namespace beltgrip::sim

@@ -1,0 +1,21 @@
+// The DBC of the simulated rig and of the car, and the configuration of BeltGrip that fits a
+// scenario. Simulation only.
+#pragma once
+
+#include <string>
+
+#include "can_dbc/dbc/model.h"
+#include "tools/sim/rig_parameters.h"
+#include "tools/sim/vehicle_parameters.h"
+
+namespace beltgrip::sim {
+
+const can::Database& rig_database();
+std::string rig_configuration(const RigScenario& scenario, const std::string& interface,
+                              const std::string& dbc_file);
+
+const can::Database& vehicle_database();
+std::string vehicle_configuration(const VehicleScenario& scenario, const std::string& interface,
+                                  const std::string& dbc_file);
+
+}  // namespace beltgrip::sim
