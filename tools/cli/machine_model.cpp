@@ -1,6 +1,5 @@
 #include "tools/cli/machine_model.h"
 
-#include <algorithm>
 #include <map>
 
 #include "daemon/core/config/config_model.h"
@@ -29,9 +28,15 @@ void take(const std::map<std::string, double>& section, const char* key, double&
   }
 }
 
-void shape(const MachineEffects& effects, sim::FrictionCurve& curve) {
-  if (effects.peak_slip_percent > 0.0) curve.peak_slip_percent = effects.peak_slip_percent;
-  curve.fall_per_percent = std::max(0.0, curve.fall_per_percent + effects.fall_per_percent);
+// What the model says replaces what the scenario has; what it does not say stays.
+void lay(const MachineEffects& model, MachineEffects& machine) {
+  const auto one = [&](double MachineEffects::*value) {
+    if (value != nullptr && model.*value != 0.0) machine.*value = model.*value;
+  };
+  for (const estimator::EffectRow& row : estimator::effect_rows()) {
+    one(row.value);
+    for (const estimator::EffectRole& each : row.roles) one(each.value);
+  }
 }
 
 }  // namespace
@@ -55,10 +60,9 @@ void apply_model(const std::string& path, sim::RigScenario& scenario) {
        belt.peak_slip_percent);
   ModelFile rest = model;  // the deformation is the variator's
   rest.driveline.erase("deformation_per_kN");
-  scenario.effects = daemon::whole_machine(rest);
-  scenario.effects.centrifugal_N_s2 += model.variator.secondary_centrifugal_N_s2;
-  shape(scenario.effects, belt);
-  scenario.sensors.add(scenario.effects);
+  MachineEffects whole = daemon::whole_machine(rest);
+  whole.centrifugal_N_s2 += model.variator.secondary_centrifugal_N_s2;
+  lay(whole, scenario.effects);
 }
 
 void apply_model(const std::string& path, sim::VehicleScenario& scenario) {
@@ -88,10 +92,7 @@ void apply_model(const std::string& path, sim::VehicleScenario& scenario) {
   ModelFile rest = model;  // these two are the variator's
   rest.driveline.erase("deformation_per_kN");
   rest.driveline.erase("loss_constant_Nm");
-  MachineEffects& effects = scenario.effects;
-  effects = daemon::whole_machine(rest);
-  shape(effects, scenario.belt.overdrive);
-  scenario.sensors.add(effects);
+  lay(daemon::whole_machine(rest), scenario.effects);
 }
 
 }  // namespace beltgrip::cli

@@ -78,7 +78,9 @@ Bus::Bus(const can::Database& dbc, const BusStyle& style, const World& world, st
       step_s_(world.step_s),
       frame_delay_s_(world.sensors.frame_delay_s),
       frame_jitter_s_(world.sensors.frame_jitter_s) {
-  add_channels(world.sensors, seed);
+  SensorParameters sensors = world.sensors;
+  sensors.add(world.effects);
+  add_channels(sensors, seed);
   Random phase(seed, "frame phase");
   for (const can::MessageDef& definition : dbc.messages) {
     add_message(definition, std::llround(world.step_s * 1e9), phase);

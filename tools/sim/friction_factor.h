@@ -1,10 +1,12 @@
-// What a model file says that friction depends on, as one factor. Simulation only.
+// What a machine has beyond the nominal friction: another shape of its curve, and what the
+// coefficient depends on, as one factor. Simulation only.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 
 #include "estimator/physics/machine_effects.h"
+#include "tools/sim/friction_curve.h"
 
 namespace beltgrip::sim {
 
@@ -17,6 +19,12 @@ struct FrictionConditions {
   double slip_energy_kJ = 0.0;
   int experiment = 0;
 };
+
+inline FrictionCurve shaped(FrictionCurve curve, const estimator::MachineEffects& e) {
+  if (e.peak_slip_percent > 0.0) curve.peak_slip_percent = e.peak_slip_percent;
+  curve.fall_per_percent = std::max(0.0, curve.fall_per_percent + e.fall_per_percent);
+  return curve;
+}
 
 inline double friction_factor(const estimator::MachineEffects& e, const FrictionConditions& now) {
   constexpr double kLeast = 0.05;

@@ -5,6 +5,7 @@
 #include "estimator/physics/variator_geometry.h"
 #include "tools/sim/configuration.h"
 #include "tools/sim/resources.h"
+#include "tools/sim/scenario_effects.h"
 
 namespace beltgrip::sim {
 
@@ -95,6 +96,8 @@ RigScenarioResult parse_rig_scenario(const std::vector<ScenarioLayer>& layers) {
   constexpr Plant kPlant = Plant::kRig;
   ScenarioReader reader("a rig's scenario; that of a car begins with plant = \"vehicle\"");
   name_world(reader, kPlant, s);
+  ScenarioEffects effects;
+  effects.name(reader);
   reader.text("belt", s.belt);
   reader.sections("belts", "a belt", [&s](const std::string& name, ScenarioReader& section) {
     name_curve(section, "", s.belts[name]);
@@ -108,7 +111,10 @@ RigScenarioResult parse_rig_scenario(const std::vector<ScenarioLayer>& layers) {
   name_numbers<Rig>(reader, "run.", s, kRun, kPlant);
   reader.apply({kBase, std::string(shipped(kBase))});
   for (const ScenarioLayer& layer : layers) reader.apply(layer);
-  if (reader.errors().empty()) check_whole(reader, s);
+  if (reader.errors().empty()) {
+    effects.put(reader, s.effects);
+    check_whole(reader, s);
+  }
   result.errors = reader.errors();
   return result;
 }

@@ -8,13 +8,21 @@
 namespace beltgrip::sim {
 
 namespace {
+
 constexpr double kStall_rad_s = 5.0;
+
+RigScenario with_its_belt(RigScenario scenario) {
+  FrictionCurve& belt = scenario.belts.at(scenario.belt);
+  belt = shaped(belt, scenario.effects);
+  return scenario;
 }
+
+}  // namespace
 
 RigSimulation::RigSimulation(const RigScenario& scenario)
     : Simulation(scenario),
-      scenario_(scenario),
-      plant_(scenario.variator, scenario.friction()),
+      scenario_(with_its_belt(scenario)),
+      plant_(scenario.variator, scenario_.friction()),
       command_force_N_(scenario.start_force_N),
       clamp_force_N_(scenario.start_force_N),
       clamping_(scenario.effects, step_s_),

@@ -4,6 +4,7 @@
 
 #include "tools/sim/configuration.h"
 #include "tools/sim/resources.h"
+#include "tools/sim/scenario_effects.h"
 
 namespace beltgrip::sim {
 
@@ -148,6 +149,8 @@ VehicleScenarioResult parse_vehicle_scenario(const std::vector<ScenarioLayer>& l
   ScenarioReader reader("a vehicle scenario");
   reader.choice("plant", {"vehicle"}, [](std::size_t) {});
   name_world(reader, kPlant, s);
+  ScenarioEffects effects;
+  effects.name(reader);
   name_curve(reader, "belt.", s.belt.overdrive);
   name_numbers<Belt>(reader, "belt.", s.belt, kBelt, kPlant);
   name_numbers<Engine>(reader, "engine.", s.engine, kEngine, kPlant);
@@ -160,7 +163,10 @@ VehicleScenarioResult parse_vehicle_scenario(const std::vector<ScenarioLayer>& l
   name_numbers<Known>(reader, "beltgrip.", s.known, kKnown, kPlant);
   reader.apply({std::string(kBase) + ".toml", std::string(shipped(std::string(kBase) + ".toml"))});
   for (const ScenarioLayer& layer : layers) reader.apply(layer);
-  if (reader.errors().empty()) check_whole(reader, s);
+  if (reader.errors().empty()) {
+    effects.put(reader, s.effects);
+    check_whole(reader, s);
+  }
   result.errors = reader.errors();
   return result;
 }

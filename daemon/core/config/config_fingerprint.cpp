@@ -46,9 +46,9 @@ std::string config_fingerprint(const Config& config) {
     text += "read at the defaults;";
   }
   if (config.corrected) {
-    for (const EffectKey& key : effect_keys()) {
+    for (const estimator::EffectRow& key : estimator::effect_rows()) {
       if (key.value == nullptr) continue;
-      text += std::string(key.effect) + '.' + std::string(key.parameter) + '=' +
+      text += std::string(key.id) + '.' + std::string(key.parameter) + '=' +
               number_text((*config.corrected).*key.value) + ';';
     }
   }

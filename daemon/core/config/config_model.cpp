@@ -13,51 +13,11 @@
 namespace beltgrip::daemon {
 namespace {
 
+using estimator::effect_rows;
+using estimator::EffectRow;
 using estimator::MachineEffects;
 
 constexpr std::size_t kFileSizeMax = std::size_t{1} << 20;
-constexpr std::array<std::string_view, 5> kSkewed{
-    "primary_speed", "secondary_speed", "secondary_pressure", "primary_torque", "engine_torque"};
-
-constexpr std::array kEffectKeys{
-    EffectKey{"torque_bias", "bias_Nm", &MachineEffects::torque_bias_Nm},
-    EffectKey{"torque_gain", "gain", &MachineEffects::torque_gain},
-    EffectKey{"inertia_torque", "inertia_kg_m2", &MachineEffects::inertia_kg_m2},
-    EffectKey{"torque_delay", "delay_s", &MachineEffects::torque_delay_s},
-    EffectKey{"torque_loss", "constant_Nm", &MachineEffects::loss_constant_Nm},
-    EffectKey{"torque_loss", "per_kN_Nm", &MachineEffects::loss_per_kN_Nm},
-    EffectKey{"torque_loss", "per_rad_s_Nm", &MachineEffects::loss_per_rad_s_Nm},
-    EffectKey{"centrifugal_force", "coefficient_N_s2", &MachineEffects::centrifugal_N_s2},
-    EffectKey{"pressure_offset", "offset_Pa", &MachineEffects::pressure_offset_Pa},
-    EffectKey{"pressure_gain", "gain", &MachineEffects::pressure_gain},
-    EffectKey{"spring_force", "force_N", &MachineEffects::spring_N},
-    EffectKey{"hydraulic_lag", "time_constant_s", &MachineEffects::lag_time_constant_s},
-    EffectKey{"hydraulic_lag", "delay_s", &MachineEffects::lag_delay_s},
-    EffectKey{"clamp_hysteresis", "force_N", &MachineEffects::hysteresis_N},
-    EffectKey{"pulley_deformation", "per_kN", &MachineEffects::deformation_per_kN},
-    EffectKey{"pulley_deformation", "per_kN2", &MachineEffects::deformation_per_kN2},
-    EffectKey{"radius_tilt", "per_Nm", &MachineEffects::tilt_per_Nm},
-    EffectKey{"end_stop_ratio", "low", &MachineEffects::end_stop_low},
-    EffectKey{"end_stop_ratio", "overdrive", &MachineEffects::end_stop_overdrive},
-    EffectKey{"ratio_creep", "rate", &MachineEffects::creep_rate},
-    EffectKey{"friction_temperature", "per_K", &MachineEffects::friction_per_K},
-    EffectKey{"friction_speed", "per_ln_speed", &MachineEffects::friction_per_ln_speed},
-    EffectKey{"friction_load", "exponent", &MachineEffects::friction_load_exponent},
-    EffectKey{"friction_ratio", "relative", &MachineEffects::friction_low_relative},
-    EffectKey{"friction_shape", "peak_slip_percent", &MachineEffects::peak_slip_percent},
-    EffectKey{"friction_shape", "fall_per_percent", &MachineEffects::fall_per_percent},
-    EffectKey{"wear", "step", &MachineEffects::wear_step},
-    EffectKey{"wear", "at", &MachineEffects::wear_from},
-    EffectKey{"wear", "per_experiment", &MachineEffects::wear_per_experiment},
-    EffectKey{"warm_up_drift", "per_kJ", &MachineEffects::warm_up_per_kJ},
-    EffectKey{"warm_up_drift", "per_start", &MachineEffects::warm_up_per_start},
-    EffectKey{"speed_scale", "primary", &MachineEffects::primary_speed_scale},
-    EffectKey{"speed_scale", "secondary", &MachineEffects::secondary_speed_scale},
-    EffectKey{"speed_ripple", "primary", &MachineEffects::primary_ripple},
-    EffectKey{"speed_ripple", "secondary", &MachineEffects::secondary_ripple},
-    EffectKey{"channel_skew", "delay_s", nullptr},
-};
-
 constexpr std::array<std::string_view, 8> kDrivelineKeys{
     "deformation_per_kN",       "loss_constant_Nm",   "loss_per_rad_s_Nm",
     "ratio_overdrive_relative", "ratio_low_relative", "secondary_inertia_kg_m2",
@@ -148,11 +108,11 @@ class Reader {
   }
 
   void read_effect(const TomlNode& section) {
-    const auto keys = effect_keys();
-    const auto of_this = [&](const EffectKey& key) { return key.effect == section.key; };
+    const auto keys = effect_rows();
+    const auto of_this = [&](const EffectRow& key) { return key.id == section.key; };
     if (section.type != TomlType::kTable || std::none_of(keys.begin(), keys.end(), of_this)) {
       std::vector<std::string> names;
-      for (const EffectKey& key : keys) names.emplace_back(key.effect);
+      for (const EffectRow& key : keys) names.emplace_back(key.id);
       fail(section.line, "effects." + section.key + ": found an unknown effect" +
                              nearest_hint(section.key, names));
     }
@@ -167,10 +127,10 @@ class Reader {
         continue;
       }
       std::string names;
-      for (const EffectKey& key : keys) {
+      for (const EffectRow& key : keys) {
         if (of_this(key)) names += (names.empty() ? "" : ", ") + std::string(key.parameter);
       }
-      if (std::none_of(keys.begin(), keys.end(), [&](const EffectKey& key) {
+      if (std::none_of(keys.begin(), keys.end(), [&](const EffectRow& key) {
             return of_this(key) && key.parameter == node.key;
           })) {
         fail(node.line, "effects." + section.key + "." + node.key +
@@ -178,11 +138,15 @@ class Reader {
       }
       effect.parameters[node.key] = number_of("effects." + section.key, node);
     }
-    if (section.key == "channel_skew" &&
-        std::find(kSkewed.begin(), kSkewed.end(), effect.role) == kSkewed.end()) {
-      fail(section.line, "effects.channel_skew.role: found " + in_quotes(effect.role) +
-                             ", expected primary_speed, secondary_speed, secondary_pressure, "
-                             "primary_torque or engine_torque");
+    const auto row = std::find_if(keys.begin(), keys.end(), of_this);
+    if (!takes_role(*row, effect.role)) {
+      std::string roles;
+      for (const estimator::EffectRole& each : row->roles) {
+        const bool last = &each == &row->roles.back();
+        roles += (roles.empty() ? "" : last ? " or " : ", ") + std::string(each.role);
+      }
+      fail(section.line, "effects." + section.key + ".role: found " + in_quotes(effect.role) +
+                             ", expected " + roles);
     }
     model_.effects[section.key] = effect;
   }
@@ -192,8 +156,6 @@ class Reader {
 };
 
 }  // namespace
-
-std::span<const EffectKey> effect_keys() { return kEffectKeys; }
 
 bool is_friction_key(std::string_view name) {
   if (name == "mu_max" || name == "peak_slip_overdrive_percent" ||
@@ -245,22 +207,13 @@ std::string model_text(const ModelFile& model) {
 
 MachineEffects machine_effects(const ModelFile& model) {
   MachineEffects out;
-  for (const EffectKey& key : kEffectKeys) {
-    const auto effect = model.effects.find(std::string(key.effect));
+  for (const EffectRow& row : effect_rows()) {
+    const auto effect = model.effects.find(std::string(row.id));
     if (effect == model.effects.end()) continue;
-    const auto found = effect->second.parameters.find(std::string(key.parameter));
+    const auto found = effect->second.parameters.find(std::string(row.parameter));
     if (found == effect->second.parameters.end()) continue;
-    // Of the command: the measured pressure acts.
-    if (key.effect == "hydraulic_lag" && effect->second.role == "command") continue;
-    double MachineEffects::*value = key.value;
-    if (value == nullptr) {
-      const std::string& role = effect->second.role;
-      value = role == "primary_speed"        ? &MachineEffects::primary_speed_delay_s
-              : role == "secondary_speed"    ? &MachineEffects::secondary_speed_delay_s
-              : role == "secondary_pressure" ? &MachineEffects::pressure_delay_s
-                                             : &MachineEffects::torque_delay_s;
-    }
-    out.*value += found->second;
+    double MachineEffects::*const value = value_of(row, effect->second.role);
+    if (value != nullptr) out.*value += found->second;
   }
   return out;
 }

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <map>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -34,12 +33,6 @@ struct ModelError {
   std::string text;  // one line: file, line, key, found, expected
 };
 
-// Every parameter of every effect, in the order of the contract.
-struct EffectKey {
-  std::string_view effect, parameter;
-  double estimator::MachineEffects::*value;  // none: channel_skew, whose role says which
-};
-std::span<const EffectKey> effect_keys();
 bool is_friction_key(std::string_view name);
 bool is_driveline_key(std::string_view name);
 

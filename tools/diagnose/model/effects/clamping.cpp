@@ -1,4 +1,5 @@
-#include "tools/diagnose/model/effects/clamping.h"
+// Effects between the measured pressure and the force that clamps the belt.
+#include "tools/diagnose/model/effects/effect.h"
 
 #include <algorithm>
 #include <cmath>
@@ -49,8 +50,6 @@ ArrayXd play_change(const ArrayXd& in, double half_width, double first) {
   return out;
 }
 
-}  // namespace
-
 void apply_hydraulic_lag(Context& c, const Slot& slot, double time_constant_s) {
   if (slot.role == "command") {
     c.track += lag_change(c.run.command.sharp, c.run.dt_s, time_constant_s);
@@ -76,5 +75,26 @@ void apply_clamp_hysteresis(Context& c, const Slot& slot, double force_N) {
   const double first = slot.role == "raised" ? -1.0 : slot.role == "lowered" ? 1.0 : 0.0;
   c.force_N += play_change(model_N, force_N, first);
 }
+
+void of_each_input(const Carried& data, const AddSlot& add) {
+  if (data.pressure_varies) add(0, {});
+  if (data.command) add(0, "command");
+}
+// The clamp force before each experiment: unknown, raised to where it begins, lowered.
+void from_each_side(const Carried&, const AddSlot& add) {
+  for (const std::string_view before : {"", "raised", "lowered"}) add(0, before);
+}
+
+constexpr Equation kEquations[] = {
+    {"centrifugal_force", "coefficient_N_s2", apply_centrifugal_force},
+    {"spring_force", "force_N", apply_spring_force},
+    {"hydraulic_lag", "time_constant_s", apply_hydraulic_lag, of_each_input},
+    {"hydraulic_lag", "delay_s", apply_hydraulic_delay, of_each_input},
+    {"clamp_hysteresis", "force_N", apply_clamp_hysteresis, from_each_side},
+};
+
+}  // namespace
+
+std::span<const Equation> clamping_equations() { return kEquations; }
 
 }  // namespace beltgrip::diagnose

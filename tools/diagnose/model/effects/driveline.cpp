@@ -1,4 +1,6 @@
-#include "tools/diagnose/model/effects/driveline.h"
+// Effects between shaft and belt, and of the geometry: torque that does not reach the belt, radii
+// that are not what the ratio says.
+#include "tools/diagnose/model/effects/effect.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,8 +19,6 @@ void shift_ratio_at(Context& c, int stop, double relative) {
     if (c.run.stop[static_cast<std::size_t>(k)] == stop) c.ln_ratio[k] += change;
   }
 }
-
-}  // namespace
 
 void apply_inertia_torque(Context& c, const Slot&, double inertia_kg_m2) {
   c.loss_Nm += inertia_kg_m2 * c.slope_p;
@@ -68,5 +68,33 @@ void apply_ratio_creep(Context& c, const Slot& slot, double rate) {
     c.ln_ratio[k] += std::copysign(1.0, rate) * toward_middle * std::min(away, 0.2);
   }
 }
+
+void at_low(const Carried& data, const AddSlot& add) {
+  if (data.low) add(0, {});
+}
+void at_overdrive(const Carried& data, const AddSlot& add) {
+  if (data.overdrive) add(0, {});
+}
+void by_each_force(const Carried&, const AddSlot& add) {
+  add(0, {});
+  add(0, "clamp force");
+}
+
+constexpr Equation kEquations[] = {
+    {"inertia_torque", "inertia_kg_m2", apply_inertia_torque},
+    {"torque_loss", "constant_Nm", apply_loss_constant},
+    {"torque_loss", "per_kN_Nm", apply_loss_per_kN},
+    {"torque_loss", "per_rad_s_Nm", apply_loss_per_speed},
+    {"pulley_deformation", "per_kN", apply_deformation_linear},
+    {"pulley_deformation", "per_kN2", apply_deformation_quadratic},
+    {"radius_tilt", "per_Nm", apply_radius_tilt},
+    {"end_stop_ratio", "low", apply_end_stop_low, at_low},
+    {"end_stop_ratio", "overdrive", apply_end_stop_overdrive, at_overdrive},
+    {"ratio_creep", "rate", apply_ratio_creep, by_each_force},
+};
+
+}  // namespace
+
+std::span<const Equation> driveline_equations() { return kEquations; }
 
 }  // namespace beltgrip::diagnose

@@ -1,37 +1,50 @@
-// One row per parameter of an effect: its identifiers of the model file, the size it has in real
-// machines, where it enters the model, and the run that tells it from its twins.
+// The effects as a diagnosis fits them: each row of the table of effects with its equation, and the
+// slots that data can carry.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "estimator/physics/machine_effects.h"
 #include "tools/diagnose/model/variator_model.h"
 
 namespace beltgrip::diagnose {
 
-// Injection points, in the order of evaluation.
-enum class Stage { kMeasurement, kForce, kDriveline, kRatio, kFriction };
+using estimator::Stage;
 
-// A parameter of one effect, ready to be fitted. `index` tells instances apart: the experiment of a
-// wear step, the role of a skew, the input of a lag.
+// What a set of experiments can show.
+struct Carried {
+  int experiments = 0;
+  bool temperature = false, command = false;
+  bool low = false, overdrive = false;  // end stops
+  bool pressure_varies = false;         // at different rates
+};
+
 struct Slot;
-using Apply = void (*)(Context&, const Slot&, double value);
+using AddSlot = std::function<void(int index, std::string_view role)>;
 
-struct EffectRow {
-  std::string_view id;
-  std::string_view parameter;
-  std::string_view unit;
-  Stage stage;
-  double typical;    // size met in practice, one sigma of the prior, in `unit`
-  double low, high;  // physical bounds
-  Apply apply;
-  std::string_view equation;
-  std::string_view acts_on;     // friction, ratio, torque, clamp force, speed
-  std::string_view depends_on;  // what the residual follows
-  std::string_view separating;  // the experiment that tells it from its twins
+// What a diagnosis adds to a row of the table of effects; it stands beside its equation.
+struct Equation {
+  std::string_view id, parameter;
+  void (*apply)(Context&, const Slot&, double value);  // none: found in the order spectrum
+  // The slots that these data can carry; none given: one, always.
+  void (*slots)(const Carried& data, const AddSlot& add) = nullptr;
+  bool counts_experiments = false;  // a slot's index is the experiment it begins with
+  // Between what is fitted, relative to the nominal curve, and what files hold; none: the same.
+  double (*to_contract)(double value, double peak_percent, double mu_max) = nullptr;
+  double (*from_contract)(double value, double peak_percent, double mu_max) = nullptr;
+};
+std::span<const Equation> measurement_equations();  // what the bus says differs from what is there
+std::span<const Equation> clamping_equations();     // from the measured pressure to the force
+std::span<const Equation> driveline_equations();    // torque on its way to the belt; radii, ratio
+std::span<const Equation> friction_equations();
+
+struct EffectRow : estimator::EffectRow, Equation {
+  using estimator::EffectRow::id, estimator::EffectRow::parameter;
 };
 
 struct Slot {
@@ -40,14 +53,14 @@ struct Slot {
   // Of channel_skew; the input of hydraulic_lag; what clamp_hysteresis rests from at the start.
   std::string_view role;
   double step() const { return 0.2 * row->typical; }
-  std::string label() const;        // "wear.step@4"
-  bool counts_experiments() const;  // index is the experiment it begins with
+  std::string label() const;  // "wear.step@4"
+  bool counts_experiments() const { return row->counts_experiments; }
   // friction_shape's parameters are absolute in the contract, relative to the nominal curve here.
   double to_contract(double value, const Eigen::VectorXd& nuisance) const;
   double from_contract(double value, const std::map<std::string, double>& friction) const;
 };
 
-// The library, in the order of the contract.
+// The library, in the order of the table. What is no size is left out: wear.at.
 std::span<const EffectRow> effect_rows();
 
 // Slots that these data can carry at all.

@@ -1,4 +1,5 @@
-#include "tools/diagnose/model/effects/friction.h"
+// Effects in the friction itself.
+#include "tools/diagnose/model/effects/effect.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,8 +15,6 @@ constexpr double kReferenceForce_N = 3000.0;
 constexpr double kWarmUp_s = 30.0;
 
 ArrayXd ln_of(const ArrayXd& factor) { return factor.max(0.05).log(); }
-
-}  // namespace
 
 void apply_friction_temperature(Context& c, const Slot&, double per_K) {
   c.ln_friction += ln_of(1.0 + per_K * (c.run.temperature.value - kReferenceTemperature_C));
@@ -61,5 +60,51 @@ void apply_warm_up_energy(Context& c, const Slot&, double per_kJ) {
 void apply_warm_up_time(Context& c, const Slot&, double per_start) {
   c.ln_friction += ln_of(1.0 + per_start * (1.0 - (-c.run.t_s / kWarmUp_s).exp()));
 }
+
+void only_with_temperature(const Carried& data, const AddSlot& add) {
+  if (data.temperature) add(0, {});
+}
+void at_both_stops(const Carried& data, const AddSlot& add) {
+  if (data.low && data.overdrive) add(0, {});
+}
+void from_each_experiment(const Carried& data, const AddSlot& add) {
+  for (int at = 1; at < data.experiments && at <= 40; ++at) add(at, {});
+}
+void over_experiments(const Carried& data, const AddSlot& add) {
+  if (data.experiments > 1) add(0, {});
+}
+// Files hold the slip at the peak and the fall in percent, a fit holds them relative to the nominal
+// curve.
+double peak_to_contract(double value, double peak_percent, double) {
+  return (1.0 + value) * peak_percent;
+}
+double peak_from_contract(double value, double peak_percent, double) {
+  return value / peak_percent - 1.0;
+}
+double fall_to_contract(double value, double peak_percent, double mu_max) {
+  return value * mu_max / peak_percent;
+}
+double fall_from_contract(double value, double peak_percent, double mu_max) {
+  return value * peak_percent / mu_max;
+}
+
+constexpr Equation kEquations[] = {
+    {"friction_temperature", "per_K", apply_friction_temperature, only_with_temperature},
+    {"friction_speed", "per_ln_speed", apply_friction_speed},
+    {"friction_load", "exponent", apply_friction_load},
+    {"friction_ratio", "relative", apply_friction_ratio, at_both_stops},
+    {"friction_shape", "peak_slip_percent", apply_peak_slip, nullptr, false, peak_to_contract,
+     peak_from_contract},
+    {"friction_shape", "fall_per_percent", apply_fall, nullptr, false, fall_to_contract,
+     fall_from_contract},
+    {"wear", "step", apply_wear_step, from_each_experiment, true},
+    {"wear", "per_experiment", apply_wear_gradual, over_experiments},
+    {"warm_up_drift", "per_kJ", apply_warm_up_energy},
+    {"warm_up_drift", "per_start", apply_warm_up_time},
+};
+
+}  // namespace
+
+std::span<const Equation> friction_equations() { return kEquations; }
 
 }  // namespace beltgrip::diagnose

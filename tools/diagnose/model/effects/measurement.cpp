@@ -1,4 +1,5 @@
-#include "tools/diagnose/model/effects/measurement.h"
+// Effects in the measuring chain: what the bus says differs from what is there.
+#include "tools/diagnose/model/effects/effect.h"
 
 namespace beltgrip::diagnose {
 
@@ -6,7 +7,6 @@ namespace {
 Eigen::ArrayXd shift_change(const GridSignal& signal, double dt_s, double shift_s) {
   return shifted(signal, dt_s, shift_s) - signal.sharp;
 }
-}  // namespace
 
 void apply_torque_bias(Context& c, const Slot&, double bias_Nm) { c.torque -= bias_Nm; }
 // Of the slow copy: dividing the samples themselves would also divide their noise, and the larger
@@ -38,5 +38,29 @@ void apply_channel_skew(Context& c, const Slot& slot, double delay_s) {
     c.pressure += shift_change(c.run.pressure, dt_s, delay_s);
   }
 }
+
+// Of the torque it is torque_delay.
+void of_each_channel(const Carried&, const AddSlot& add) {
+  for (const std::string_view role : {"primary_speed", "secondary_speed", "secondary_pressure"}) {
+    add(0, role);
+  }
+}
+
+constexpr Equation kEquations[] = {
+    {"torque_bias", "bias_Nm", apply_torque_bias},
+    {"torque_gain", "gain", apply_torque_gain},
+    {"torque_delay", "delay_s", apply_torque_delay},
+    {"pressure_offset", "offset_Pa", apply_pressure_offset},
+    {"pressure_gain", "gain", apply_pressure_gain},
+    {"speed_scale", "primary", apply_speed_scale_primary},
+    {"speed_scale", "secondary", apply_speed_scale_secondary},
+    {"channel_skew", "delay_s", apply_channel_skew, of_each_channel},
+    {"speed_ripple", "primary", nullptr},
+    {"speed_ripple", "secondary", nullptr},
+};
+
+}  // namespace
+
+std::span<const Equation> measurement_equations() { return kEquations; }
 
 }  // namespace beltgrip::diagnose
