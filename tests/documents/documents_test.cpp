@@ -1,5 +1,5 @@
-// Documents whose content stands in a table of the code: frames, configuration, commands. They are
-// generated, and compared here; BELTGRIP_WRITE_DOCUMENTS=1 writes them instead.
+// Documents whose content stands in a table of the code: frames, configuration, commands, effects.
+// They are generated, and compared here; BELTGRIP_WRITE_DOCUMENTS=1 writes them instead.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -11,6 +11,7 @@
 
 #include "can_dbc/dbc/parser.h"
 #include "daemon/core/publish/own_frames.h"
+#include "estimator/physics/machine_effects.h"
 #include "tests/support/program.h"
 
 namespace beltgrip::test {
@@ -135,6 +136,34 @@ std::string commands() {
   return out.str();
 }
 
+constexpr std::string_view kEffectsBegin = "\n## Every effect\n";
+
+std::string effects() {
+  const std::string text = read_file(BELTGRIP_SOURCE_DIR "/tools/DIAGNOSE.md");
+  std::ostringstream out;
+  out << text.substr(0, text.find(kEffectsBegin)) << kEffectsBegin
+      << "In a model file or a scenario: `[effects.NAME]`, `parameter = value`; zero, or left out, "
+         "is "
+         "off. The sizes of `friction_shape` are relative to the nominal curve.\n"
+      << kGenerated
+      << "\n| effect | parameter | unit | equation | usual size | fitted from | to |\n"
+      << "|---|---|---|---|---|---|---|\n";
+  for (const estimator::EffectRow& row : estimator::effect_rows()) {
+    out << "| `" << row.id << "` | `" << row.parameter << "` | " << row.unit << " | "
+        << cell(row.equation);
+    for (const estimator::EffectRole& each : row.roles) {
+      out << (&each == &row.roles.front() ? "; `role`: " : ", ") << each.role;
+    }
+    if (row.typical == 0.0) {
+      out << " | | | |\n";
+    } else {
+      out << " | " << number(row.typical) << " | " << number(row.low) << " | " << number(row.high)
+          << " |\n";
+    }
+  }
+  return out.str();
+}
+
 struct Document {
   std::string path;
   std::function<std::string()> text;
@@ -155,7 +184,8 @@ TEST_P(Documents, SayWhatTheCodeSays) {
 INSTANTIATE_TEST_SUITE_P(All, Documents,
                          testing::Values(Document{"can_dbc/FRAMES.md", frames},
                                          Document{"systemd/CONFIGURATION.md", configuration},
-                                         Document{"tools/COMMANDS.md", commands}));
+                                         Document{"tools/COMMANDS.md", commands},
+                                         Document{"tools/DIAGNOSE.md", effects}));
 
 }  // namespace
 }  // namespace beltgrip::test
