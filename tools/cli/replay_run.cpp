@@ -130,7 +130,7 @@ std::string joined(const std::vector<std::string>& paths) {
   return name;
 }
 
-void describe_troubles(const can::LogStats& stats, const sim::TimelineCounters& counters,
+void describe_troubles(const can::LogStats& stats, const ports::TimelineCounters& counters,
                        ReplayResult& result) {
   for (std::size_t i = 0; i < stats.first_bad.size() && i < kBadLinesShown; ++i) {
     result.warnings.push_back(result.log + ":" + std::to_string(stats.first_bad[i].line) + ": " +
@@ -189,10 +189,10 @@ std::string seconds_text(std::int64_t t_ns) {
   return (t_ns < 0 ? "-" : "") + digits;
 }
 
-std::unique_ptr<sim::LogTimeline> open_timeline(const std::vector<std::string>& paths,
-                                                const std::string& interface,
-                                                const daemon::FrameIdentifiers& own,
-                                                const std::string& further_interface) {
+std::unique_ptr<ports::LogTimeline> open_timeline(const std::vector<std::string>& paths,
+                                                  const std::string& interface,
+                                                  const daemon::FrameIdentifiers& own,
+                                                  const std::string& further_interface) {
   std::vector<std::unique_ptr<can::LogReader>> readers;
   for (const std::string& path : paths) {
     try {
@@ -201,14 +201,14 @@ std::unique_ptr<sim::LogTimeline> open_timeline(const std::vector<std::string>& 
       throw Failure{kNoInput, error.text};
     }
   }
-  sim::FrameSelection selection;
+  ports::FrameSelection selection;
   selection.interface = interface;
   selection.further_interface = further_interface;
   for (std::size_t i = 0; i < daemon::kOwnMessageCount; ++i) {
     selection.ignored.push_back(
         {daemon::own_identifier(own, static_cast<daemon::OwnMessage>(i)), false});
   }
-  return std::make_unique<sim::LogTimeline>(std::move(readers), std::move(selection));
+  return std::make_unique<ports::LogTimeline>(std::move(readers), std::move(selection));
 }
 
 std::string further_interface(const daemon::Config& config) {
@@ -249,8 +249,8 @@ int record_version(const std::string& path) {
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none)) return 0;
   try {
-    const std::optional<int> version = sim::RecordPort::version_of(path);
-    constexpr int kNewest = sim::RecordPort::kVersion;
+    const std::optional<int> version = ports::RecordPort::version_of(path);
+    constexpr int kNewest = ports::RecordPort::kVersion;
     if (version && (*version < 1 || *version > kNewest)) {
       throw Failure{kBadInput, path + ": found a flight record of version " +
                                    std::to_string(*version) + ", expected 1 to " +
@@ -264,12 +264,12 @@ int record_version(const std::string& path) {
 
 // What the flight recorder kept, decided again as the daemon did.
 ReplayResult replay_record(const std::string& path, const daemon::Config& config,
-                           const sim::ReplayPort::Receiver& receiver,
+                           const ports::ReplayPort::Receiver& receiver,
                            const ReplayOutputs& outputs) {
   ReplayResult result;
   result.log = path;
   daemon::Pipeline pipeline(config);
-  sim::RecordPort port(path, receiver, [&](const sim::RecordedKnowledge& known) {
+  ports::RecordPort port(path, receiver, [&](const ports::RecordedKnowledge& known) {
     estimator::LearnedFriction learned;
     for (std::size_t i = 0; i < learned.groups.size(); ++i) {
       learned.groups[i].known = known.groups[i].mu_max > 0.0;
@@ -310,7 +310,7 @@ ReplayResult replay(const std::vector<std::string>& paths, const std::string& in
   ReplayResult result;
   result.log = joined(paths);
   const std::string further = further_interface(config);
-  sim::ReplayPort::Receiver receiver;
+  ports::ReplayPort::Receiver receiver;
   std::unique_ptr<can::CandumpWriter> writer;
   if (outputs.log_out != nullptr) {
     writer = std::make_unique<can::CandumpWriter>(outputs.log_out);
@@ -321,7 +321,7 @@ ReplayResult replay(const std::vector<std::string>& paths, const std::string& in
   const int version = paths.size() == 1 && interface.empty() ? record_version(paths[0]) : 0;
   if (version > 0) {
     result = replay_record(paths[0], config, receiver, outputs);
-    if (version < sim::RecordPort::kVersion) {
+    if (version < ports::RecordPort::kVersion) {
       result.warnings.push_back(result.log + ": a flight record of version " +
                                 std::to_string(version) + ": of what the history had learned it " +
                                 (version == 1 ? "has mu_max alone" : "lacks the newest results") +
@@ -330,14 +330,14 @@ ReplayResult replay(const std::vector<std::string>& paths, const std::string& in
     return result;
   }
   const auto timeline = open_timeline(paths, interface, config.identifiers, further);
-  sim::ReplayPort port(*timeline, std::move(receiver));
+  ports::ReplayPort port(*timeline, std::move(receiver));
   const can::LogStats head = timeline->stats();
   if (head.frames == 0 || port.empty()) throw no_frames(result, head, interface);
 
   run_daemon(port, config, result, outputs);
 
   const can::LogStats stats = timeline->stats();
-  const sim::TimelineCounters& counters = timeline->counters();
+  const ports::TimelineCounters& counters = timeline->counters();
   result.frames = stats.frames;
   result.frames_bad += counters.frames_bad;
   result.lines_bad = stats.lines_bad;

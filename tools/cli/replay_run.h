@@ -43,10 +43,10 @@ struct ReplayOutputs {
 
 // The logs as one timeline without BeltGrip's own frames; those of an interface named as the
 // further bus's are of that bus, all others of the first. Throws Failure 66.
-std::unique_ptr<sim::LogTimeline> open_timeline(const std::vector<std::string>& paths,
-                                                const std::string& interface,
-                                                const daemon::FrameIdentifiers& own,
-                                                const std::string& further_interface = "");
+std::unique_ptr<ports::LogTimeline> open_timeline(const std::vector<std::string>& paths,
+                                                  const std::string& interface,
+                                                  const daemon::FrameIdentifiers& own,
+                                                  const std::string& further_interface = "");
 // Empty where the configuration has one bus.
 std::string further_interface(const daemon::Config& config);
 

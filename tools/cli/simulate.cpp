@@ -104,8 +104,8 @@ Run run_rig(const Options& options, std::FILE* log, bool results) {
   if (results) {
     std::vector<std::unique_ptr<can::LogReader>> logs;
     logs.push_back(std::move(reader));
-    sim::LogTimeline timeline(std::move(logs), {});
-    sim::ReplayPort port(timeline, {});
+    ports::LogTimeline timeline(std::move(logs), {});
+    ports::ReplayPort port(timeline, {});
     run_daemon(port, load_configuration_text(run.configuration, run.dbc, ""), run.daemon);
     run.daemon.log = scenario.name;
     run.daemon.frames = timeline.stats().frames;

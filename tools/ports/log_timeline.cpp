@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <optional>
 
-namespace beltgrip::sim {
+namespace beltgrip::ports {
 
 namespace {
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
@@ -120,4 +120,4 @@ can::LogStats LogTimeline::stats() const {
   return sum;
 }
 
-}  // namespace beltgrip::sim
+}  // namespace beltgrip::ports

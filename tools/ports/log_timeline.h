@@ -12,7 +12,7 @@
 #include "can_dbc/frame/can_frame.h"
 #include "can_dbc/log/can_log.h"
 
-namespace beltgrip::sim {
+namespace beltgrip::ports {
 
 struct TimelineCounters {
   std::uint64_t frames = 0;       // delivered
@@ -45,4 +45,4 @@ class LogTimeline {
   TimelineCounters counters_;
 };
 
-}  // namespace beltgrip::sim
+}  // namespace beltgrip::ports

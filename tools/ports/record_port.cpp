@@ -4,7 +4,7 @@
 #include <charconv>
 #include <optional>
 
-namespace beltgrip::sim {
+namespace beltgrip::ports {
 
 using daemon::MonoTime;
 
@@ -167,4 +167,4 @@ daemon::SendResult RecordPort::send_on(std::uint8_t bus, const can::CanFrame& fr
   return daemon::SendResult::kSent;
 }
 
-}  // namespace beltgrip::sim
+}  // namespace beltgrip::ports

@@ -15,7 +15,7 @@
 #include "can_dbc/log/can_log.h"
 #include "daemon/core/base/port.h"
 
-namespace beltgrip::sim {
+namespace beltgrip::ports {
 
 // What the history had told the daemon.
 struct RecordedKnowledge {
@@ -94,4 +94,4 @@ class RecordPort final : public daemon::Port {
   std::vector<Failure> failed_;  // at the next sample
 };
 
-}  // namespace beltgrip::sim
+}  // namespace beltgrip::ports

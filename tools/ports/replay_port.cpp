@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace beltgrip::sim {
+namespace beltgrip::ports {
 
 ReplayPort::ReplayPort(LogTimeline& log, Receiver receiver)
     : log_(log), receiver_(std::move(receiver)), has_next_(log_.next(next_)) {
@@ -85,4 +85,4 @@ daemon::SendResult ReplayPort::send_on(std::uint8_t bus, const can::CanFrame& fr
   return daemon::SendResult::kSent;
 }
 
-}  // namespace beltgrip::sim
+}  // namespace beltgrip::ports

@@ -11,7 +11,7 @@
 #include "daemon/core/base/port.h"
 #include "tools/ports/log_timeline.h"
 
-namespace beltgrip::sim {
+namespace beltgrip::ports {
 
 class ReplayPort final : public daemon::Port {
  public:
@@ -58,4 +58,4 @@ class ReplayPort final : public daemon::Port {
   bool take_sent(const can::StampedFrame& frame) noexcept;
 };
 
-}  // namespace beltgrip::sim
+}  // namespace beltgrip::ports

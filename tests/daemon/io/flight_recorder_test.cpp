@@ -177,16 +177,16 @@ TEST_P(Rough, RunIsDecidedAgainByteByByte) {
   EXPECT_GT(counters.sends_failed, 2U);
   ASSERT_EQ(files().size(), 1U);
   const std::string path = files()[0].string();
-  ASSERT_EQ(sim::RecordPort::version_of(path), sim::RecordPort::kVersion);
+  ASSERT_EQ(ports::RecordPort::version_of(path), ports::RecordPort::kVersion);
 
   std::vector<test::SentFrame> sent;
   Pipeline again(config);
-  sim::RecordPort port(
+  ports::RecordPort port(
       path,
       [&](MonoTime t, const can::CanFrame& frame, std::uint8_t bus) {
         sent.push_back({t, frame, bus});
       },
-      [&](const sim::RecordedKnowledge& known) {
+      [&](const ports::RecordedKnowledge& known) {
         estimator::LearnedFriction told;
         told.groups[0].known = true;
         told.groups[0].mu_max = known.groups[0].mu_max;

@@ -6,7 +6,7 @@
 
 #include "tools/ports/log_timeline.h"
 
-namespace beltgrip::sim {
+namespace beltgrip::ports {
 namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
@@ -154,4 +154,4 @@ TEST(ReplayPort, AnEmptyLogIsClosedAtOnce) {
 }
 
 }  // namespace
-}  // namespace beltgrip::sim
+}  // namespace beltgrip::ports
