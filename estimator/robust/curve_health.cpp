@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/statistics/square.h"
+
 namespace beltgrip::estimator {
 namespace {
 
@@ -11,8 +13,6 @@ constexpr double kDeformation_percent_per_N = 2e-4;
 constexpr double kLeastShare = 0.1;  // of the chord, on either side
 constexpr double kLeastGap_percent = 0.02;
 constexpr std::size_t kFewest = 12;  // residuals
-
-double square(double x) { return x * x; }
 
 struct Group {  // means
   double slip, mu, force_N;

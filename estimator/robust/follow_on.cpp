@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "estimator/statistics/square.h"
+
 namespace beltgrip::estimator {
 namespace {
 
@@ -11,8 +13,6 @@ constexpr double kFewest = 5.0;
 constexpr double kStillCarried = 0.99;  // of mu
 constexpr double kSlower = 2.0;
 constexpr double kDeviations = 3.0;
-
-double square(double x) { return x * x; }
 
 }  // namespace
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/statistics/square.h"
+
 namespace beltgrip::estimator {
 namespace {
 
@@ -14,8 +16,6 @@ constexpr double kShare = 0.015;    // of the force
 constexpr double kLeastMove = 0.4;  // of what slip would have to move by
 constexpr double kSlipDeviations = 4.0, kSlopeDeviations = 2.0;
 constexpr double kStairs = 1.5;  // steps of a signal that is rounded coarsely are no steps
-double square(double x) { return x * x; }
-
 }  // namespace
 
 ForceStep::ForceStep(double sample_rate_hz, double resolution_N)

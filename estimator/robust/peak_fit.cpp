@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/statistics/square.h"
+
 namespace beltgrip::estimator {
 namespace {
 
@@ -38,8 +40,6 @@ constexpr double kNearTop = 0.98;
 constexpr double kHealthFrom = 0.6;        // of the top of mu*
 constexpr double kStandsStill = 0.02;      // of the clamp force
 constexpr std::size_t kLargestGroup = 16;  // points
-
-double square(double x) { return x * x; }
 
 // R = L D L', positive definite, without pivoting.
 class Factors {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/statistics/square.h"
+
 namespace beltgrip::estimator {
 namespace {
 
@@ -42,8 +44,6 @@ constexpr int kWorkLook = 30, kWorkAdd = 140, kWorkFit = 350, kWorkSum = 380;
 constexpr double kNone = -1e300;  // of a logarithm
 constexpr double kSmallWeights = 1e-100;
 constexpr double kLowest = -0.7, kHighest = 1.8;  // of the histogram
-
-constexpr double square(double x) { return x * x; }
 
 double tanh_form(double u, double a) { return std::tanh(a * u) / std::tanh(a); }
 double brush_form(double u, double n) { return 1.0 - std::pow(1.0 - u, n); }

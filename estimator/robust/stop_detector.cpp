@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/statistics/square.h"
+
 namespace beltgrip::estimator {
 namespace {
 
@@ -14,8 +16,6 @@ constexpr double kSmallestLevelSlip = 0.5;  // percent: slip taken for elasticit
 constexpr double kQuietDeviation = 0.05;    // percent: noise of the smallest slip at most
 constexpr double kSettle_s = 1.2;           // load is being taken up: no slope before
 constexpr double kTiny = 1e-12;
-
-double square(double x) { return x * x; }
 
 // Weighted over tau = 0..1, the window from begin to end.
 struct Weights {

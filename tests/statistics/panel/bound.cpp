@@ -6,8 +6,12 @@
 #include <cmath>
 #include <vector>
 
+#include "estimator/statistics/square.h"
+
 namespace beltgrip::panel {
 namespace {
+
+using estimator::square;
 
 constexpr double kOneSided99 = 2.326;
 constexpr double kStep_percent = 0.02;
@@ -151,8 +155,6 @@ struct Evidence {  // means over a few samples
   double slip, mu, force;
   double weight;  // of mu, by the noise of torque and slip
 };
-
-double square(double x) { return x * x; }
 
 }  // namespace
 
