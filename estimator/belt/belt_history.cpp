@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/physics/sensor_error.h"
 #include "estimator/physics/units.h"
 #include "estimator/statistics/distributions.h"
+#include "estimator/statistics/interval.h"
 
 namespace beltgrip::estimator {
 
@@ -346,7 +346,7 @@ WearTest compare(std::span<const double> before, std::span<const double> after) 
   const double change = mean_after - mean_before;
   test.p_value = student_cdf(change / deviation, degrees);
   test.found = test.p_value < kWearFalseAlarm;
-  const double half = student_quantile(0.975, degrees) * deviation;
+  const double half = student_quantile(kUpper95, degrees) * deviation;
   test.change_percent = kPercent * std::expm1(change);
   test.ci95_low = kPercent * std::expm1(change - half);
   test.ci95_high = kPercent * std::expm1(change + half);

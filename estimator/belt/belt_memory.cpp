@@ -4,7 +4,7 @@
 #include <cmath>
 #include <type_traits>
 
-#include "estimator/physics/sensor_error.h"
+#include "estimator/statistics/interval.h"
 
 namespace beltgrip::estimator {
 

@@ -3,44 +3,15 @@
 // conclude are noexcept, allocate nothing and do bounded work. Real-time thread.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 
+#include "estimator/method/stop_reason.h"
 #include "estimator/physics/parameters.h"
 #include "estimator/physics/variator_sample.h"
 
 namespace beltgrip::estimator {
 
 enum class Phase : std::uint8_t { kQuiet, kExcited, kPeak, kMacroSlip };  // wire values
-
-// Why a method or the daemon stops; the first reason wins. Wire values of
-// BeltGripStatus.StopReason: a new one has a row in the table of daemon/core/input/stop_cause, a
-// value in can_dbc/beltgrip.dbc, a bound in daemon/core/guard/tx_gate and a row in
-// tools/NO_RESULT.md.
-enum class StopReason : std::uint8_t {
-  kNone,
-  kSlope,
-  kConfidence,
-  kSlip,
-  kSlipRate,
-  kSlipEnergy,
-  kTime,
-  kForceFloor,
-  kEngineSpeed,
-  kTorque,
-  kRatio,
-  kInputs,
-  kPermission,
-  kDriver,
-  kBus,
-  kShutdown,
-  kTraceEnd,
-  kClampNotFollowed,  // the force does not follow the request
-  kInputFrozen,
-  kRoom,  // slip left is too little
-  kLag
-};
-inline constexpr std::size_t kStopReasonCount = 21;
 
 // The state after one sample. mu_star and sigma_star_percent are positive in the direction of the
 // torque.

@@ -9,6 +9,7 @@
 #include "estimator/physics/units.h"
 #include "estimator/signal/excitation.h"
 #include "estimator/signal/signal_chain.h"
+#include "estimator/statistics/interval.h"
 
 namespace beltgrip::estimator {
 namespace {

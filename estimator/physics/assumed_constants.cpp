@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/physics/sensor_error.h"
+#include "estimator/statistics/interval.h"
 
 namespace beltgrip::estimator {
 
@@ -69,7 +69,6 @@ std::array<double, kDimensions> steps() {
 }
 
 constexpr double kLeastForce_N = 1.0;
-constexpr double kTail = 0.025;
 
 }  // namespace
 
@@ -160,11 +159,11 @@ bool AssumedConstants::step() noexcept {
       stage_ = Stage::kLow;
       return false;
     case Stage::kLow:
-      spread_.low = quantile(kTail, 0, kMiddle);
+      spread_.low = quantile(kTail95, 0, kMiddle);
       stage_ = Stage::kHigh;
       return false;
     case Stage::kHigh:
-      spread_.high = quantile(1.0 - kTail, kMiddle, kDraws);
+      spread_.high = quantile(kUpper95, kMiddle, kDraws);
       stage_ = Stage::kDone;
       return true;
     case Stage::kDone:

@@ -5,7 +5,6 @@
 
 namespace beltgrip::estimator {
 
-inline constexpr double kNormal95 = 1.959963984540054;  // half width of 95 % in deviations
 inline constexpr double kSmallestStd = 1e-9;  // mu_max_std > 0 holds for data without any noise too
 
 // Standard deviation of mu* relative to mu* from bias and gain of torque and pressure at one

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/statistics/interval.h"
 #include "estimator/statistics/square.h"
 
 namespace beltgrip::estimator {
@@ -29,7 +30,6 @@ constexpr double kForceStep = 0.02;  // relative
 constexpr double kSlipStep_percent = 0.08;
 constexpr double kShortestPoint_s = 0.05;
 constexpr std::size_t kFewestPoints = 5;
-constexpr double kQuantile = 0.025;
 constexpr double kReachedDeviations = 2.7;
 constexpr double kLeastPossible = 1e-3;
 // Curves that are less likely than the best by more than this do not count (of the logarithm), and
@@ -288,7 +288,7 @@ void PeakForecast::conclude() noexcept {
   forecast_ = {};
   // Where next to nothing of them is possible any more, no form is the curve's.
   if (!(sum_ > kLeastPossible * sum_all_)) return;
-  const std::array<double, 3> shares{kQuantile, 0.5, 1.0 - kQuantile};
+  const std::array<double, 3> shares{kTail95, 0.5, kUpper95};
   std::array<double, 3> quantiles{};
   quantiles.fill(top_mu_ * std::exp(kHighest));
   double below = 0.0;

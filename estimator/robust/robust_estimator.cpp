@@ -16,6 +16,7 @@
 #include "estimator/robust/peak_forecast.h"
 #include "estimator/signal/excitation.h"
 #include "estimator/signal/signal_chain.h"
+#include "estimator/statistics/interval.h"
 
 namespace beltgrip::estimator {
 namespace {

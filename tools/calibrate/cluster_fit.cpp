@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/physics/sensor_error.h"
 #include "estimator/statistics/distributions.h"
+#include "estimator/statistics/interval.h"
 
 namespace beltgrip::calibrate {
 
@@ -71,7 +71,8 @@ ClusterFit fit(const Observations& data, const VectorXd& prior_mean, const Vecto
   const VectorXd clustered =
       (inverse * (meat * clusters / (clusters - 1.0) + precision) * inverse).diagonal();
   const VectorXd plain = inverse.diagonal();
-  const double few = estimator::student_quantile(0.975, clusters - 1.0) / estimator::kNormal95;
+  const double few =
+      estimator::student_quantile(estimator::kUpper95, clusters - 1.0) / estimator::kNormal95;
   result.std = few * clustered.cwiseMax(plain).cwiseMax(0.0).cwiseSqrt();
   result.solved = true;
   return result;

@@ -6,8 +6,8 @@
 #include <limits>
 #include <numbers>
 
-#include "estimator/physics/sensor_error.h"
 #include "estimator/statistics/distributions.h"
+#include "estimator/statistics/interval.h"
 #include "tools/calibrate/calibrate.h"
 #include "tools/calibrate/series.h"
 
@@ -113,7 +113,8 @@ Finding pressure_zero(std::span<const diagnose::SignalTable> logs) {
   for (const double each : means) squares += (each - mean) * (each - mean);
   const auto n = static_cast<double>(means.size());
   const double scatter = std::sqrt(squares / (n - 1.0) / n) *
-                         estimator::student_quantile(0.975, n - 1.0) / estimator::kNormal95;
+                         estimator::student_quantile(estimator::kUpper95, n - 1.0) /
+                         estimator::kNormal95;
   // Rounded values that stand still may lie anywhere within their step; noise of more than a step
   // averages the rounding out, by exp(-2 pi^2 (noise / step)^2).
   const double step_square = resolution_Pa * resolution_Pa;

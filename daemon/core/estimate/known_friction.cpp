@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/physics/sensor_error.h"
 #include "estimator/physics/slip.h"
 #include "estimator/physics/units.h"
+#include "estimator/statistics/interval.h"
 
 namespace beltgrip::daemon {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "estimator/method/possible_friction.h"
-#include "estimator/physics/sensor_error.h"
 #include "estimator/physics/slip.h"
+#include "estimator/statistics/interval.h"
 
 namespace beltgrip::daemon {
 

@@ -10,7 +10,6 @@ namespace beltgrip::daemon {
 
 namespace {
 
-constexpr double kStalePeriods = 2.5;
 constexpr double kMissingPeriods = 10.0;
 constexpr Duration kPeriodAssumed = 50 * kMillisecond;  // until it is known
 constexpr Duration kLearningStale = kSecond;            // while the period is being learned
@@ -279,7 +278,7 @@ void InputMonitor::learn(Row& row, MonoTime t) noexcept {
 }
 
 Duration InputMonitor::stale_limit(const Row& row) noexcept {
-  return row.period ? std::max(kStaleMinimum, scaled(*row.period, kStalePeriods)) : kLearningStale;
+  return row.period ? stale_after(*row.period) : kLearningStale;
 }
 
 SignalQuality InputMonitor::judge(const Row& row, MonoTime t) const noexcept {

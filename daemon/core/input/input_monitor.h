@@ -49,7 +49,12 @@ enum class FrameUse : std::uint8_t { kForeign, kTaken, kBad };
 
 class InputMonitor {
  public:
-  static constexpr Duration kStaleMinimum = 50 * kMillisecond;
+  // Silence after which a signal of this period is stale: two and a half periods, and no less than
+  // what a busy bus may take.
+  static constexpr Duration stale_after(Duration period) noexcept {
+    constexpr Duration kLeast = 50 * kMillisecond;
+    return std::max(kLeast, period * 5 / 2);
+  }
   static constexpr std::size_t kLearnIntervals = 8;
   static constexpr Duration kStandstillShown = 600 * kMillisecond;
 

@@ -65,7 +65,7 @@ Stop InputStage::lost(MonoTime t) const noexcept {
 
 bool InputStage::starved(MonoTime t) const noexcept {
   const Duration slowest = std::max(sampler_.delay().value_or(0), sample_period_);
-  return t - last_usable_ > std::max(InputMonitor::kStaleMinimum, slowest * 5 / 2);
+  return t - last_usable_ > InputMonitor::stale_after(slowest);
 }
 
 Stop InputStage::starved_for(MonoTime t) const noexcept {
@@ -90,14 +90,14 @@ Stop InputStage::missing_condition() const noexcept {
 }
 
 Duration InputStage::slowest_stale() const noexcept {
-  Duration slowest = InputMonitor::kStaleMinimum;
+  Duration slowest = 0;
   for (std::size_t i = 0; i < kRoleCount; ++i) {
     const auto role = static_cast<Role>(i);
     const bool idle = role == Role::kOilTemperature || role == Role::kVehicleSpeed;
     if (idle || !monitor_.is_bound(role)) continue;
-    slowest = std::max(slowest, monitor_.period(role).value_or(0) * 5 / 2);
+    slowest = std::max(slowest, monitor_.period(role).value_or(0));
   }
-  return slowest;
+  return InputMonitor::stale_after(slowest);
 }
 
 }  // namespace beltgrip::daemon

@@ -1,0 +1,10 @@
+// How sure an interval is: every interval that leaves the estimator is one of 95 %.
+#pragma once
+
+namespace beltgrip::estimator {
+
+inline constexpr double kTail95 = 0.025;                // left out at either end
+inline constexpr double kUpper95 = 1.0 - kTail95;       // where the upper end lies
+inline constexpr double kNormal95 = 1.959963984540054;  // half width in standard deviations
+
+}  // namespace beltgrip::estimator
