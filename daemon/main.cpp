@@ -50,6 +50,7 @@ struct Arguments {
   std::string log_level = "info";
   std::string record;  // folder; empty: nothing is recorded
   bool print_default_config = false;
+  bool check = false;
 };
 
 MonoTime steady_ns() {
@@ -74,6 +75,21 @@ int next_signal(int descriptor) {
   signalfd_siginfo info{};
   if (read(descriptor, &info, sizeof info) != sizeof info) return 0;
   return static_cast<int>(info.ssi_signo);
+}
+
+// The configuration alone: nothing is opened. What the bus says of it, beltgrip check tells.
+int check(const Arguments& arguments) {
+  const ConfigResult loaded = load_config(arguments.config);
+  for (const std::string& warning : loaded.warnings) complain(warning);
+  for (const ConfigError& error : loaded.errors) complain(error.text);
+  if (!loaded.config) return loaded.exit_code();
+  const Config& config = *loaded.config;
+  std::string text = arguments.config + ": right; bus " + config.interface + ", " +
+                     std::to_string(config.roles.size()) + " roles, control \"" +
+                     (config.control == Control::kCommand ? "command" : "observe") + "\"\n";
+  if (!config.assumed.empty()) text += assumed_text(config) + "\n";
+  std::fputs(can::printable_lines(text).c_str(), stdout);
+  return kDone;
 }
 
 // The port, and the bus behind it where it is the embedded one.
@@ -351,6 +367,9 @@ int main(int argc, char** argv) {
       .type_name("DIR");
   app.add_flag("--print-default-config", arguments.print_default_config,
                "print every key with default, unit and range, and exit");
+  app.add_flag("--check", arguments.check,
+               "say whether the configuration is right, and exit; beltgrip check says whether it "
+               "fits a car");
   switch (app.parse(argc, argv)) {
     case command_line::Parsed::kGoOn:
       break;
@@ -365,7 +384,7 @@ int main(int argc, char** argv) {
     return kDone;
   }
   try {
-    return run(arguments);
+    return arguments.check ? check(arguments) : run(arguments);
   } catch (const std::exception& error) {
     complain(std::string("beltgripd: found an internal error: ") + error.what());
     return kInternal;

@@ -8,6 +8,7 @@
 namespace beltgrip::cli {
 
 void add_calibrate(command_line::Command app);
+void add_check(command_line::Command app);
 void add_history(command_line::Command app);
 void add_init(command_line::Command app);
 void add_monitor(command_line::Command app);

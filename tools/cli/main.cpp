@@ -16,17 +16,6 @@
 namespace beltgrip::cli {
 namespace {
 
-// Named in the interfaces, not built yet: known by name so that the answer is an honest one.
-constexpr const char* kLater[] = {"check"};
-
-void add_later(command_line::Command app) {
-  for (const char* name : kLater) {
-    app.add_hidden_subcommand(name).callback([name] {
-      throw Failure{kConfiguration, std::string(name) + ": not in this version"};
-    });
-  }
-}
-
 // One line for each line of the text; none when everything has been said.
 int fail(const std::string& text, int exit_code) {
   std::fflush(stdout);
@@ -63,6 +52,7 @@ int run(int argc, char** argv) {
   add_can(app);
   add_status(app);
   add_history(app);
+  add_check(app);
   add_calibrate(app);
   add_replay(app);
   add_simulate(app);
@@ -70,7 +60,6 @@ int run(int argc, char** argv) {
   add_dbc(app);
   add_diagnose(app);
   add_report(app);
-  add_later(app);
   app.set_version_of_subcommands("beltgrip " BELTGRIP_VERSION);
   if (const std::string name = unknown_subcommand(app, argc, argv); !name.empty()) {
     return fail("unknown subcommand '" + name + "' (see beltgrip --help)", kUsage);

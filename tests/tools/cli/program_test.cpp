@@ -20,15 +20,6 @@ TEST(Program, HelpsAndNamesItsVersionEverywhere) {
   EXPECT_EQ(beltgrip({"--version"}).out.substr(0, 9), "beltgrip ");
 }
 
-TEST(Program, WhatIsNotThereYetSaysSo) {
-  for (const char* name : {"check"}) {
-    const RunResult result = beltgrip({name, "--whatever", "x"});
-    EXPECT_EQ(result.status, 78) << name;
-    EXPECT_EQ(result.err, std::string("beltgrip: ") + name + ": not in this version\n");
-    EXPECT_EQ(result.out, "");
-  }
-}
-
 TEST(Program, AMistakeOnTheCommandLineIsOneLine) {
   const std::vector<std::vector<std::string>> mistakes = {
       {},

@@ -1,0 +1,327 @@
+// beltgrip check as users call it: healthy drives without a false alarm, and one mistake after the
+// other. What is wrong is known, for the test did it.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/program.h"
+#include "tests/tools/check/drive_log.h"
+
+namespace beltgrip::test {
+namespace {
+
+using nlohmann::json;
+
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+// The findings that contain a part.
+int count(const json& findings, const std::string& part) {
+  int found = 0;
+  for (const auto& each : findings) found += has(each.get<std::string>(), part) ? 1 : 0;
+  return found;
+}
+
+class Check : public testing::Test {
+ protected:
+  // A drive is simulated once for all tests.
+  struct Drive {
+    std::string log, toml, dbc;
+  };
+  static const Drive& drive(const std::string& scenario, const std::string& duration = "") {
+    static std::map<std::string, Drive> drives;
+    Drive& drive = drives[scenario + duration];
+    if (!drive.log.empty()) return drive;
+    const Workplace at;
+    std::vector<std::string> command{"simulate", "--scenario", scenario, "--out-dir",
+                                     at.path("drive")};
+    if (!duration.empty()) {
+      command.emplace_back("--duration");
+      command.push_back(duration);
+    }
+    EXPECT_EQ(beltgrip(command).status, 0);
+    drive = {at.read("drive/trace.log"), at.read("drive/beltgrip.toml"),
+             at.read("drive/vehicle.dbc")};
+    return drive;
+  }
+  static const Drive& city() { return drive("city", "420"); }
+
+  json check(const Drive& drive) const {
+    place.write("trace.log", drive.log);
+    place.write("beltgrip.toml", drive.toml);
+    place.write("vehicle.dbc", drive.dbc);
+    const RunResult text =
+        beltgrip({"check", place.path("trace.log"), "--config", place.path("beltgrip.toml")});
+    EXPECT_EQ(text.status, 0) << text.err;
+    for (std::size_t at = 0; at < text.out.size();) {
+      const std::size_t end = text.out.find('\n', at);
+      const std::string line = text.out.substr(at, end - at);
+      if (!has(line, place.path(""))) {
+        EXPECT_LE(line.size(), 100u) << line;
+      }
+      at = end + 1;
+    }
+    const RunResult result = beltgrip(
+        {"check", place.path("trace.log"), "--config", place.path("beltgrip.toml"), "--json", "-"});
+    EXPECT_EQ(result.status, 0) << result.err;
+    return json::parse(result.out);
+  }
+  static std::string with_role(const std::string& toml, const std::string& role,
+                               const std::string& right) {
+    const std::size_t at = toml.find("\n" + role + " ");
+    EXPECT_NE(at, std::string::npos);
+    const std::size_t end = toml.find('\n', at + 1);
+    return toml.substr(0, at + 1) + (right.empty() ? "" : role + " = " + right) + toml.substr(end);
+  }
+
+  Workplace place;
+};
+
+TEST_F(Check, FindsNothingWrongWithAnyShippedDrive) {
+  for (const char* scenario :
+       {"coast-low", "coast-overdrive", "coast-overdrive-unreachable", "cold-oil",
+        "cruise-drive-torque", "demo", "paper-rig", "worn-belt"}) {
+    SCOPED_TRACE(scenario);
+    const json found = check(drive(scenario));
+    EXPECT_EQ(found["across"].size(), 0u) << found["across"];
+    for (const auto& [role, of] : found["roles"].items()) {
+      EXPECT_EQ(count(of["findings"], "wrong: ") + count(of["findings"], "may be: "), 0)
+          << role << of["findings"];
+      EXPECT_TRUE(of["seen"]);
+      EXPECT_EQ(of["crc_bad"], 0);
+      EXPECT_EQ(of["in_range_share"], 1.0);
+    }
+    EXPECT_NE(found["ready"], "none");
+  }
+}
+
+TEST_F(Check, TellsWhatADriveAllows) {
+  // The daemon ran two experiments in these 34 s.
+  const json demo = check(drive("demo"));
+  EXPECT_EQ(demo["ready"], "command");
+  EXPECT_GE(demo["experiments"]["in_reach"], 2);
+  // Its pressure floor was made so that the peak is out of reach.
+  const json far = check(drive("coast-overdrive-unreachable"));
+  EXPECT_EQ(far["ready"], "observe");
+  EXPECT_EQ(far["experiments"]["in_reach"], 0);
+  EXPECT_GE(far["experiments"]["forbidden_by"]["unreachable"], 1);
+  const std::string sentence = far["sentence"];
+  EXPECT_TRUE(has(sentence, "force floor")) << sentence;
+  // By hand: torque = 2 R_p mu F / cos 11 degrees, in overdrive.
+  const double floor_N = far["experiments"]["floor_N"], needed = far["experiments"]["needed_Nm"];
+  EXPECT_NEAR(needed, 2.0 * 0.07837 * 0.11 * floor_N / 0.981627, 0.01);
+  const json rig = check(drive("paper-rig"));
+  EXPECT_EQ(rig["experiments"]["opportunities"], 1);
+  EXPECT_TRUE(has(rig["sentence"], "lockup_closed")) << rig["sentence"];
+}
+
+TEST_F(Check, TheCityDriveIsHealthyToo) {
+  const json found = check(city());
+  EXPECT_EQ(found["across"].size(), 0u) << found["across"];
+  EXPECT_EQ(found["ready"], "command") << found["sentence"];
+  // Raw steps of the DBC: 0.125 rpm; white noise of the scenario's speed sensors.
+  EXPECT_DOUBLE_EQ(found["roles"]["primary_speed"]["step"], 0.125);
+  EXPECT_NEAR(found["roles"]["primary_speed"]["rate_Hz"], 100.0, 1.0);
+}
+
+TEST_F(Check, LogOfAnotherCar) {
+  Drive other = drive("coast-overdrive");
+  other.log = changed_log(other.log, [](LogFrame& frame) {
+    frame.id += 0x301;
+    return true;
+  });
+  json found = check(other);
+  EXPECT_EQ(found["ready"], "none");
+  EXPECT_TRUE(has(found["sentence"], "another car")) << found["sentence"];
+  EXPECT_FALSE(found["roles"]["primary_speed"]["seen"]);
+  // The same with identifiers nearby: they are named.
+  other.log = changed_log(drive("coast-overdrive").log, [](LogFrame& frame) {
+    frame.id += 1;
+    return true;
+  });
+  found = check(other);
+  EXPECT_EQ(count(found["roles"]["primary_speed"]["findings"], "0x121 (8 bytes, 100 Hz)"), 1)
+      << found["roles"]["primary_speed"]["findings"];
+}
+
+TEST_F(Check, WrongDataId) {
+  Drive wrong = drive("coast-overdrive");
+  wrong.toml = replaced(wrong.toml, "data_id = 0x120", "data_id = 0x012A");
+  const json found = check(wrong);
+  const json& role = found["roles"]["primary_speed"];
+  EXPECT_EQ(found["ready"], "none");
+  EXPECT_EQ(role["crc_bad"], role["frames"]);
+  EXPECT_EQ(count(role["findings"], "data id 0x0120 fits"), 1) << role["findings"];
+  EXPECT_EQ(count(found["roles"]["engine_torque"]["findings"], "CRC"), 0);
+}
+
+TEST_F(Check, SwappedSpeeds) {
+  for (const Drive& right : {city(), drive("coast-overdrive")}) {
+    SCOPED_TRACE(right.log.size());
+    Drive wrong = right;
+    wrong.toml = with_role(wrong.toml, "primary_speed", "\"TCU_Speed.SecondarySpeed\"");
+    wrong.toml = with_role(wrong.toml, "secondary_speed", "\"TCU_Speed.PrimarySpeed\"");
+    json found = check(wrong);
+    EXPECT_EQ(found["ready"], "none") << found["sentence"];
+    EXPECT_EQ(count(found["across"], "wrong: primary_speed and secondary_speed are swapped"), 1)
+        << found["across"];
+    // Without a witness it may be so.
+    wrong.toml = with_role(with_role(wrong.toml, "engine_speed", ""), "vehicle_speed", "");
+    wrong.toml = replaced(wrong.toml, "control = \"command\"", "control = \"observe\"");
+    found = check(wrong);
+    EXPECT_EQ(count(found["across"], "swapped?"), 1) << found["across"];
+  }
+}
+
+TEST_F(Check, UnitsOfSpeeds) {
+  Drive wrong = city();
+  const std::string primary = "{ signal = \"TCU_Speed.PrimarySpeed\", unit = \"rad/s\" }";
+  const std::string secondary = "{ signal = \"TCU_Speed.SecondarySpeed\", unit = \"rad/s\" }";
+  wrong.toml = with_role(wrong.toml, "primary_speed", primary);
+  json found = check(wrong);
+  EXPECT_EQ(found["ready"], "none");
+  EXPECT_EQ(count(found["roles"]["primary_speed"]["findings"], "1/min read as rad/s?"), 1)
+      << found["roles"]["primary_speed"];
+  EXPECT_EQ(count(found["across"], "primary 1/min read as rad/s"), 1) << found["across"];
+  wrong.toml = with_role(wrong.toml, "secondary_speed", secondary);
+  found = check(wrong);
+  EXPECT_EQ(found["ready"], "none");
+  EXPECT_GE(count(found["across"], "1/min"), 1) << found["across"];
+  // A DBC without units: nothing but the values tells.
+  wrong.dbc = replaced(replaced(wrong.dbc, "[0|8000] \"rpm\"  ECU", "[0|8000] \"\"  ECU"),
+                       "[0|8000] \"rpm\"  ECU", "[0|8000] \"\"  ECU");
+  found = check(wrong);
+  EXPECT_EQ(found["ready"], "none");
+}
+
+TEST_F(Check, SignOfTheTorque) {
+  for (const Drive& right : {city(), drive("coast-overdrive")}) {
+    Drive wrong = right;
+    wrong.toml = with_role(wrong.toml, "engine_torque",
+                           "{ signal = \"ECU_Engine.EngineTorque\", scale = -1 }");
+    const json found = check(wrong);
+    EXPECT_EQ(count(found["across"], "engine_torque: sign?"), 1) << found["across"];
+  }
+  Drive wrong = city();
+  wrong.toml = with_role(wrong.toml, "engine_torque",
+                         "{ signal = \"ECU_Engine.EngineTorque\", scale = -1 }");
+  EXPECT_EQ(check(wrong)["ready"], "none");
+}
+
+TEST_F(Check, AnotherPressure) {
+  Drive wrong = city();
+  wrong.toml = with_role(wrong.toml, "secondary_pressure", "\"TCU_Pressure.PrimaryPressure\"");
+  json found = check(wrong);
+  EXPECT_GE(count(found["across"], "pressure"), 1) << found["across"];
+  // kPa for bar.
+  wrong.toml = with_role(city().toml, "secondary_pressure",
+                         "{ signal = \"TCU_Pressure.SecondaryPressure\", unit = \"kPa\" }");
+  found = check(wrong);
+  EXPECT_GE(count(found["roles"]["secondary_pressure"]["findings"], "kPa"), 1) << found["roles"];
+  EXPECT_GE(count(found["across"], "unit of pressure"), 1) << found["across"];
+}
+
+TEST_F(Check, BrakeAsLockUp) {
+  Drive wrong = city();
+  wrong.toml = with_role(wrong.toml, "lockup_closed", "\"ESP_Vehicle.BrakePressed\"");
+  json found = check(wrong);
+  EXPECT_EQ(found["ready"], "none");
+  EXPECT_EQ(count(found["across"], "brake_pressed and lockup_closed are one signal"), 1)
+      << found["across"];
+  EXPECT_EQ(count(found["across"], "would stall the engine"), 1) << found["across"];
+}
+
+TEST_F(Check, AStuckCounter) {
+  Drive wrong = drive("coast-overdrive");
+  wrong.log = changed_log(wrong.log, [](LogFrame& frame) {
+    if (frame.id != 0x130) return true;
+    frame.data[7] = static_cast<std::uint8_t>((frame.data[7] & 0x0F) | 0x50);
+    frame.data[6] = crc_of(frame, 0x130, 6);
+    return true;
+  });
+  const json found = check(wrong);
+  const json& role = found["roles"]["secondary_pressure"];
+  EXPECT_EQ(role["crc_bad"], 0);
+  EXPECT_EQ(count(role["findings"], "wrong: counter of TCU_Pressure stands still"), 1)
+      << role["findings"];
+  EXPECT_EQ(found["ready"], "none");
+}
+
+TEST_F(Check, AGapEveryMinute) {
+  Drive wrong = city();
+  wrong.log = changed_log(wrong.log, [](LogFrame& frame) {
+    return frame.id != 0x130 || std::fmod(frame.t_s, 60.0) > 1.0;
+  });
+  const json found = check(wrong);
+  const json& role = found["roles"]["secondary_pressure"];
+  EXPECT_NEAR(role["longest_gap_s"], 1.01, 0.02);
+  EXPECT_EQ(count(role["findings"], "6 gaps"), 1) << role["findings"];
+  EXPECT_EQ(count(role["findings"], "one every 60 s"), 1) << role["findings"];
+  EXPECT_EQ(count(found["roles"]["primary_speed"]["findings"], "gap"), 0);
+}
+
+TEST_F(Check, TorqueInPercent) {
+  Drive wrong = drive("coast-overdrive");
+  wrong.dbc = replaced(wrong.dbc, "[-500|500] \"Nm\"", "[-100|100] \"%\"");
+  wrong.toml = with_role(wrong.toml, "engine_torque",
+                         "{ signal = \"ECU_Engine.EngineTorque\", unit = \"Nm\" }");
+  json found = check(wrong);
+  EXPECT_EQ(count(found["roles"]["engine_torque"]["findings"], "the DBC says \"%\""), 1)
+      << found["roles"]["engine_torque"];
+  // Without a unit there: the range may tell.
+  wrong.dbc = replaced(wrong.dbc, "[-100|100] \"%\"", "[-100|100] \"\"");
+  found = check(wrong);
+  EXPECT_EQ(count(found["roles"]["engine_torque"]["findings"], "percent of a reference torque"), 1)
+      << found["roles"]["engine_torque"];
+}
+
+TEST_F(Check, ATableOfSignalsIsNoLog) {
+  place.write("beltgrip.toml", drive("coast-overdrive").toml);
+  place.write("vehicle.dbc", drive("coast-overdrive").dbc);
+  place.write("table.csv", "PrimarySpeed,SecondarySpeed\nrpm,rpm\n1200,2700\n1201,2702\n");
+  const RunResult result =
+      beltgrip({"check", place.path("table.csv"), "--config", place.path("beltgrip.toml")});
+  EXPECT_EQ(result.status, 65);
+  EXPECT_EQ(lines(result.err), 1) << result.err;
+  EXPECT_TRUE(has(result.err, "table of signals")) << result.err;
+}
+
+TEST_F(Check, AFrozenSpeed) {
+  Drive wrong = drive("coast-overdrive");
+  std::vector<std::uint8_t> last;
+  wrong.log = changed_log(wrong.log, [&last](LogFrame& frame) {
+    if (frame.id != 0x120) return true;
+    if (frame.t_s < 6.0 || frame.t_s > 12.0) {
+      last = {frame.data[0], frame.data[1]};
+    } else {
+      std::copy(last.begin(), last.end(), frame.data.begin());
+      frame.data[6] = crc_of(frame, 0x120, 6);
+    }
+    return true;
+  });
+  const json found = check(wrong);
+  const json& role = found["roles"]["primary_speed"];
+  EXPECT_NEAR(role["stuck_s"], 6.0, 0.05);
+  EXPECT_EQ(count(role["findings"], "wrong: stood at"), 1) << role["findings"];
+}
+
+TEST_F(Check, TheConfigurationAlone) {
+  place.write("beltgrip.toml", drive("coast-overdrive").toml);
+  place.write("vehicle.dbc", drive("coast-overdrive").dbc);
+  const RunResult result = beltgrip({"check", "--config", place.path("beltgrip.toml")});
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_TRUE(has(result.out, "by the configuration alone")) << result.out;
+  place.write("wrong.toml", "[bus]\nspeed = 1\n");
+  EXPECT_EQ(beltgrip({"check", "--config", place.path("wrong.toml")}).status, 78);
+  EXPECT_EQ(
+      beltgrip({"check", place.path("none.log"), "--config", place.path("beltgrip.toml")}).status,
+      66);
+  EXPECT_EQ(beltgrip({"check", place.path("none.log"), "--live", "1", "--config",
+                      place.path("beltgrip.toml")})
+                .status,
+            64);
+}
+
+}  // namespace
+}  // namespace beltgrip::test

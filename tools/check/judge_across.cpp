@@ -1,0 +1,417 @@
+#include "tools/check/judge_across.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "estimator/method/possible_friction.h"
+#include "tools/check/text.h"
+#include "tools/check/thresholds.h"
+
+namespace beltgrip::check {
+
+namespace {
+
+double share_of(const std::vector<double>& values, const auto& holds) {
+  if (values.empty()) return 0.0;
+  return static_cast<double>(std::count_if(values.begin(), values.end(), holds)) /
+         static_cast<double>(values.size());
+}
+
+// Relative distance between the quarters.
+double spread_of(const std::vector<double>& values) {
+  return quantile(values, 0.9) / quantile(values, 0.1) - 1.0;
+}
+
+double correlation(const std::vector<double>& x, const std::vector<double>& y) {
+  const auto n = static_cast<double>(x.size());
+  double mx = 0.0, my = 0.0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    mx += x[i] / n;
+    my += y[i] / n;
+  }
+  double xx = 0.0, yy = 0.0, xy = 0.0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    xx += (x[i] - mx) * (x[i] - mx);
+    yy += (y[i] - my) * (y[i] - my);
+    xy += (x[i] - mx) * (y[i] - my);
+  }
+  return xx > 0.0 && yy > 0.0 ? xy / std::sqrt(xx * yy) : 0.0;
+}
+
+double deviation(const std::vector<double>& values) {
+  double mean = 0.0, square = 0.0;
+  for (const double v : values) mean += v / static_cast<double>(values.size());
+  for (const double v : values) square += (v - mean) * (v - mean);
+  return values.empty() ? 0.0 : std::sqrt(square / static_cast<double>(values.size()));
+}
+
+class Across {
+ public:
+  Across(const std::vector<Window>& windows, const daemon::Config& config)
+      : windows_(windows), config_(config) {}
+
+  Findings run() {
+    one_signal_twice();
+    doubtful_ = speeds();
+    if (!doubtful_) lockup();
+    torque_sign();
+    if (!doubtful_) {
+      carried();
+      pressure_course();
+      pressure_command();
+    }
+    return found_;
+  }
+
+ private:
+  void wrong(std::string text) { found_.push_back({Weight::kWrong, std::move(text)}); }
+  void doubt(std::string text) { found_.push_back({Weight::kDoubt, std::move(text)}); }
+  void note(std::string text) { found_.push_back({Weight::kNote, std::move(text)}); }
+
+  std::vector<double> ratio_of(Role above, Role below, bool closed_only) const;
+  bool is_bound(Role role) const {
+    return std::any_of(config_.roles.begin(), config_.roles.end(),
+                       [role](const daemon::RoleBinding& each) { return each.role == role; });
+  }
+  Role torque_role() const {
+    return config_.estimator.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque;
+  }
+  bool is_assumed(const char* key) const {
+    return std::find(config_.assumed.begin(), config_.assumed.end(), std::string(key)) !=
+           config_.assumed.end();
+  }
+  void one_signal_twice();
+  bool speeds();
+  void lockup();
+  void torque_sign();
+  void carried();
+  void pressure_course();
+  void pressure_command();
+
+  const std::vector<Window>& windows_;
+  const daemon::Config& config_;
+  Findings found_;
+  bool doubtful_ = false;
+};
+
+void Across::one_signal_twice() {
+  for (const daemon::RoleBinding& a : config_.roles) {
+    for (const daemon::RoleBinding& b : config_.roles) {
+      if (a.role >= b.role || a.uds || b.uds || a.id != b.id || a.bus != b.bus) continue;
+      if (a.signal_name != b.signal_name || a.true_when != b.true_when) continue;
+      const auto engine_for_turbine = [](Role x, Role y) {  // a lock-up that is closed for good
+        return x == Role::kPrimarySpeed && y == Role::kEngineSpeed;
+      };
+      if (engine_for_turbine(a.role, b.role)) continue;
+      wrong(std::string(daemon::role_name(a.role)) + " and " +
+            std::string(daemon::role_name(b.role)) + " are one signal, " + a.message_name + "." +
+            a.signal_name);
+    }
+  }
+}
+
+// Of the windows in which both turn.
+std::vector<double> Across::ratio_of(Role above, Role below, bool closed_only) const {
+  std::vector<double> ratios;
+  for (const Window& window : windows_) {
+    if (!(window[above] > 0.0) || !(window[below] > 0.0)) continue;
+    const bool shaft = above != Role::kVehicleSpeed;
+    if (window[below] < kMoving_rad_s && (shaft ? window[above] : kMoving_rad_s) < kMoving_rad_s) {
+      continue;
+    }
+    if (closed_only && !(window[Role::kLockupClosed] == 1.0)) continue;
+    ratios.push_back(window[above] / window[below]);
+  }
+  return ratios;
+}
+
+// True: something is wrong with them, and what rests on them would accuse others.
+bool Across::speeds() {
+  const std::vector<double> ratio = ratio_of(Role::kSecondarySpeed, Role::kPrimarySpeed, false);
+  if (ratio.size() < kWindowsLeast) return false;
+  const double low = config_.variator.ratio_low, overdrive = config_.variator.ratio_overdrive;
+  const auto inside = [&](double factor, bool inverted) {
+    return share_of(ratio, [&](double r) {
+      const double as_meant = factor * (inverted ? 1.0 / r : r);
+      return as_meant > low * (1.0 - kStopBand) && as_meant < overdrive * (1.0 + kStopBand);
+    });
+  };
+  const double least = quantile(ratio, 0.01), most = quantile(ratio, 0.99);
+  const std::string stops =
+      format("%.3g to %.3g", low, overdrive) +
+      (is_assumed("variator.ratio_low") || is_assumed("variator.ratio_overdrive") ? " (assumed)"
+                                                                                  : "");
+
+  // Which pulley turns with the wheels, and which with the engine.
+  const std::vector<double> by_secondary =
+      ratio_of(Role::kVehicleSpeed, Role::kSecondarySpeed, false);
+  const std::vector<double> by_primary = ratio_of(Role::kVehicleSpeed, Role::kPrimarySpeed, false);
+  const bool closed_only = is_bound(Role::kLockupClosed);
+  const std::vector<double> engine_primary =
+      ratio_of(Role::kEngineSpeed, Role::kPrimarySpeed, closed_only);
+  const std::vector<double> engine_secondary =
+      ratio_of(Role::kEngineSpeed, Role::kSecondarySpeed, closed_only);
+  const auto is_one = [](const std::vector<double>& values) {
+    return values.size() >= kWindowsLeast && std::abs(quantile(values, 0.5) - 1.0) < kSameSpeed &&
+           share_of(values, [](double r) { return std::abs(r - 1.0) < 4.0 * kSameSpeed; }) > 0.8;
+  };
+  const bool wheels_by_primary = by_primary.size() >= kWindowsLeast &&
+                                 spread_of(by_primary) < kFinalDriveSpread &&
+                                 spread_of(by_secondary) > kOtherSpread;
+  const bool engine_by_secondary = is_one(engine_secondary) && !is_one(engine_primary);
+  if (wheels_by_primary || engine_by_secondary) {
+    wrong(std::string("primary_speed and secondary_speed are swapped: ") +
+          (wheels_by_primary
+               ? format("the vehicle's speed keeps to the primary within %.1f %%, to the "
+                        "secondary within %.0f %%",
+                        100.0 * spread_of(by_primary), 100.0 * spread_of(by_secondary))
+               : format("the engine turns %.3f times as fast as the secondary, %.3f times as "
+                        "fast as the primary",
+                        quantile(engine_secondary, 0.5), quantile(engine_primary, 0.5))));
+    return true;
+  }
+
+  const double inside_share = inside(1.0, false);
+  if (inside_share < kInStopsLeast) {
+    struct Reading {
+      const char* text;
+      double factor;
+      bool inverted;
+    };
+    constexpr std::array kReadings{
+        Reading{"primary and secondary swapped", 1.0, true},
+        Reading{"primary 1/min read as rad/s (or secondary rad/s as 1/min)", kPerMinute, false},
+        Reading{"primary rad/s read as 1/min (or secondary 1/min as rad/s)", 1.0 / kPerMinute,
+                false}};
+    std::string causes;
+    for (const Reading& reading : kReadings) {
+      if (inside(reading.factor, reading.inverted) < kExplains) continue;
+      causes += (causes.empty() ? "" : ", or ") + std::string(reading.text);
+    }
+    const std::string text =
+        format("speed ratio %.3g to %.3g, end stops %s: ", least, most, stops.c_str());
+    if (!causes.empty()) {
+      wrong(text + causes + "?");
+    } else if (quantile(ratio, 0.5) < low * (1.0 - kStopBand) ||
+               quantile(ratio, 0.5) > overdrive * (1.0 + kStopBand)) {
+      wrong(text + "a scale of one speed, or the end stops are another variator's");
+    } else {
+      doubt(text + format("%.0f %% of the time beyond them; a scale, or another variator's stops",
+                          100.0 * (1.0 - inside_share)));
+    }
+    return true;
+  }
+
+  // A ratio that stays where a stop would be if the shafts were swapped.
+  const auto near = [](double a, double b) { return std::abs(a / b - 1.0) < kStopBand; };
+  const auto stays_at = [&](double a, double b) {
+    return share_of(ratio, [&](double r) { return near(r, a) || near(r, b); });
+  };
+  if (stays_at(1.0 / low, 1.0 / overdrive) > kStaysLeast && stays_at(low, overdrive) < kPasses &&
+      !is_one(engine_primary)) {
+    doubt(
+        format("speed ratio stays at %.3f: at no end stop (%s), but 1 / %.3f is at one; primary "
+               "and secondary swapped?",
+               quantile(ratio, 0.5), stops.c_str(), quantile(ratio, 0.5)));
+    return true;
+  }
+
+  // Level by the wheels.
+  if (by_secondary.size() >= kWindowsLeast) {
+    const double radius_m = quantile(by_secondary, 0.5);
+    if (radius_m < kFinalDriveLeast_m || radius_m > kFinalDriveMost_m) {
+      const double per_minute = radius_m < kFinalDriveLeast_m ? kPerMinute : 1.0 / kPerMinute;
+      const double with = radius_m * per_minute;
+      const bool by_unit = with > kFinalDriveLeast_m && with < kFinalDriveMost_m;
+      wrong(format("the car goes %.3g m a radian of the secondary, cars go 0.04 to 0.08 m: ",
+                   radius_m) +
+            (by_unit ? radius_m < kFinalDriveLeast_m ? "speeds in 1/min read as rad/s?"
+                                                     : "speeds in rad/s read as 1/min?"
+                     : "unit or scale of vehicle_speed or secondary_speed?"));
+      return true;
+    }
+  }
+  // The engine against the primary.
+  if (engine_primary.size() >= kWindowsLeast && closed_only && !is_one(engine_primary)) {
+    const double usual_engine = quantile(engine_primary, 0.5);
+    if (near(usual_engine, kPerMinute) || near(usual_engine, 1.0 / kPerMinute)) {
+      wrong(
+          format("the engine turns %.3f times as fast as the primary with the lock-up closed: "
+                 "1/min and rad/s mixed up?",
+                 usual_engine));
+    }
+  }
+  return false;
+}
+
+// A lock-up clutch that is closed while the car stands would stall the engine; one that is closed
+// makes engine and primary one shaft.
+void Across::lockup() {
+  if (!is_bound(Role::kLockupClosed)) return;
+  double standing_s = 0.0, closed_s = 0.0, braked_s = 0.0;
+  for (const Window& window : windows_) {
+    if (!(window[Role::kLockupClosed] > 0.99)) continue;
+    closed_s += kWindow_s;
+    const double secondary = window[Role::kSecondarySpeed];
+    if (std::isfinite(secondary) && std::abs(secondary) < kStanding_rad_s) standing_s += kWindow_s;
+    if (window[Role::kBrakePressed] > 0.5) braked_s += kWindow_s;
+  }
+  const std::vector<double> engine = ratio_of(Role::kEngineSpeed, Role::kPrimarySpeed, true);
+  const double together =
+      share_of(engine, [](double r) { return std::abs(r - 1.0) < 4.0 * kSameSpeed; });
+  const bool apart = engine.size() >= kWindowsLeast && together < 0.5 &&
+                     std::abs(quantile(engine, 0.5) - 1.0) < 1.0;
+  if (standing_s >= kStandsClosed_s) {
+    wrong(
+        format("lockup_closed for %.1f s while the secondary stands: a closed lock-up would stall "
+               "the engine; is it the brake, or true_when the wrong way round?",
+               standing_s));
+  } else if (apart) {
+    wrong(
+        format("with lockup_closed the engine turns %.3g times as fast as the primary, and within "
+               "%.0f %% of it for %.0f %% of the time only: another signal, or true_when",
+               quantile(engine, 0.5), 400.0 * kSameSpeed, 100.0 * together));
+  } else if (closed_s > kStandsClosed_s && is_bound(Role::kBrakePressed) &&
+             braked_s > kCrcWrongShare * closed_s && braked_s > 0.9 * closed_s) {
+    doubt(format("lockup_closed only while the brake is pressed (%.1f of %.1f s): is it the brake?",
+                 braked_s, closed_s));
+  }
+}
+
+void Across::torque_sign() {
+  const Role role = torque_role();
+  std::vector<double> torque, acceleration, pressed, released;
+  for (const Window& window : windows_) {
+    const double now = window[role];
+    // The wheels', or of both pulleys the one that is there.
+    const double turns = window[Role::kSecondarySpeed];
+    if (!std::isfinite(now) || !(turns > kMoving_rad_s)) continue;
+    if (window[Role::kBrakePressed] > 0.0) continue;
+    torque.push_back(now);
+    acceleration.push_back(window.rate(Role::kSecondarySpeed) / turns);
+    const double pedal = window[Role::kAcceleratorPedal];
+    const bool locked = !(window[Role::kLockupClosed] < 1.0);
+    if (pedal > kPedalPressed) pressed.push_back(now);
+    if (pedal < kPedalReleased && locked && window[Role::kPrimarySpeed] > 100.0) {
+      released.push_back(now);
+    }
+  }
+  const double usual_pressed = quantile(pressed, 0.5), usual_released = quantile(released, 0.5);
+  const bool against_pedal = pressed.size() >= kWindowsLeast && usual_pressed < -kTorqueSigned_Nm;
+  const bool against_release =
+      released.size() >= kWindowsLeast && usual_released > kTorqueSigned_Nm;
+  const double together = torque.size() >= 4 * kWindowsLeast && deviation(torque) > kTorqueSpread_Nm
+                              ? correlation(torque, acceleration)
+                              : 0.0;
+  const std::string name(daemon::role_name(role));
+  std::string text;
+  if (against_pedal) {
+    text += format("%.0f Nm with the accelerator pressed", usual_pressed);
+  }
+  if (against_release) {
+    text += (text.empty() ? "" : ", ") + format("%+.0f Nm with it released", usual_released);
+  }
+  if (together < kTorqueAgainst) {
+    text += (text.empty() ? "" : ", ") +
+            format("the car gains speed as the torque falls (correlation %.2f)", together);
+  }
+  if (text.empty()) return;
+  // Cruise control drives with the pedal released; downhill a car gains speed in overrun.
+  const bool sure = against_pedal || (against_release && together < kTorqueAgainst);
+  if (sure) {
+    wrong(name + ": sign? " + text);
+  } else {
+    doubt(name + ": sign? " + text);
+  }
+}
+
+// Friction as read where the belt does not slip.
+void Across::carried() {
+  std::vector<double> friction;
+  for (const Window& window : windows_) {
+    if (!std::isfinite(window.mu_star) || !(std::abs(window[torque_role()]) > 10.0)) continue;
+    friction.push_back(window.mu_star);
+  }
+  if (friction.size() < kWindowsLeast) return;
+  const double high = quantile(friction, 1.0 - kCarriedShare);
+  const double most = config_.friction_is_assumed ? estimator::kMuReadMost : estimator::kMuMost;
+  const std::string text = format(
+      "the belt is read as carrying a friction of %.3g at an end stop; belts have %.2f to "
+      "%.2f",
+      high, estimator::kBeltLeast, estimator::kBeltMost);
+  const std::string causes =
+      ": unit of pressure (kPa for bar?) or torque, another pressure, piston area or radius";
+  if (high > most) {
+    wrong(text + causes);
+  } else if (high > estimator::kBeltMost) {
+    doubt(text + causes);
+  }
+}
+
+// At equal torque the secondary's pressure falls toward overdrive, as the belt runs farther out on
+// the primary; the primary's rises.
+void Across::pressure_course() {
+  std::vector<std::array<double, 3>> rows;  // log ratio, torque, log pressure
+  for (const Window& window : windows_) {
+    const double primary = window[Role::kPrimarySpeed], secondary = window[Role::kSecondarySpeed];
+    const double pressure = window[Role::kSecondaryPressure], torque = window[torque_role()];
+    if (!(primary > kMoving_rad_s) || !(secondary > kMoving_rad_s) || !(pressure > 0.0)) continue;
+    if (!(std::abs(torque) > 10.0)) continue;
+    rows.push_back({std::log(secondary / primary), std::log(std::abs(torque)), std::log(pressure)});
+  }
+  if (rows.size() < 8 * kWindowsLeast) return;
+  const auto n = static_cast<double>(rows.size());
+  std::array<double, 3> mean{};
+  for (const auto& row : rows) {
+    for (std::size_t k = 0; k < 3; ++k) mean[k] += row[k] / n;
+  }
+  double rr = 0.0, tt = 0.0, rt = 0.0, rp = 0.0, tp = 0.0, pp = 0.0;
+  for (const auto& row : rows) {
+    const double r = row[0] - mean[0], t = row[1] - mean[1], p = row[2] - mean[2];
+    rr += r * r / n, tt += t * t / n, rt += r * t / n;
+    rp += r * p / n, tp += t * p / n, pp += p * p / n;
+  }
+  const double determinant = rr * tt - rt * rt;
+  if (std::sqrt(rr) < kRatioSpread || determinant < 0.2 * rr * tt) return;
+  const double by_ratio = (rp * tt - tp * rt) / determinant;
+  const double by_torque = (tp * rr - rp * rt) / determinant;
+  const double rest = pp - by_ratio * rp - by_torque * tp;
+  const double explained = pp > 0.0 ? 1.0 - rest / pp : 0.0;
+  if (by_ratio > kPressureRises && explained > kCorrelationSure * kCorrelationSure) {
+    doubt(
+        format("secondary_pressure rises toward overdrive at equal torque (as ratio to the power "
+               "%.2f); there it falls: primary for secondary pressure?",
+               by_ratio));
+  } else if (by_torque < -kPressureRises && explained > kCorrelationSure * kCorrelationSure) {
+    doubt(
+        format("secondary_pressure falls where torque rises (as torque to the power %.2f): "
+               "another pressure?",
+               by_torque));
+  }
+}
+
+void Across::pressure_command() {
+  std::vector<double> share;
+  for (const Window& window : windows_) {
+    const double is = window[Role::kSecondaryPressure],
+                 wanted = window[Role::kSecondaryPressureCommand];
+    if (is > 0.0 && wanted > 0.0) share.push_back(is / wanted);
+  }
+  if (share.size() < kWindowsLeast) return;
+  const double usual = quantile(share, 0.5);
+  if (usual > 1.5 || usual < 1.0 / 1.5) {
+    doubt(format("secondary_pressure is %.3g times its command: a unit, or another pressure?",
+                 usual));
+  }
+}
+
+}  // namespace
+
+Findings judge_across(const std::vector<Window>& windows, const daemon::Config& config) {
+  return Across(windows, config).run();
+}
+
+}  // namespace beltgrip::check

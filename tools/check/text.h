@@ -1,0 +1,35 @@
+// Numbers as a person reads them. Tools only.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+namespace beltgrip::check {
+
+inline std::string format(const char* pattern, auto... values) {
+  std::array<char, 400> line;
+  std::snprintf(line.data(), line.size(), pattern, values...);
+  return line.data();
+}
+
+// "7,280"
+inline std::string grouped(double value) {
+  std::string digits = format("%.0f", std::abs(value));
+  for (std::size_t at = digits.size(); at > 3; at -= 3) digits.insert(at - 3, ",");
+  return (value < 0.0 && digits != "0" ? "-" : "") + digits;
+}
+
+// To four digits, without an exponent where there need be none.
+inline std::string number(double value) {
+  if (!std::isfinite(value)) return "-";
+  if (value == 0.0) return "0";
+  const double magnitude = std::abs(value);
+  if (magnitude >= 9999.5) return grouped(value);
+  std::string text = format("%.4g", value);
+  if (text.find('e') != std::string::npos && magnitude >= 1e-4) text = format("%.6f", value);
+  return text;
+}
+
+}  // namespace beltgrip::check

@@ -1,0 +1,85 @@
+// Every number that decides what `beltgrip check` says: value, unit in the name, origin. "derived"
+// says from what, "measured" where, "chosen" why. Tools only.
+#pragma once
+
+namespace beltgrip::check {
+
+// --- frames -------------------------------------------------------------------------------------
+// Derived: a CRC of the wrong data id fits one frame in 256 by chance.
+inline constexpr double kCrcWrongShare = 0.5;
+// Chosen: an id of another car lies close by when it differs by a few in its last digits.
+inline constexpr unsigned kSimilarIdDistance = 0x10;
+inline constexpr int kSimilarShown = 3;
+// Derived: as daemon/core/input/frame_guard.h judges a rate.
+inline constexpr double kRateSlow = 1.0 / 1.75, kRateFast = 1.0 / 0.65;
+// Derived: as the daemon's inputs grow stale (interfaces: 50 ms, or 2.5 periods).
+inline constexpr double kGapLeast_s = 0.05, kGapPeriods = 2.5;
+// Chosen: from here on gaps are told of as coming at regular times; scatter by their median.
+inline constexpr int kRegularGaps = 3;
+inline constexpr double kRegularScatter = 0.1;
+// Derived: the sampler waits for at most 50 ms (daemon/core/input/sampler.h), of a slower signal
+// the slope is followed.
+inline constexpr double kRateLeast_Hz = 10.0;
+
+// --- values of one role -------------------------------------------------------------------------
+// Chosen: a few values at the edge of the range are the signal's "not available" at start-up.
+inline constexpr double kInRangeLeast = 0.99;
+// Chosen: no engine of a passenger car turns faster, no secondary pulley at 250 km/h either
+// (variator-facts: some 48 1/min a km/h).
+inline constexpr double kPrimaryMost_rad_s = 1050.0, kSecondaryMost_rad_s = 1700.0;
+// Chosen: below 525 1/min no engine with a closed lock-up clutch runs.
+inline constexpr double kPrimaryLeast_rad_s = 55.0;
+// Derived: the windows of production sensors end at 9.6 MPa (variator-facts 2.2, K31x).
+inline constexpr double kPressureMost_Pa = 10e6;
+// Derived: no pump idles its secondary pulley below 0.1 MPa in drive; 20 kPa leaves room for a
+// bench (variator-facts 2.2: 0.1 to 0.65 MPa at idle).
+inline constexpr double kPressureLeast_Pa = 10e3;
+inline constexpr double kTorqueMost_Nm = 1000.0;
+inline constexpr double kSpeedMost_m_s = 90.0;
+inline constexpr double kOilLeast_degC = -50.0, kOilMost_degC = 170.0;
+// Derived: 32 1/min a bit opens the paper's gate for good, 3 1/min do not (variator-facts 1.4).
+inline constexpr double kSpeedStepMost_rad_s = 1.0;
+// Chosen: a few hundred newtons of clamp force, a third of it in a coast-down.
+inline constexpr double kPressureStepMost_Pa = 30e3;
+// Chosen: no sensor of a shaft that changes its speed repeats a value for so long.
+inline constexpr double kStuck_s = 0.5;
+// Derived: while the other pulley moved by this the ratio would have left its end stop's band.
+inline constexpr double kOtherMoved = 0.03;
+// Chosen: a signal that never changed in so long is named.
+inline constexpr double kConstantFor_s = 20.0;
+
+// --- across roles, on windows of half a second --------------------------------------------------
+inline constexpr double kWindow_s = 0.5;
+inline constexpr std::size_t kWindowsLeast = 6;
+// Derived: slip, deformation and wear move the ratio by less beyond its end stops.
+inline constexpr double kStopBand = 0.04;
+// Measured (city): 2 % of the windows, at walking speed, lie beyond the stops of a healthy car.
+inline constexpr double kInStopsLeast = 0.95, kExplains = 0.95;
+// Chosen: a car stays at an end stop for long, and passes other ratios.
+inline constexpr double kStaysLeast = 0.5, kPasses = 0.05;
+// Chosen: an engine with a closed lock-up turns with the primary pulley to within noise and delay.
+inline constexpr double kSameSpeed = 0.015;
+// Measured (city, both ways round): the spread of vehicle speed over the pulley that drives the
+// wheels is 2 %, over the other it is what the ratio moved by.
+inline constexpr double kFinalDriveSpread = 0.06, kOtherSpread = 0.20;
+// Derived: 0.30 m wheel radius over a final drive of 4 to 7: 0.043 to 0.075 m; doubled for trucks.
+inline constexpr double kFinalDriveLeast_m = 0.02, kFinalDriveMost_m = 0.16;
+inline constexpr double kPerMinute = 9.549296585513721;  // 1/min in a rad/s
+// Chosen: below these a car stands.
+inline constexpr double kStanding_rad_s = 5.0, kMoving_rad_s = 40.0;
+inline constexpr double kStandsClosed_s = 2.0;
+// Measured (all shipped scenarios: +0.75 and more where torque moves by 15 Nm).
+inline constexpr double kTorqueSpread_Nm = 10.0;
+inline constexpr double kTorqueAgainst = -0.5;
+inline constexpr double kPedalPressed = 0.15, kPedalReleased = 0.02;
+inline constexpr double kTorqueSigned_Nm = 8.0;
+// Derived: at the belt's best friction (0.15) a belt would slip; as read beyond it, a unit or a
+// constant is wrong. estimator/method/possible_friction.h.
+inline constexpr double kCarriedShare = 0.05;  // of the windows
+// Measured (city): secondary pressure at equal torque falls toward overdrive by -0.2 and less,
+// primary pressure rises by +0.3 and more, in log(pressure) a log(ratio).
+inline constexpr double kPressureRises = 0.15;
+inline constexpr double kRatioSpread = 0.15;  // standard deviation of log(ratio), for that
+inline constexpr double kCorrelationSure = 0.5;
+
+}  // namespace beltgrip::check

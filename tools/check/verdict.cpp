@@ -1,0 +1,178 @@
+#include "tools/check/verdict.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+#include "tools/check/judge_across.h"
+#include "tools/check/text.h"
+
+namespace beltgrip::check {
+
+namespace {
+
+// What a request for force needs beyond what observing does (daemon/core/config demands them where
+// experiment.control is "command").
+constexpr std::array kForCommand{Role::kExperimentPermitted, Role::kAcceleratorPedal,
+                                 Role::kBrakePressed,        Role::kLockupClosed,
+                                 Role::kOilTemperature,      Role::kVehicleSpeed};
+
+std::string first_wrong(const Findings& findings) {
+  for (const Finding& each : findings) {
+    if (each.weight == Weight::kWrong) return each.text;
+  }
+  return {};
+}
+
+void missing_for_command(const daemon::Config& config, std::vector<std::string>& missing) {
+  std::string roles;
+  for (const Role role : kForCommand) {
+    const bool bound =
+        std::any_of(config.roles.begin(), config.roles.end(),
+                    [role](const daemon::RoleBinding& each) { return each.role == role; });
+    if (!bound) roles += (roles.empty() ? "" : ", ") + std::string(daemon::role_name(role));
+  }
+  if (!roles.empty()) missing.push_back("to command: signals for " + roles);
+  if (config.variator.primary_inertia_kg_m2 <= 0.0) {
+    missing.push_back("to command: variator.primary_inertia_kg_m2");
+  }
+  if (config.control != daemon::Control::kCommand) {
+    missing.push_back("to command: experiment.control = \"command\"");
+  }
+}
+
+}  // namespace
+
+std::string limit_text(daemon::Inhibit inhibit, const daemon::Config& config) {
+  using daemon::Inhibit;
+  const daemon::ExperimentSettings& limits = config.experiment;
+  switch (inhibit) {
+    case Inhibit::kPermission:
+      return "experiment_permitted is 0";
+    case Inhibit::kLockup:
+      return "the lock-up clutch is open";
+    case Inhibit::kRatio:
+      return format("the ratio is at no end stop (%.3g, %.3g)", config.variator.ratio_low,
+                    config.variator.ratio_overdrive);
+    case Inhibit::kTorque:
+      return format("torque outside %.0f to %.0f Nm", limits.torque_min_Nm, limits.torque_max_Nm);
+    case Inhibit::kSpeed:
+      return format("primary below %.0f rad/s", limits.primary_speed_min_rad_s);
+    case Inhibit::kOil:
+      return format("oil below %.0f degC", limits.oil_temperature_min_degC);
+    case Inhibit::kUnreachable:
+      return "the force floor lies above the peak's force";
+    case Inhibit::kRamp:
+      return "no ramp of force keeps the slip limits if a signal fails";
+    case Inhibit::kTime:
+      return "the ramp would last longer than the coast-down";
+    case Inhibit::kForce:
+      return "the controller's own force still moves";
+    default:
+      return std::string(daemon::kInhibitNames[static_cast<std::size_t>(inhibit)]);
+  }
+}
+
+std::string reach_text(const Prospects& prospects, const daemon::Config& config) {
+  if (!prospects.judged || !prospects.best) return {};
+  const Opportunity& best = *prospects.best;
+  const bool coast = config.trigger == daemon::Trigger::kCoastDown;
+  return "force floor " + grouped(best.floor_N) + " N: the peak (friction " +
+         format("%.3g", config.experiment.friction_expected) + ") is reached from " +
+         grouped(best.needed_Nm) + " Nm on; this drive " + (coast ? "coasts" : "drives") +
+         " with " + grouped(best.torque_Nm) + " Nm";
+}
+
+Verdict judge(const RoleWatch& watch, const std::vector<Window>& windows,
+              const Prospects& prospects, const daemon::Config& config, const DbcUnits& units,
+              bool seen) {
+  Verdict verdict;
+  bool observes = true, commands = true;
+  bool none_seen = seen && !config.roles.empty();
+  for (const RoleCourse& course : watch.roles()) {
+    verdict.roles.push_back(judge_role(course, watch, config, units));
+    if (course.frames > 0) none_seen = false;
+  }
+  verdict.across = judge_across(windows, config);
+  if (none_seen) {
+    observes = commands = false;
+    verdict.missing.push_back("no message of any role is in " +
+                              grouped(static_cast<double>(watch.frames())) +
+                              " frames: the log of another car, or another bus?");
+  } else {
+    for (std::size_t i = 0; i < verdict.roles.size(); ++i) {
+      const std::string text = first_wrong(verdict.roles[i]);
+      if (text.empty()) continue;
+      const Role role = config.roles[i].role;
+      verdict.missing.push_back(std::string(daemon::role_name(role)) + ": " + text);
+      commands = false;
+      if (is_required(role, config)) observes = false;
+    }
+    for (const Finding& each : verdict.across) {
+      if (each.weight != Weight::kWrong) continue;
+      verdict.missing.push_back(each.text);
+      observes = commands = false;
+    }
+  }
+  const std::size_t wrong = verdict.missing.size();
+  missing_for_command(config, verdict.missing);
+  if (verdict.missing.size() > wrong) commands = false;
+  if (seen && !none_seen && prospects.judged && prospects.opportunities > 0 &&
+      prospects.in_reach == 0) {
+    commands = false;
+    verdict.missing.push_back("to command: a drive in which an experiment may run; in none of " +
+                              std::to_string(prospects.opportunities) + " it may");
+  }
+  if (!seen) verdict.missing.push_back("a log or a bus: nothing of the car has been seen");
+
+  verdict.ready = commands && observes ? Ready::kCommand
+                  : observes           ? Ready::kObserve
+                                       : Ready::kNone;
+  const std::string reach = seen ? reach_text(prospects, config) : std::string();
+  std::string forbidden = reach;
+  if (prospects.best && prospects.best->forbidden != 0) {
+    const auto limit = static_cast<daemon::Inhibit>(std::countr_zero(prospects.best->forbidden));
+    if (limit != daemon::Inhibit::kUnreachable) {
+      forbidden = "with " + grouped(prospects.best->torque_Nm) + " Nm the peak is in reach, but " +
+                  limit_text(limit, config);
+    }
+  }
+  const std::string only_configuration = seen ? "" : " by the configuration alone";
+  switch (verdict.ready) {
+    case Ready::kNone:
+      verdict.sentence = "Not ready: " + verdict.missing.front();
+      break;
+    case Ready::kObserve:
+      verdict.sentence = "Ready to observe" + only_configuration;
+      if (seen && prospects.judged && prospects.opportunities > 0 && prospects.in_reach == 0) {
+        verdict.sentence += ", not to command: " + forbidden;
+      } else {
+        for (const std::string& each : verdict.missing) {
+          constexpr std::string_view kCommand = "to command: ";
+          if (!each.starts_with(kCommand)) continue;
+          verdict.sentence += "; to command, this is missing: " + each.substr(kCommand.size());
+          break;
+        }
+        if (!reach.empty()) verdict.sentence += "; " + reach;
+      }
+      break;
+    case Ready::kCommand:
+      verdict.sentence = "Ready to command" + only_configuration;
+      if (!reach.empty()) {
+        verdict.sentence += "; " + reach;
+      } else if (seen && prospects.judged) {
+        verdict.sentence += "; this drive had no opportunity for an experiment";
+        const auto most =
+            std::max_element(prospects.forbidden_by.begin(), prospects.forbidden_by.end());
+        if (*most > 0) {
+          const auto which = most - prospects.forbidden_by.begin();
+          verdict.sentence += ": " + limit_text(static_cast<daemon::Inhibit>(which), config);
+        }
+      }
+      break;
+  }
+  verdict.sentence += ".";
+  return verdict;
+}
+
+}  // namespace beltgrip::check

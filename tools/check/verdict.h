@@ -1,0 +1,37 @@
+// All of a check, put together: role by role, across, experiments, and what it is ready for.
+// Tools only.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "daemon/core/config/config.h"
+#include "tools/check/bus_view.h"
+#include "tools/check/finding.h"
+#include "tools/check/judge_role.h"
+#include "tools/check/role_watch.h"
+
+namespace beltgrip::check {
+
+enum class Ready { kNone, kObserve, kCommand };
+
+struct Verdict {
+  std::vector<Findings> roles;  // as config.roles
+  Findings across;
+  Ready ready = Ready::kNone;
+  std::vector<std::string> missing;
+  std::string sentence;
+};
+
+// seen: a log or a bus was looked at, not the configuration alone.
+Verdict judge(const RoleWatch& watch, const std::vector<Window>& windows,
+              const Prospects& prospects, const daemon::Config& config, const DbcUnits& units,
+              bool seen);
+
+// What a limit means, with its number: "oil below 40 degC".
+std::string limit_text(daemon::Inhibit inhibit, const daemon::Config& config);
+// "force floor 7,280 N: the peak is reached from 116 Nm on; this drive coasts with 31 Nm"
+std::string reach_text(const Prospects& prospects, const daemon::Config& config);
+
+}  // namespace beltgrip::check

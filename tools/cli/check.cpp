@@ -1,0 +1,155 @@
+// beltgrip check: is a configuration fit for a car? What a log or a bus shows of every role, what
+// belongs together, which experiments the driving allows, and what is missing.
+#include <cstdio>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "can_dbc/dbc/parser.h"
+#include "daemon/core/loop/loop.h"
+#include "tools/check/bus_view.h"
+#include "tools/check/listening_port.h"
+#include "tools/check/report.h"
+#include "tools/check/role_watch.h"
+#include "tools/check/verdict.h"
+#include "tools/cli/bus.h"
+#include "tools/cli/command.h"
+#include "tools/cli/configuration.h"
+#include "tools/cli/output_file.h"
+#include "tools/cli/replay_run.h"
+#include "tools/cli/stop_signals.h"
+#include "tools/ports/replay_port.h"
+#include "tools/text/terminal.h"
+
+namespace beltgrip::cli {
+
+namespace {
+
+struct Options {
+  std::vector<std::string> logs;
+  std::string config;
+  std::string json;
+  double live_s = 0.0;
+};
+
+// Units as the DBC files say them; the configuration keeps its own alone.
+check::DbcUnits dbc_units(const daemon::Config& config) {
+  check::DbcUnits units;
+  for (const std::string& path : config.files) {
+    if (!path.ends_with(".dbc")) continue;
+    std::ifstream file(path, std::ios::binary);
+    std::ostringstream text;
+    text << file.rdbuf();
+    const can::DbcParseResult parsed = can::parse_dbc(text.str());
+    for (const can::MessageDef& message : parsed.database.messages) {
+      for (const daemon::RoleBinding& role : config.roles) {
+        if (role.uds || role.id != message.id) continue;
+        const can::SignalDef* signal = message.find_signal(role.signal_name);
+        if (signal != nullptr) units.emplace(role.role, signal->unit);
+      }
+    }
+  }
+  return units;
+}
+
+// The same inputs, with nothing asked of anybody. Where the car's conditions begin an experiment,
+// none begins: what one would need is judged by the view, all along the drive.
+daemon::Config listening(daemon::Config config) {
+  config.control = daemon::Control::kObserve;
+  config.diagnostics = daemon::Diagnostics::kListen;
+  config.experiment.primary_speed_min_rad_s = std::numeric_limits<double>::infinity();
+  return config;
+}
+
+struct Seen {
+  check::Thinned<check::Window> windows;
+  check::Prospects prospects;
+};
+
+void look(daemon::Port& port, const daemon::Config& config, check::RoleWatch& watch,
+          std::optional<daemon::Duration> length, Seen& seen) {
+  watch.begin_log();
+  check::ListeningPort listening_port(port, watch, length);
+  const daemon::Config quiet = listening(config);
+  daemon::Pipeline pipeline(quiet);
+  check::BusView view(config, watch, pipeline, seen.windows, seen.prospects);
+  daemon::run_loop(listening_port, pipeline, quiet.estimator.sample_rate_hz,
+                   estimator::StopReason::kTraceEnd, &view);
+}
+
+void look_at_log(const std::string& path, const daemon::Config& config, check::RoleWatch& watch,
+                 Seen& seen) {
+  const auto timeline = open_timeline({path}, "", config.identifiers, further_interface(config));
+  ports::ReplayPort port(*timeline, {});
+  if (port.empty()) {
+    const can::LogStats stats = timeline->stats();
+    throw Failure{kBadInput,
+                  path + ": no readable frame in " + std::to_string(stats.lines) +
+                      " lines; expected a CAN log (candump -L, .asc, .trc, .blf, .mf4): a table of "
+                      "signals has no frames, and without time stamps it is no record of a drive"};
+  }
+  look(port, config, watch, {}, seen);
+  const can::LogStats stats = timeline->stats();
+  if (stats.lines_bad > 0) {
+    warn(path + ": " + std::to_string(stats.lines_bad) + " unreadable lines");
+  }
+}
+
+void run(const Options& options) {
+  const bool live = options.live_s > 0.0;
+  if (live && !options.logs.empty()) {
+    throw Failure{kUsage, "check: found logs and --live, expected one of them"};
+  }
+  end_streams_when_stopped(options.logs);
+  const daemon::Config config = load_configuration(options.config, "");
+  Inputs inputs(options.logs);
+  inputs.add(config.files);
+  std::optional<OutputFile> json;
+  if (!options.json.empty()) json.emplace(options.json, inputs);
+
+  check::RoleWatch watch(config);
+  Seen seen;
+  std::string what;
+  if (live) {
+    const auto port = open_bus(config.interface, {}, stop_descriptor());
+    look(*port, config, watch, static_cast<daemon::Duration>(options.live_s * 1e9), seen);
+    char seconds[32];
+    std::snprintf(seconds, sizeof seconds, "%.4g", options.live_s);
+    what = config.interface + " for " + seconds + " s";
+  }
+  for (const std::string& log : options.logs) {
+    look_at_log(log, config, watch, seen);
+    what += (what.empty() ? "" : ", ") + log;
+  }
+  const check::Verdict verdict = check::judge(watch, seen.windows.values(), seen.prospects, config,
+                                              dbc_units(config), !what.empty());
+  const check::Checked checked{config, watch, seen.prospects, verdict, what};
+  if (json) {
+    json->write(check::json(checked));
+    json->close();
+  }
+  if (options.json != "-") print(stdout, check::text(checked));
+}
+
+}  // namespace
+
+void add_check(command_line::Command app) {
+  const command_line::Command command = app.add_subcommand(
+      "check",
+      "Does a configuration fit the car: every role, what belongs together, what is missing");
+  auto options = std::make_shared<Options>();
+  command.add_option("log", options->logs, "CAN logs of drives, all of the same vehicle");
+  command.add_option("--config", options->config, "BeltGrip's configuration").required();
+  command
+      .add_option("--live", options->live_s,
+                  "Listen to the configuration's bus for so many seconds; nothing is sent")
+      .range(0.1, 86400.0);
+  command.add_option("--json", options->json, "As JSON, '-': standard output");
+  command.callback([options] { run(*options); });
+}
+
+}  // namespace beltgrip::cli
