@@ -39,7 +39,7 @@ std::string status_line(const Observation& observation) {
   std::string faults;
   for (std::size_t i = 0; i < kFaultCount; ++i) {
     if ((report.faults >> i & 1U) == 0) continue;
-    faults += (faults.empty() ? ", faults " : " ") + std::string(kFaultNames[i]);
+    faults += (faults.empty() ? ", faults " : " ") + std::string(kFaults[i].name);
   }
   return line + faults;
 }

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "daemon/core/base/named.h"
 #include "daemon/core/experiment/arming.h"
 #include "daemon/core/observe/event.h"
 #include "daemon/core/publish/names.h"
@@ -89,11 +90,11 @@ Json diagnostics(const Config& config, const UdsCounters& counters) {
           {"frames_of_another_tester", counters.foreign}};
 }
 
-template <std::size_t kCount>
-Json names(std::uint32_t bits, const std::array<std::string_view, kCount>& all) {
+template <typename Enum, std::size_t kCount>
+Json names(std::uint32_t bits, const std::array<Named<Enum>, kCount>& all) {
   Json set = Json::array();
   for (std::size_t i = 0; i < kCount; ++i) {
-    if ((bits >> i & 1U) != 0) set.push_back(all[i]);
+    if ((bits >> i & 1U) != 0) set.push_back(all[i].name);
   }
   return set;
 }
@@ -116,8 +117,8 @@ std::string status_json(const Config& config, MonoTime now, const Observation& o
       {"mu_star", usable ? Json(curve.mu_star) : Json()},
       {"sigma_star_percent", usable ? Json(curve.sigma_star_percent) : Json()},
       {"friction_slope", usable ? Json(curve.friction_slope) : Json()},
-      {"faults", names(report.faults, kFaultNames)},
-      {"inhibits", names(report.inhibits, kInhibitNames)},
+      {"faults", names(report.faults, kFaults)},
+      {"inhibits", names(report.inhibits, kInhibits)},
       {"result", result(now, report.result)},
       {"signals", signals(now, observation)},
       {"counters",

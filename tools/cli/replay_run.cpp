@@ -475,7 +475,7 @@ std::string inhibits_text(const ReplayResult& result) {
   std::string why;
   for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
     if (result.inhibited_s[i] < kShownInhibit_s) continue;
-    why += (why.empty() ? "" : ", ") + std::string(daemon::kInhibitNames[i]) +
+    why += (why.empty() ? "" : ", ") + std::string(daemon::kInhibits[i].name) +
            format(" %.1f s", result.inhibited_s[i]);
   }
   return why;

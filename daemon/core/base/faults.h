@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "daemon/core/base/mono_time.h"
+#include "daemon/core/base/named.h"
 
 namespace beltgrip::daemon {
 
@@ -37,11 +38,28 @@ enum class Fault : std::uint8_t {
 inline constexpr std::size_t kFaultCount = 20;
 
 // Signal names are "Fault" followed by these.
-inline constexpr std::array<std::string_view, kFaultCount> kFaultNames{
-    "InputMissing",   "InputStale",       "InputFrozen",   "InputRange",      "InputNotFinite",
-    "InputFrame",     "TimeStamp",        "FramesLost",    "SampleLate",      "BusPassive",
-    "BusOff",         "BusDown",          "ForeignSender", "SendFailed",      "FrameRefused",
-    "ResultDoubtful", "HistoryUnwritten", "InputRate",     "InputProtection", "ClampStuck"};
+inline constexpr std::array<Named<Fault>, kFaultCount> kFaults{
+    {{Fault::kInputMissing, "InputMissing"},
+     {Fault::kInputStale, "InputStale"},
+     {Fault::kInputFrozen, "InputFrozen"},
+     {Fault::kInputRange, "InputRange"},
+     {Fault::kInputNotFinite, "InputNotFinite"},
+     {Fault::kInputFrame, "InputFrame"},
+     {Fault::kTimeStamp, "TimeStamp"},
+     {Fault::kFramesLost, "FramesLost"},
+     {Fault::kSampleLate, "SampleLate"},
+     {Fault::kBusPassive, "BusPassive"},
+     {Fault::kBusOff, "BusOff"},
+     {Fault::kBusDown, "BusDown"},
+     {Fault::kForeignSender, "ForeignSender"},
+     {Fault::kSendFailed, "SendFailed"},
+     {Fault::kFrameRefused, "FrameRefused"},
+     {Fault::kResultDoubtful, "ResultDoubtful"},
+     {Fault::kHistoryUnwritten, "HistoryUnwritten"},
+     {Fault::kInputRate, "InputRate"},
+     {Fault::kInputProtection, "InputProtection"},
+     {Fault::kClampStuck, "ClampStuck"}}};
+static_assert(in_wire_order(kFaults));
 
 constexpr std::uint32_t fault_bit(Fault fault) {
   return std::uint32_t{1} << static_cast<unsigned>(fault);

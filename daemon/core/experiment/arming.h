@@ -14,6 +14,7 @@
 
 #include "daemon/core/base/limits.h"
 #include "daemon/core/base/mono_time.h"
+#include "daemon/core/base/named.h"
 #include "daemon/core/config/config.h"
 #include "daemon/core/experiment/reachability.h"
 #include "daemon/core/input/stop_cause.h"
@@ -42,10 +43,25 @@ enum class Inhibit : std::uint8_t {
   kQuiet         // a speed that stood still would not show
 };
 inline constexpr std::size_t kInhibitCount = 17;
-inline constexpr std::array<std::string_view, kInhibitCount> kInhibitNames{
-    "inputs", "fault",  "permission", "pedal",     "brake",     "lock-up",
-    "ratio",  "torque", "speed",      "oil",       "cool-down", "unreachable",
-    "ramp",   "time",   "grip",       "own force", "quiet"};
+inline constexpr std::array<Named<Inhibit>, kInhibitCount> kInhibits{
+    {{Inhibit::kInputs, "inputs"},
+     {Inhibit::kFault, "fault"},
+     {Inhibit::kPermission, "permission"},
+     {Inhibit::kPedal, "pedal"},
+     {Inhibit::kBrake, "brake"},
+     {Inhibit::kLockup, "lock-up"},
+     {Inhibit::kRatio, "ratio"},
+     {Inhibit::kTorque, "torque"},
+     {Inhibit::kSpeed, "speed"},
+     {Inhibit::kOil, "oil"},
+     {Inhibit::kCooldown, "cool-down"},
+     {Inhibit::kUnreachable, "unreachable"},
+     {Inhibit::kRamp, "ramp"},
+     {Inhibit::kTime, "time"},
+     {Inhibit::kGrip, "grip"},
+     {Inhibit::kForce, "own force"},
+     {Inhibit::kQuiet, "quiet"}}};
+static_assert(in_wire_order(kInhibits));
 
 constexpr std::uint32_t inhibit_bit(Inhibit inhibit) {
   return std::uint32_t{1} << static_cast<unsigned>(inhibit);

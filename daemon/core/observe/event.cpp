@@ -56,15 +56,15 @@ std::string text_of(const Event& event) {
       return text;
     }
     case EventId::kInhibit:
-      return "no experiment: " + std::string(kInhibitNames[event.to]);
+      return "no experiment: " + std::string(kInhibits[event.to].name);
     case EventId::kFaultRaised:
-      return "fault " + std::string(kFaultNames[event.to]) +
+      return "fault " + std::string(kFaults[event.to].name) +
              (event.cause.role ? " (" + std::string(role_name(*event.cause.role)) + ")" : "") +
              (event.identifier != 0 ? " (0x" + hexadecimal(event.identifier) + ")" : "");
     case EventId::kFaultCleared:
       break;
   }
-  return "fault " + std::string(kFaultNames[event.to]) + " gone";
+  return "fault " + std::string(kFaults[event.to].name) + " gone";
 }
 
 bool LineBudget::take(const Event& event) noexcept {

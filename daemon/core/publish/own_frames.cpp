@@ -78,7 +78,7 @@ OwnFrames::OwnFrames(const FrameIdentifiers& identifiers) : identifiers_(identif
   status_.outcome = field(kS, "Outcome");
   status_.reason = field(kS, "StopReason");
   for (std::size_t i = 0; i < kFaultCount; ++i) {
-    status_.faults[i] = field(kS, "Fault" + std::string(kFaultNames[i]));
+    status_.faults[i] = field(kS, "Fault" + std::string(kFaults[i].name));
   }
 }
 

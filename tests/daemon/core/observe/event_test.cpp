@@ -187,8 +187,8 @@ TEST(NoResult, EveryReasonHasItsRow) {
   const auto expect_row = [&](std::string_view name) {
     EXPECT_NE(cells.find(", " + std::string(name) + ","), std::string::npos) << name;
   };
-  for (const std::string_view name : kInhibitNames) expect_row(name);
-  for (const std::string_view name : kFaultNames) expect_row(name);
+  for (const auto& each : kInhibits) expect_row(each.name);
+  for (const auto& each : kFaults) expect_row(each.name);
   for (std::size_t i = 0; i < estimator::kStopReasonCount; ++i) {
     expect_row(stop_reason_name(static_cast<StopReason>(i)));
   }

@@ -197,7 +197,7 @@ TEST(OwnFrames, EachFaultHasItsBit) {
     values.faults = std::uint32_t{1} << i;
     const can::CanFrame frame = frames().pack(values, 0);
     for (std::size_t j = 0; j < kFaultCount; ++j) {
-      EXPECT_EQ(value_of(frame, "Fault" + std::string(kFaultNames[j])), i == j ? 1.0 : 0.0);
+      EXPECT_EQ(value_of(frame, "Fault" + std::string(kFaults[j].name)), i == j ? 1.0 : 0.0);
     }
     EXPECT_TRUE(passes(frame));
   }
