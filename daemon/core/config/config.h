@@ -14,6 +14,7 @@
 #include "can_dbc/dbc/signal_codec.h"
 #include "can_dbc/text/unit_text.h"
 #include "daemon/core/base/own_identifiers.h"
+#include "daemon/core/config/config_errors.h"
 #include "estimator/physics/assumed_constants.h"
 #include "estimator/physics/machine_effects.h"
 #include "estimator/physics/parameters.h"
@@ -148,12 +149,6 @@ struct Config {
   ExperimentSettings experiment;
   std::vector<std::string> files;  // that were read for it: itself, DBC files, model
   std::string state_dir;  // path as in the file; empty: $STATE_DIRECTORY, or nothing is kept
-};
-
-struct ConfigError {
-  int exit_code = 78;  // 66 a file is missing or unreadable, 65 a DBC without a readable message,
-                       // 78 everything else
-  std::string text;    // "FILE:LINE: key: found ..., expected ..."
 };
 
 struct ConfigResult {

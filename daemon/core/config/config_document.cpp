@@ -91,6 +91,18 @@ std::string TomlNode::found() const {
   }
 }
 
+const TomlNode* section_of(const TomlNode& root, std::string_view name) {
+  const TomlNode* found = root.find(name);
+  return found != nullptr && found->type == TomlType::kTable ? found : nullptr;
+}
+
+std::uint32_t line_of(const TomlNode& root, std::string_view section, std::string_view key) {
+  const TomlNode* in = section_of(root, section);
+  if (in == nullptr) return 1;
+  const TomlNode* at = in->find(key);
+  return at == nullptr ? in->line : at->line;
+}
+
 std::variant<TomlNode, TomlSyntaxError> parse_toml(std::string_view text) {
   if (const auto beyond = beyond_bounds(text)) return *beyond;
   try {

@@ -30,6 +30,11 @@ struct TomlNode {
   std::string found() const;
 };
 
+// A section [name] of a file; null where there is none.
+const TomlNode* section_of(const TomlNode& root, std::string_view name);
+// The line of a key, else of its section, else 1.
+std::uint32_t line_of(const TomlNode& root, std::string_view section, std::string_view key);
+
 struct TomlSyntaxError {
   std::uint32_t line = 0;
   std::string text;  // one line

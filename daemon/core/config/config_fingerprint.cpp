@@ -21,12 +21,6 @@ bool decides(const Option& option) {
          option.key != "safety_factor";
 }
 
-bool is_measured_from(Role role) {
-  return role == Role::kPrimarySpeed || role == Role::kSecondarySpeed ||
-         role == Role::kSecondaryPressure || role == Role::kEngineTorque ||
-         role == Role::kPrimaryTorque;
-}
-
 }  // namespace
 
 std::string config_fingerprint(const Config& config) {
@@ -53,7 +47,7 @@ std::string config_fingerprint(const Config& config) {
     }
   }
   for (const RoleBinding& role : config.roles) {
-    if (!is_measured_from(role.role)) continue;
+    if (!sensor_of(role.role)) continue;  // nothing is measured from it
     text += std::string(role_name(role.role)) + '=' + role.message_name + '.' + role.signal_name +
             '*' + number_text(role.factor) + '+' + number_text(role.shift) + ';';
     if (role.delay_ms != 0.0) text += "delay=" + number_text(role.delay_ms) + ';';

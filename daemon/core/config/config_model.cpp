@@ -6,7 +6,6 @@
 #include <cmath>
 #include <variant>
 
-#include "daemon/core/config/config_binding.h"
 #include "daemon/core/config/config_document.h"
 #include "daemon/core/config/config_options.h"
 

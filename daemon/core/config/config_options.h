@@ -1,6 +1,5 @@
-// The option table: key, type, unit, default, range and help of every plain key of the
-// configuration in one row. Reading, range errors and the commented default file all come from it.
-// The sections [signals] and [sensors], whose keys are roles, have their own rows here. Start-up
+// The tables of options: every key of the configuration, one row each (option.h). Who adds a key
+// adds its row here, its place in the struct that the section is read into, and its use. Start-up
 // and tools only.
 #pragma once
 
@@ -9,49 +8,61 @@
 #include <string>
 #include <string_view>
 
+#include "can_dbc/uds/iso_tp.h"
 #include "daemon/core/config/config.h"
+#include "daemon/core/config/option.h"
 #include "estimator/physics/assumed_constants.h"
 
 namespace beltgrip::daemon {
 
-struct Option {
-  enum class Kind { kNumber, kText, kChoice, kTexts, kIdentifiers };
-
-  std::string_view section;
-  std::string_view key;
-  Kind kind;
-  std::string_view unit;  // for the help; the key carries it as well
-  double minimum = 0.0, maximum = 0.0;
-  double factor = 1.0;                        // value in the Config = value in the file * factor
-  std::span<const std::string_view> choices;  // kChoice, in the order of the enumeration
-  std::string_view help;                      // lines separated by '\n'
-  double& (*number)(Config&) = nullptr;
-  std::string& (*text)(Config&) = nullptr;
-  std::size_t (*get_choice)(const Config&) = nullptr;
-  void (*set_choice)(Config&, std::size_t) = nullptr;
-};
-
-std::span<const Option> option_table();
 std::span<const std::string_view> section_names();  // in the order of the file
 
-// [signals] and [sensors]
+// [bus], [variator], [estimator], [experiment], [daemon]
+using Option = OptionOf<Config>;
+std::span<const Option> option_table();
+
+// [bus.NAME] and bus.identifiers
+std::span<const OptionOf<FurtherBus>> further_bus_options();
+std::span<const OptionOf<FrameIdentifiers>> identifier_options();
+
+// signals.ROLE = { ... }
+struct RoleText {
+  std::string signal;
+  std::optional<UdsSource> uds;
+  std::string unit;
+  double scale = 1.0, offset = 0.0;
+  std::optional<double> period_ms;
+  double delay_ms = 0.0;
+  std::string bus;
+};
+std::span<const OptionOf<RoleText>> role_options();
+// signals.ROLE.uds = { ... }
+inline constexpr std::size_t kUdsDataMax = can::kIsoTpMax - 3;  // after service and identifier
+std::span<const OptionOf<UdsSource>> uds_options();
+
+// protection.MESSAGE = { ... }, what it says without the DBC
+struct ProtectionText {
+  std::uint16_t data_id = 0;
+};
+std::span<const OptionOf<ProtectionText>> protection_options();
+
+// sensors.ROLE = { ... }
+struct SensorText {
+  std::optional<double> bias, gain;
+};
+// The bias and the gain of what measures it; empty: no accuracy is known.
+std::span<const OptionOf<SensorText>> sensor_options(can::Dimension dimension);
+inline std::string_view bias_key(can::Dimension dimension) {  // "bias_Pa"
+  const auto options = sensor_options(dimension);
+  return options.empty() ? std::string_view() : options.front().key;
+}
+
 std::string_view role_help(Role role);
-// What is assumed of a key of [variator] that is left out; empty: nothing.
-std::string assumption_text(const Option& option);
 // The kind of sensor whose accuracy a result rests on; none of other roles.
 std::optional<estimator::Sensor> sensor_of(Role role);
-std::string_view bias_key(can::Dimension dimension);  // "bias_Pa"; empty: no accuracy is known
-double bias_maximum(can::Dimension dimension);
-inline constexpr double kGainMaximum = 1.0;
+// What is assumed of a key of [variator] that is left out; empty: nothing.
+std::string assumption_text(const Option& option);
 
-struct IdentifierKey {
-  std::string_view key;
-  std::uint32_t FrameIdentifiers::*field;
-};
-std::span<const IdentifierKey> identifier_keys();
-
-inline constexpr double kPeriodMinimum_ms = 0.5, kPeriodMaximum_ms = 10'000.0;
-inline constexpr double kDelayMinimum_ms = -50.0, kDelayMaximum_ms = 200.0;
 inline constexpr double kPollPeriodMinimum_ms = 10.0;
 
 }  // namespace beltgrip::daemon

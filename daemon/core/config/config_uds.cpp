@@ -1,23 +1,10 @@
 #include "daemon/core/config/config_uds.h"
 
-#include <array>
-#include <charconv>
-#include <cmath>
-
-#include "can_dbc/uds/iso_tp.h"
-#include "daemon/core/config/config_options.h"
+#include "daemon/core/config/option_reader.h"
 
 namespace beltgrip::daemon {
 
 namespace {
-
-constexpr std::uint32_t kDidMax = 0xFFFF;
-constexpr std::size_t kDataMax = can::kIsoTpMax - 3;  // bytes after service and identifier
-
-can::CanId id_of(std::int64_t value) {
-  const auto id = static_cast<std::uint32_t>(value);
-  return {id, id > can::kStandardIdMax};
-}
 
 // The address of all ECUs at once: 0x7DF, or normal fixed addressing with target type functional.
 bool is_functional(can::CanId id) {
@@ -27,140 +14,120 @@ bool is_functional(can::CanId id) {
 
 bool is_own(const FrameIdentifiers& own, can::CanId id) {
   if (id.extended) return false;
-  return id.value == own.estimate || id.value == own.slip || id.value == own.clamp ||
-         id.value == own.status;
+  for (const auto& option : identifier_options()) {
+    if (option.get_integer(own) == id.value) return true;
+  }
+  return false;
+}
+
+// The keys that it cannot do without, as in the table of its options.
+std::string example() {
+  std::string text;
+  for (const OptionRow& option : uds_options()) {
+    if (!option.is_required) continue;
+    text +=
+        (text.empty() ? "{ " : ", ") + std::string(option.key) + " = " + std::string(option.shown);
+  }
+  return text + " }";
+}
+
+// Where the role stands in the file.
+struct RolePlace {
+  std::string key;
+  std::uint32_t line;
+};
+
+// No other frame has the identifiers of a request and its answer.
+void check_alone(const Config& config, const RoleBinding& role, const RolePlace& place,
+                 ConfigErrors& errors) {
+  for (const auto& [name, id] :
+       {std::pair("request", role.uds->request), std::pair("response", role.uds->response)}) {
+    const std::string key = key_of(place.key + ".uds", name);
+    if (role.bus == 0 && is_own(config.identifiers, id)) {
+      errors.add(place.line, key, "an identifier of BeltGrip's own frames",
+                 "another identifier there or in bus.identifiers");
+    }
+    for (const RoleBinding& other : config.roles) {
+      if (other.uds || other.bus != role.bus || other.id != id) continue;
+      errors.add(place.line, key,
+                 "the identifier of message " + other.message_name + ", the source of " +
+                     std::string(role_name(other.role)),
+                 "one that no broadcast message of a role has");
+    }
+  }
+}
+
+// An ECU has one identifier for requests and one for answers.
+void check_pairs(const Config& config, const RoleBinding& role, const RolePlace& place,
+                 ConfigErrors& errors) {
+  const UdsSource& source = *role.uds;
+  for (const RoleBinding& other : config.roles) {
+    if (!other.uds || other.bus != role.bus || other.role >= role.role) continue;
+    const bool same_request = other.uds->request == source.request;
+    const bool same_response = other.uds->response == source.response;
+    if (same_request == same_response && other.uds->request != source.response &&
+        other.uds->response != source.request) {
+      continue;
+    }
+    errors.add(
+        place.line, place.key + ".uds",
+        "request and response that " + std::string(role_name(other.role)) + " pairs otherwise",
+        "one response for each request on a bus");
+  }
+}
+
+void check_poll(const RoleBinding& role, const RolePlace& place, ConfigErrors& errors) {
+  if (is_functional(role.uds->request)) {
+    errors.add(place.line, place.key + ".uds.request", "the address of all ECUs at once",
+               "that of one ECU, as bus.diagnostics is \"poll\"");
+  }
+  if (!role.period_ms || *role.period_ms < kPollPeriodMinimum_ms) {
+    errors.add(place.line, place.key + ".period_ms",
+               role.period_ms ? "less than 10" : "no such key",
+               "how often to ask, 10 to 10000, as bus.diagnostics is \"poll\"");
+  }
 }
 
 }  // namespace
 
-std::optional<UdsSource> read_uds(const std::string& key, const TomlNode& node,
-                                  ConfigErrors& errors) {
-  if (node.type != TomlType::kTable) {
-    errors.add(node.line, key, node.found(),
-               "{ request = 0x7E1, response = 0x7E9, did = 0x1101, start = 7, length = 16 }");
-    return {};
-  }
-  static const std::vector<std::string> kKeys{"request",    "response", "did",    "start", "length",
-                                              "byte_order", "scale",    "offset", "signed"};
+UdsSource usual_uds() {
   UdsSource uds;
   uds.signal.byte_order = can::ByteOrder::kBig;
-  bool good = true;
-  const auto wrong = [&](const TomlNode& child, const std::string& expected) {
-    errors.add(child.line, key + "." + child.key, child.found(), expected);
-    good = false;
-  };
-  // An integer from minimum to maximum.
-  const auto integer = [&](const TomlNode& child, std::int64_t minimum, std::int64_t maximum,
-                           const std::string& expected) {
-    const bool fits =
-        child.type == TomlType::kInteger && child.integer >= minimum && child.integer <= maximum;
-    if (!fits) wrong(child, expected);
-    return fits ? child.integer : minimum;
-  };
-  for (const TomlNode& child : node.children) {
-    if (child.key == "request" || child.key == "response") {
-      const can::CanId id = id_of(integer(child, 0, can::kExtendedIdMax,
-                                          "an identifier: up to 0x7FF is 11 bit, up to 0x1FFFFFFF "
-                                          "is 29 bit"));
-      (child.key == "request" ? uds.request : uds.response) = id;
-    } else if (child.key == "did") {
-      uds.identifier =
-          static_cast<std::uint16_t>(integer(child, 0, kDidMax, "an integer from 0 to 0xFFFF"));
-    } else if (child.key == "start") {
-      uds.signal.start_bit = static_cast<std::uint32_t>(
-          integer(child, 0, std::int64_t{kDataMax} * 8 - 1,
-                  "a bit of the data after the identifier, numbered as in a DBC: 7 is the highest "
-                  "of the first byte"));
-    } else if (child.key == "length") {
-      uds.signal.length =
-          static_cast<std::uint32_t>(integer(child, 1, 64, "an integer from 1 to 64 (bits)"));
-    } else if (child.key == "byte_order") {
-      const bool little = child.text == "little";
-      if (child.type != TomlType::kText || (!little && child.text != "big")) {
-        wrong(child, "\"big\" or \"little\"");
-      }
-      uds.signal.byte_order = little ? can::ByteOrder::kLittle : can::ByteOrder::kBig;
-    } else if (child.key == "scale") {
-      if (!child.is_number() || !std::isfinite(child.number) || child.number == 0.0) {
-        wrong(child, "a finite number other than 0");
-      }
-      uds.signal.scale = child.number;
-    } else if (child.key == "offset") {
-      if (!child.is_number() || !std::isfinite(child.number)) wrong(child, "a finite number");
-      uds.signal.offset = child.number;
-    } else if (child.key == "signed") {
-      if (child.type != TomlType::kFlag) wrong(child, "true or false");
-      uds.signal.type = child.flag ? can::ValueType::kSigned : can::ValueType::kUnsigned;
-    } else {
-      errors.add(child.line, key + "." + child.key, "an unknown key",
-                 "request, response, did, start, length, byte_order, scale, offset or signed" +
-                     nearest_hint(child.key, kKeys));
-      good = false;
-    }
-  }
-  for (const char* required : {"request", "response", "did", "start", "length"}) {
-    if (node.find(required) != nullptr) continue;
-    errors.add(node.line, key, "a table without " + std::string(required),
-               "{ request = 0x7E1, response = 0x7E9, did = 0x1101, start = 7, length = 16 }");
-    good = false;
-  }
-  if (!good) return {};
-  if (!can::SignalCodec(uds.signal).fits(kDataMax)) {
-    errors.add(node.line, key, "a signal that does not fit in an answer",
-               "start and length inside " + std::to_string(kDataMax) + " bytes of data");
-    return {};
-  }
   return uds;
+}
+
+bool read_role_uds(const std::string& key, const TomlNode& node, RoleText& role,
+                   ConfigErrors& errors) {
+  if (node.type != TomlType::kTable) {
+    errors.add(node.line, key, node.found(), example());
+    return false;
+  }
+  UdsSource uds = usual_uds();
+  bool good = read_keys(uds_options(), key, node, uds, errors);
+  good &= has_required(uds_options(), key, node, "a table", example(), errors);
+  if (!good) return false;
+  if (!can::SignalCodec(uds.signal).fits(kUdsDataMax)) {
+    errors.add(node.line, key, "a signal that does not fit in an answer",
+               "start and length inside " + std::to_string(kUdsDataMax) + " bytes of data");
+    return false;
+  }
+  role.uds = uds;
+  return true;
 }
 
 void check_uds(const Config& config, const TomlNode& signals, ConfigErrors& errors) {
   for (const RoleBinding& role : config.roles) {
     if (!role.uds) continue;
-    const std::string key = "signals." + std::string(role_name(role.role));
     const TomlNode* node = signals.find(role_name(role.role));
-    const std::uint32_t line = node == nullptr ? 1 : node->line;
-    const UdsSource& source = *role.uds;
-    const auto at = [&](const char* name) { return key + ".uds." + name; };
-    if (source.request == source.response) {
-      errors.add(line, at("response"), "the identifier of the request",
+    const RolePlace place{key_of("signals", role_name(role.role)),
+                          node == nullptr ? 1 : node->line};
+    if (role.uds->request == role.uds->response) {
+      errors.add(place.line, place.key + ".uds.response", "the identifier of the request",
                  "that of the answer: often the request's + 8");
     }
-    for (const auto& [name, id] :
-         {std::pair("request", source.request), std::pair("response", source.response)}) {
-      if (role.bus == 0 && is_own(config.identifiers, id)) {
-        errors.add(line, at(name), "an identifier of BeltGrip's own frames",
-                   "another identifier there or in bus.identifiers");
-      }
-      for (const RoleBinding& other : config.roles) {
-        if (other.uds || other.bus != role.bus || other.id != id) continue;
-        errors.add(line, at(name),
-                   "the identifier of message " + other.message_name + ", the source of " +
-                       std::string(role_name(other.role)),
-                   "one that no broadcast message of a role has");
-      }
-    }
-    for (const RoleBinding& other : config.roles) {
-      if (!other.uds || other.bus != role.bus || other.role >= role.role) continue;
-      const bool same_request = other.uds->request == source.request;
-      const bool same_response = other.uds->response == source.response;
-      if (same_request == same_response && other.uds->request != source.response &&
-          other.uds->response != source.request) {
-        continue;
-      }
-      errors.add(
-          line, key + ".uds",
-          "request and response that " + std::string(role_name(other.role)) + " pairs otherwise",
-          "one response for each request on a bus");
-    }
-    if (config.diagnostics != Diagnostics::kPoll) continue;
-    if (is_functional(source.request)) {
-      errors.add(line, at("request"), "the address of all ECUs at once",
-                 "that of one ECU, as bus.diagnostics is \"poll\"");
-    }
-    if (!role.period_ms || *role.period_ms < kPollPeriodMinimum_ms) {
-      errors.add(line, key + ".period_ms", role.period_ms ? "less than 10" : "no such key",
-                 "how often to ask, 10 to 10000, as bus.diagnostics is \"poll\"");
-    }
+    check_alone(config, role, place, errors);
+    check_pairs(config, role, place, errors);
+    if (config.diagnostics == Diagnostics::kPoll) check_poll(role, place, errors);
   }
 }
 

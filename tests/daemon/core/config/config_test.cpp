@@ -153,6 +153,61 @@ TEST_F(ConfigTest, EveryNumberAtAndBeyondItsRange) {
   }
 }
 
+// The tables within a section: each key with a value beyond its range, or of another type, is an
+// error that says what would be right.
+TEST_F(ConfigTest, EveryKeyOfATableBeyondItsRange) {
+  using Kind = OptionRow::Kind;
+  const auto wrong_values = [](const OptionRow& option) {
+    std::vector<std::string> values{"2026-01-01"};
+    const auto beyond = [&](double value) { values.push_back(number(value)); };
+    if (option.kind == Kind::kNumber) {
+      values.insert(values.end(), {"nan", "inf", "\"1\"", "[1]"});
+      if (std::isfinite(option.minimum)) beyond(std::nextafter(option.minimum, -1e9));
+      if (std::isfinite(option.maximum)) beyond(std::nextafter(option.maximum, 1e9));
+      if (option.is_nonzero) values.emplace_back("0");
+    }
+    if (option.kind == Kind::kInteger) {
+      values.insert(values.end(), {"1.5", "\"1\""});
+      values.push_back(std::to_string(static_cast<std::int64_t>(option.minimum) - 1));
+      values.push_back(std::to_string(static_cast<std::int64_t>(option.maximum) + 1));
+    }
+    if (option.kind == Kind::kText || option.kind == Kind::kFlag) values.emplace_back("1");
+    if (option.kind == Kind::kChoice) values.emplace_back("\"nonsense\"");
+    return values;
+  };
+  const auto expect_wrong = [&](const std::string& toml, const std::string& key) {
+    const ConfigResult result = load(toml);
+    const bool named =
+        std::any_of(result.errors.begin(), result.errors.end(), [&](const ConfigError& error) {
+          return error.text.find(": " + key + ": found ") != std::string::npos &&
+                 error.text.find(", expected ") + 11 < error.text.size();
+        });
+    EXPECT_TRUE(named) << key << "\n" << toml;
+  };
+  std::size_t tried = 0;
+  const auto each_key = [&](const auto& options, const std::string& section,
+                            const std::string& where, const std::string& before,
+                            const std::string& after) {
+    for (const OptionRow& option : options) {
+      if (option.kind == Kind::kOther) continue;
+      for (const std::string& value : wrong_values(option)) {
+        const std::string key(option.key);
+        expect_wrong(with(section, before + key + " = " + value + after), where + "." + key);
+        ++tried;
+      }
+    }
+  };
+  each_key(identifier_options(), "bus", "bus.identifiers", "identifiers = { ", " }");
+  each_key(further_bus_options(), "bus", "bus.x", "x = { ", " }");
+  each_key(role_options(), "signals", "signals.oil_temperature", "oil_temperature = { ", " }");
+  each_key(uds_options(), "signals", "signals.oil_temperature.uds", "oil_temperature = { uds = { ",
+           " } }");
+  each_key(sensor_options(can::Dimension::kPressure), "sensors", "sensors.primary_pressure",
+           "primary_pressure = { ", " }");
+  each_key(protection_options(), "protection", "protection.Flags", "Flags = { ", " }");
+  EXPECT_GT(tried, 90U);
+}
+
 TEST_F(ConfigTest, EveryKeyTwiceIsASyntaxErrorWithItsLine) {
   for (const Option& option : option_table()) {
     if (option.kind != Option::Kind::kNumber) continue;
@@ -521,7 +576,7 @@ TEST_F(ConfigTest, Sensors) {
       expect_error(with("sensors", name + " = { gain = 0 }"), key, {"an unknown key"});
       continue;
     }
-    const double maximum = bias_maximum(role_dimension(role));
+    const double maximum = sensor_options(role_dimension(role)).front().maximum;
     expect_good(with("sensors", name + " = { gain = 1, " + bias + " = " + number(maximum) + " }"));
     expect_good(with("sensors", name + " = { gain = 0, " + bias + " = 0 }"));
     expect_error(with("sensors", name + " = { gain = 1.01 }"), key + ".gain", {"1.01"});
@@ -633,6 +688,23 @@ TEST_F(ConfigTest, TheDefaultFileSaysTheDefaults) {
     }
   }
   EXPECT_EQ(result.config->interface, defaults.interface);
+}
+
+TEST_F(ConfigTest, TheDefaultFileHasTheKeysOfEveryTable) {
+  const std::string text = default_config_text();
+  const auto expect_keys = [&](const auto& options) {
+    for (const OptionRow& option : options) {
+      EXPECT_NE(text.find("\n#   " + std::string(option.key) + " = "), std::string::npos)
+          << option.section << "." << option.key;
+      EXPECT_FALSE(option.help.empty()) << option.key;
+    }
+  };
+  expect_keys(identifier_options());
+  expect_keys(further_bus_options());
+  expect_keys(role_options());
+  expect_keys(uds_options());
+  expect_keys(protection_options());
+  EXPECT_EQ(text.find(" \n"), std::string::npos);
 }
 
 // The values that the interface promises as defaults.

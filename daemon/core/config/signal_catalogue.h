@@ -1,5 +1,4 @@
-// From names in the configuration to signals in the DBC files of a bus: reads the files, finds what
-// a role names, settles its unit. Start-up and tools only.
+// From names in the configuration to signals in the DBC files of a bus. Start-up and tools only.
 #pragma once
 
 #include <optional>
@@ -14,27 +13,7 @@
 
 namespace beltgrip::daemon {
 
-// Collects errors with their position: "FILE:LINE: key: found ..., expected ...".
-class ConfigErrors {
- public:
-  ConfigErrors(std::string file, std::vector<ConfigError>& errors)
-      : files_{std::move(file)}, errors_(errors) {}
-  // A file that is included: what its lines are counted from, so that a line tells its file.
-  std::uint32_t add_file(const std::string& file);
-  std::string place(std::uint32_t line) const;  // "FILE:LINE"
-  void add(std::uint32_t line, const std::string& key, const std::string& found,
-           const std::string& expected, int exit_code = 78);
-
- private:
-  static constexpr unsigned kLineBits = 22;  // a file of 1 MiB has fewer lines
-  static constexpr std::uint32_t kFirstLine = std::uint32_t{1} << kLineBits;
-  std::vector<std::string> files_;
-  std::vector<ConfigError>& errors_;
-};
-
-// The name in `names` nearest to `name`, where one is near enough to be a slip of the pen:
-// ", nearest is \"x\"", else nothing.
-std::string nearest_hint(std::string_view name, const std::vector<std::string>& names);
+std::string id_text(can::CanId id);  // "0x123", "0x12345678x" (29 bit)
 
 class SignalCatalogue {
  public:
@@ -47,9 +26,10 @@ class SignalCatalogue {
   void check_identifiers(const std::string& key, std::uint32_t line, ConfigErrors& errors) const;
   // True when every file could be read: only then roles can be judged.
   bool complete() const { return complete_; }
-  // The binding of a role from its TOML value; nothing when errors were added.
+  // The binding of a role from its TOML value; nothing when errors were added (config_binding).
   std::optional<RoleBinding> bind(Role role, const TomlNode& node, ConfigErrors& errors) const;
-  // The protection of the message that the node's key names; nothing when errors were added.
+  // The protection of the message that the node's key names; nothing when errors were added
+  // (config_protection).
   std::optional<MessageProtection> protect(const TomlNode& node, ConfigErrors& errors) const;
 
  private:
@@ -61,6 +41,7 @@ class SignalCatalogue {
     const File* file = nullptr;
     const can::MessageDef* message = nullptr;
   };
+  // Name or identifier; nothing when an error was added.
   std::optional<Found> find_message(std::string_view name, const std::string& key,
                                     std::uint32_t line, ConfigErrors& errors) const;
   std::vector<std::string> message_names() const;
