@@ -246,6 +246,116 @@ TEST_F(Dbc, DecodeTakesSeveralLogsOfAnyFormat) {
   EXPECT_EQ(lines(missing.out), 2);
 }
 
+TEST_F(Dbc, DecodeIsTextForPeople) {
+  place_.write("a.log",
+               "(1.5) can0 123#E803F00000000005\n"
+               "(2.25) can1 124#03000000CDCCCC3D\n"  // 0.1 as a float
+               "(3.0) can0 18FEF1FE#FF0080FFFFFFFFFF\n");
+  const std::vector<std::string> decode{"dbc", "decode", "--dbc", path("a.dbc"), path("a.log")};
+  const RunResult result = beltgrip(decode);
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_EQ(result.out,
+            "1.5 can0 0x123 Engine: Speed 97 rpm, Gear -1 (reverse), Late 5, "
+            "Long 360287970205369344\n"
+            "2.25 can1 0x124 Muxed: Page 3, Float 0.10000000149\n"
+            "3.0 can0 0x18FEF1FE Ccvs: Vehicle 128 km/h\n");
+  std::vector<std::string> to_file = decode;
+  to_file.insert(to_file.end(), {"--text", path("out.txt")});
+  EXPECT_EQ(beltgrip(to_file).status, 0);
+  EXPECT_EQ(place_.read("out.txt"), result.out);
+}
+
+TEST_F(Dbc, DecodeIsATableForPrograms) {
+  place_.write("a.log",
+               "(1.5) can0 123#0A00\n"
+               "(2.0) can0 124#030000000000C0FF\n"  // a nan with a sign
+               "(2.5) can0 124#030000000000807F\n"  // inf
+               "(3.0) can0 124#03000000000080FF\n"  // -inf
+               "(3.5) can0 124#0207\n"
+               "(4.0) can0 124#020007\n");
+  const RunResult result =
+      beltgrip({"dbc", "decode", "--dbc", path("a.dbc"), path("a.log"), "--csv", "-", "--signals",
+                "Speed", "--signals", "Muxed.Second", "--signals", "Float"});
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_EQ(result.out,
+            "t_s,iface,Engine.Speed,Muxed.Second,Muxed.Float\n"
+            "1.5,can0,-2,,\n"
+            "2.0,can0,,,nan\n"
+            "2.5,can0,,,inf\n"
+            "3.0,can0,,,-inf\n"
+            "3.5,can0,,7,\n"
+            "4.0,can0,,0,\n");
+}
+
+TEST_F(Dbc, DecodeTakesWhatIsAskedFor) {
+  const std::string log =
+      "(10.0) can0 123#0A00\n(10.5) can0 124#0107\n(11.0) can0 124#0207\n(12.0) can0 123#0B00\n";
+  const auto times = [&](std::vector<std::string> more) {
+    std::string found;
+    const RunResult result = decode(log, std::move(more));
+    EXPECT_EQ(result.status, 0) << result.err;
+    std::istringstream stream(result.out);
+    for (std::string line; std::getline(stream, line);) {
+      found += json::parse(line)["t_s"].dump() + ' ';
+    }
+    return found;
+  };
+  EXPECT_EQ(times({}), "10.0 10.5 11.0 12.0 ");
+  EXPECT_EQ(times({"--messages", "Muxed"}), "10.5 11.0 ");
+  EXPECT_EQ(times({"--messages", "Muxed", "--messages", "Engine"}), "10.0 10.5 11.0 12.0 ");
+  EXPECT_EQ(times({"--signals", "Speed"}), "10.0 12.0 ");
+  // Both ends of the time count, from the first frame of the log.
+  EXPECT_EQ(times({"--from", "0.5"}), "10.5 11.0 12.0 ");
+  EXPECT_EQ(times({"--from", "0.5", "--to", "1"}), "10.5 11.0 ");
+  EXPECT_EQ(times({"--to", "0"}), "10.0 ");
+  const RunResult one = decode("(1.0) can0 124#0107\n", {"--signals", "First"});
+  EXPECT_EQ(json::parse(one.out)["signals"], (json{{"First", 7}}))
+      << "the selector is not asked for";
+}
+
+TEST_F(Dbc, DecodeSaysWhatItCannotGive) {
+  const std::string log = "(1.0) can0 123#0A00\n";
+  for (const auto& [more, text] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"--signals", "Spede"}, "--signals Spede: no signal of that name"},
+           {{"--signals", "Muxed.Speed"}, "--signals Muxed.Speed: no signal of that name"},
+           {{"--messages", "Motor"}, "--messages Motor: no message of that name"},
+           {{"--csv", "-"}, "expected one of --text, --csv, --json"}}) {
+    const RunResult result = decode(log, more);
+    EXPECT_EQ(result.status, 64) << result.err;
+    EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
+    EXPECT_EQ(lines(result.err), 2) << "one of the DBC's own: " << result.err;
+  }
+  // Nothing decoded is no result.
+  for (const auto& [nothing, more] : std::vector<std::pair<std::string, std::vector<std::string>>>{
+           {"(1.0) can0 456#0A00\n", {}}, {log, {"--messages", "Muxed"}}, {log, {"--from", "1"}}}) {
+    const RunResult result = decode(nothing, more);
+    EXPECT_EQ(result.status, 65) << result.err;
+    EXPECT_NE(result.err.find("none of its 1 frames"), std::string::npos) << result.err;
+    EXPECT_EQ(result.out, "");
+  }
+}
+
+TEST_F(Dbc, ATableTooWideIsRefused) {
+  std::string wide = "BS_: BU_: A\n";
+  for (int message = 0; message < 40; ++message) {
+    wide += "BO_ " + std::to_string(message + 1) + " M" + std::to_string(message) + ": 8 A\n";
+    for (int signal = 0; signal < 64; ++signal) {
+      wide += " SG_ S" + std::to_string(signal) + " : " + std::to_string(signal) +
+              "|1@1+ (1,0) [0|0] \"\" A\n";
+    }
+  }
+  place_.write("wide.dbc", wide);
+  place_.write("a.log", "(1.0) can0 001#FF\n");
+  const RunResult refused =
+      beltgrip({"dbc", "decode", "--dbc", path("wide.dbc"), path("a.log"), "--csv", "-"});
+  EXPECT_EQ(refused.status, 64);
+  EXPECT_NE(refused.err.find("2560 columns, expected at most 2000"), std::string::npos)
+      << refused.err;
+  const RunResult chosen = beltgrip({"dbc", "decode", "--dbc", path("wide.dbc"), path("a.log"),
+                                     "--csv", "-", "--messages", "M0"});
+  EXPECT_EQ(chosen.status, 0) << chosen.err;
+}
+
 TEST_F(Dbc, ShowForReadersPrintsEveryMessageAndSignal) {
   const RunResult result = beltgrip({"dbc", "show", path("a.dbc")});
   EXPECT_EQ(result.status, 0);

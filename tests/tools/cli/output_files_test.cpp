@@ -18,9 +18,9 @@ namespace {
 namespace fs = std::filesystem;
 
 // What is not a name of a file that is written.
-const std::set<std::string> kNoOutputs{"--config",   "--method", "--interface", "--bus",
-                                       "--scenario", "--belt",   "--set",       "--model",
-                                       "--held-out", "--truth",  "--dbc",       "--socket"};
+const std::set<std::string> kNoOutputs{
+    "--config", "--method",   "--interface", "--bus", "--scenario", "--belt",     "--set",
+    "--model",  "--held-out", "--truth",     "--dbc", "--socket",   "--messages", "--signals"};
 constexpr const char* kMark = "not to be lost\n";
 
 struct Output {
@@ -81,6 +81,8 @@ const std::vector<Output> kOutputs{
     {"history", "--csv", false, {"history", "@history.db"}, {"history.db"}, ""},
     {"dbc show", "--json", false, {"dbc", "show", "@vehicle.dbc"}, {"vehicle.dbc"}, ""},
     {"dbc decode", "--json", false, kDecode, {"vehicle.dbc", "trace.log"}, ""},
+    {"dbc decode", "--csv", false, kDecode, {"vehicle.dbc", "trace.log"}, ""},
+    {"dbc decode", "--text", false, kDecode, {"vehicle.dbc", "trace.log"}, ""},
 };
 
 class OutputFiles : public testing::TestWithParam<Output> {

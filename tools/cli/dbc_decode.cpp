@@ -1,0 +1,308 @@
+#include "tools/cli/dbc_decode.h"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cinttypes>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string_view>
+
+#include "can_dbc/dbc/message_index.h"
+#include "can_dbc/log/can_log.h"
+#include "can_dbc/text/printable.h"
+#include "tools/cli/dbc_file.h"
+#include "tools/cli/decoded_frame.h"
+#include "tools/cli/exit_codes.h"
+#include "tools/cli/output_file.h"
+#include "tools/cli/stop_signals.h"
+#include "tools/text/terminal.h"
+
+namespace beltgrip::cli {
+
+namespace {
+
+// The names that were asked for, and which of them were found.
+class Names {
+ public:
+  explicit Names(const std::vector<std::string>& names) : names_(names) {}
+  bool all() const { return names_.empty(); }
+  bool has(const std::string& name) {
+    if (std::find(names_.begin(), names_.end(), name) == names_.end()) return false;
+    found_.insert(name);
+    return true;
+  }
+  void demand_all_found(const char* option, const char* what) const {
+    for (const std::string& name : names_) {
+      if (found_.count(name) == 0) {
+        throw Failure{kUsage, std::string("dbc decode: ") + option + ' ' + name + ": no " + what +
+                                  " of that name in the DBC (beltgrip dbc show lists them)"};
+      }
+    }
+  }
+
+ private:
+  std::vector<std::string> names_;
+  std::set<std::string> found_;
+};
+
+// The DBC files, and what of them is wanted.
+class Decoder {
+ public:
+  explicit Decoder(const DecodeOptions& options) {
+    const std::vector<std::string>& paths = options.dbc_paths;
+    for (const std::string& path : paths) {
+      results_.push_back(std::make_unique<can::DbcParseResult>(read_dbc(path)));
+      const can::DbcParseResult& result = *results_.back();
+      mention_problems(path, result.problems);
+      if (result.database.messages.empty()) fail_without_message(path);
+      databases_.push_back(&result.database);
+    }
+    index_ = can::MessageIndex(databases_);
+    mention_conflicts(paths);
+    choose(options);
+  }
+
+  // The messages of which something is wanted.
+  const std::vector<const ChosenMessage*>& chosen() const { return chosen_; }
+
+  // nullptr: no DBC names the frame, or nothing of it is wanted.
+  const ChosenMessage* decode(const can::CanFrame& frame) {
+    if (frame.remote || frame.error) return nullptr;
+    const can::MessageIndex::Place* place = index_.lookup(frame.id);
+    if (place == nullptr) return nullptr;
+    const ChosenMessage& message = messages_[place->database][place->message];
+    if (!message.definition) return nullptr;
+    message.codec.decode(frame.payload(), values_);
+    for (std::size_t i = 0; i < message.wanted.size(); ++i) {
+      values_[i].present = values_[i].present && message.wanted[i];
+    }
+    if (message.names_repeat) keep_first_of_each_name(message);
+    return &message;
+  }
+  std::span<const can::DecodedSignal> values_of(const ChosenMessage& message) const {
+    return std::span(values_).first(message.wanted.size());
+  }
+
+ private:
+  const can::MessageDef& message_at(can::MessageIndex::Place place) const {
+    return databases_[place.database]->messages[place.message];
+  }
+
+  void mention_conflicts(const std::vector<std::string>& paths) const {
+    constexpr std::size_t kConflictsShown = 10;
+    const auto& conflicts = index_.conflicts();
+    for (std::size_t i = 0; i < std::min(conflicts.size(), kConflictsShown); ++i) {
+      const can::MessageIndex::Conflict& conflict = conflicts[i];
+      print(stderr, paths[conflict.ignored.database] + ": message " +
+                        message_at(conflict.ignored).name + " has the identifier of " +
+                        message_at(conflict.used).name + " in " + paths[conflict.used.database] +
+                        ", which is used\n");
+    }
+    if (conflicts.size() > kConflictsShown) {
+      std::fprintf(stderr, "and %zu more messages with an identifier used before\n",
+                   conflicts.size() - kConflictsShown);
+    }
+  }
+
+  void choose(const DecodeOptions& options) {
+    Names messages(options.messages);
+    Names signals(options.signals);
+    std::size_t longest = 0;
+    std::size_t number = 0;
+    for (const can::Database* database : databases_) {
+      messages_.emplace_back(database->messages.size());
+      for (std::size_t m = 0; m < database->messages.size(); ++m) {
+        const can::MessageDef& definition = database->messages[m];
+        if (!messages.all() && !messages.has(definition.name)) continue;
+        ChosenMessage message = prepare(definition, signals);
+        if (std::count(message.wanted.begin(), message.wanted.end(), true) == 0 && !signals.all()) {
+          continue;
+        }
+        message.number = number++;
+        longest = std::max(longest, definition.signals.size());
+        messages_.back()[m] = std::move(message);
+      }
+    }
+    messages.demand_all_found("--messages", "message");
+    signals.demand_all_found("--signals", "signal");
+    std::size_t column = 0;
+    for (std::vector<ChosenMessage>& database : messages_) {
+      for (ChosenMessage& message : database) {
+        if (!message.definition) continue;
+        message.first_column = column;
+        column += static_cast<std::size_t>(
+            std::count(message.wanted.begin(), message.wanted.end(), true));
+        chosen_.push_back(&message);
+      }
+    }
+    values_.resize(longest);
+  }
+
+  static ChosenMessage prepare(const can::MessageDef& definition, Names& signals) {
+    ChosenMessage message;
+    message.definition = &definition;
+    message.codec = can::MessageCodec(definition);
+    std::set<std::string_view> names;
+    for (const can::SignalDef& signal : definition.signals) {
+      message.names_repeat |= !names.insert(signal.name).second;
+      // Both, so that each counts as found.
+      const bool by_name = signals.has(signal.name);
+      const bool by_place = signals.has(definition.name + '.' + signal.name);
+      message.wanted.push_back(signals.all() || by_name || by_place);
+    }
+    return message;
+  }
+
+  // A JSON object has each name once.
+  void keep_first_of_each_name(const ChosenMessage& message) {
+    std::set<std::string_view> before;
+    for (std::size_t i = 0; i < message.wanted.size(); ++i) {
+      if (!values_[i].present) continue;
+      values_[i].present = before.insert(message.definition->signals[i].name).second;
+    }
+  }
+
+  std::vector<std::unique_ptr<can::DbcParseResult>> results_;
+  std::vector<const can::Database*> databases_;
+  can::MessageIndex index_;
+  std::vector<std::vector<ChosenMessage>> messages_;  // beside the databases' messages
+  std::vector<const ChosenMessage*> chosen_;
+  std::vector<can::DecodedSignal> values_;
+};
+
+// Instants of one log that are wanted, in seconds after its first frame.
+class Window {
+ public:
+  Window(double from_s, double to_s) : from_s_(from_s), to_s_(to_s) {}
+  bool has(std::int64_t t_ns) {
+    if (std::isinf(from_s_) && std::isinf(to_s_)) return true;  // stamps that go back, too
+    if (!has_begun_) begin_ns_ = t_ns;
+    has_begun_ = true;
+    std::int64_t after_ns = 0;
+    if (__builtin_sub_overflow(t_ns, begin_ns_, &after_ns)) return false;
+    const double after_s = static_cast<double>(after_ns) * 1e-9;
+    return after_s >= from_s_ && after_s <= to_s_;
+  }
+
+ private:
+  double from_s_;  // -inf and inf: all
+  double to_s_;
+  std::int64_t begin_ns_ = 0;
+  bool has_begun_ = false;
+};
+
+// More stands ready on standard input, or it is at its end. Where nothing does, the lines written
+// so far must not wait for what may come much later.
+bool input_waits() {
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  return ::poll(&input, 1, 0) > 0;
+}
+
+std::unique_ptr<can::LogReader> open_log(const std::string& path) {
+  try {
+    return can::LogReader::open(path);
+  } catch (const can::LogOpenError& error) {
+    throw Failure{kNoInput, error.text};
+  }
+}
+
+void decode_log(Decoder& decoder, const DecodeOptions& options, const std::string& log_path,
+                FrameWriter& writer, OutputFile& out) {
+  const std::unique_ptr<can::LogReader> log = open_log(log_path);
+  Window window(options.from_s, options.to_s);
+  can::LogRecord record;
+  std::string lines;
+  std::uint64_t decoded = 0;
+  std::uint64_t in_time = 0;
+  constexpr std::size_t kBlock = std::size_t{64} * 1024;
+  const bool live = log_path == "-";
+  while (log->next(record)) {
+    if (window.has(record.t_ns)) {
+      ++in_time;
+      if (const ChosenMessage* message = decoder.decode(record.frame)) {
+        writer.append({record, *message, decoder.values_of(*message)}, lines);
+        ++decoded;
+      }
+    }
+    const bool hand_on = live && !input_waits();
+    if (lines.size() < kBlock && !hand_on) continue;
+    out.write(lines);
+    if (hand_on) out.flush();
+    lines.clear();
+  }
+  out.write(lines);
+
+  const can::LogStats& stats = log->stats();
+  for (const can::BadLine& bad : stats.first_bad) {
+    print(stderr, log_path + ":" + std::to_string(bad.line) + ": " + bad.reason + "\n");
+  }
+  const bool all = options.messages.empty() && options.signals.empty();
+  std::fprintf(stderr,
+               "%s: %" PRIu64 " frames, %" PRIu64 " decoded, %" PRIu64 " %s, %" PRIu64
+               " bad lines\n",
+               can::printable(log_path).c_str(), stats.frames, decoded, in_time - decoded,
+               all ? "that no DBC names" : "not asked for or that no DBC names", stats.lines_bad);
+  if (stats.frames == 0) {
+    throw Failure{kBadInput, log_path + ": no readable frame in it, expected a CAN log"};
+  }
+  if (decoded == 0) {
+    throw Failure{kBadInput,
+                  log_path + ": none of its " + std::to_string(stats.frames) +
+                      " frames is one that was asked for, expected a log of the bus that the DBC "
+                      "describes"};
+  }
+}
+
+struct Output {
+  std::string path;
+  std::unique_ptr<FrameWriter> writer;
+};
+
+Output output_of(const DecodeOptions& options, const Decoder& decoder) {
+  const int asked = static_cast<int>(!options.text_path.empty()) +
+                    static_cast<int>(!options.csv_path.empty()) +
+                    static_cast<int>(!options.json_path.empty());
+  if (asked > 1) {
+    throw Failure{kUsage,
+                  "dbc decode: more than one output, expected one of --text, --csv, --json"};
+  }
+  if (!options.json_path.empty()) return {options.json_path, json_writer(options.raw)};
+  if (!options.csv_path.empty()) {
+    return {options.csv_path, csv_writer(decoder.chosen(), options.raw)};
+  }
+  return {options.text_path.empty() ? "-" : options.text_path, text_writer(options.raw)};
+}
+
+}  // namespace
+
+// One log after the other; one that cannot be used does not hide the rest.
+void decode(const DecodeOptions& options) {
+  end_streams_when_stopped(options.log_paths);
+  Decoder decoder(options);
+  const Output output = output_of(options, decoder);
+  Inputs inputs(options.dbc_paths);
+  inputs.add(options.log_paths);
+  OutputFile out(output.path, inputs);
+  out.write(output.writer->head());
+  std::optional<Failure> failure;
+  bool any = false;
+  for (const std::string& log_path : options.log_paths) {
+    try {
+      decode_log(decoder, options, log_path, *output.writer, out);
+      any = true;
+    } catch (const Failure& found) {
+      if (found.exit_code != kNoInput && found.exit_code != kBadInput) throw;
+      if (failure) print(stderr, found.text + "\n");
+      if (!failure) failure = found;
+    }
+  }
+  if (any || output.path == "-") out.close();
+  if (failure) throw *failure;
+}
+
+}  // namespace beltgrip::cli

@@ -1,0 +1,48 @@
+// A frame of a log with what a DBC says of it, and its three forms. Tools only.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "can_dbc/dbc/message_codec.h"
+#include "can_dbc/dbc/model.h"
+#include "can_dbc/log/can_log.h"
+
+namespace beltgrip::cli {
+
+// A message of a DBC that is to be decoded: which of its signals are wanted.
+struct ChosenMessage {
+  const can::MessageDef* definition = nullptr;
+  can::MessageCodec codec;
+  std::vector<bool> wanted;      // beside the definition's signals
+  std::size_t number = 0;        // among all messages of all DBC files
+  std::size_t first_column = 0;  // in CSV: of its first wanted signal
+  bool names_repeat = false;     // among its signals
+};
+
+struct DecodedFrame {
+  const can::LogRecord& record;
+  const ChosenMessage& message;
+  std::span<const can::DecodedSignal> values;  // beside the definition's signals
+};
+
+// Text of the value table; nullptr: none.
+const std::string* label_of(const DecodedFrame& frame, std::size_t signal);
+
+class FrameWriter {
+ public:
+  virtual ~FrameWriter() = default;
+  virtual std::string head() const { return {}; }
+  virtual void append(const DecodedFrame& frame, std::string& out) = 0;
+};
+
+// Each gets the messages in the order of their columns.
+std::unique_ptr<FrameWriter> text_writer(bool with_raw);
+std::unique_ptr<FrameWriter> json_writer(bool with_raw);
+// One column a signal, a row a frame. Failure 64 with more columns than a table can be read with.
+std::unique_ptr<FrameWriter> csv_writer(std::span<const ChosenMessage* const> messages,
+                                        bool with_raw);
+
+}  // namespace beltgrip::cli
