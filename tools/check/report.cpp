@@ -149,7 +149,7 @@ std::string text(const Checked& checked) {
     for (std::size_t i = 0; i < checked.prospects.forbidden_by.size(); ++i) {
       const std::uint64_t times = checked.prospects.forbidden_by[i];
       if (times == 0) continue;
-      const std::string name(daemon::kInhibitNames[i]);
+      const std::string name(daemon::kInhibits[i].name);
       const std::string what = limit_text(static_cast<daemon::Inhibit>(i), checked.config);
       out += wrapped(format("  kept away %llu time%s: ", static_cast<unsigned long long>(times),
                             times == 1 ? "" : "s"),
@@ -224,7 +224,7 @@ std::string json(const Checked& checked) {
   json.field("in_reach", prospects.in_reach).key("forbidden_by").begin_object();
   for (std::size_t i = 0; i < prospects.forbidden_by.size(); ++i) {
     if (prospects.forbidden_by[i] > 0) {
-      json.field(daemon::kInhibitNames[i], prospects.forbidden_by[i]);
+      json.field(daemon::kInhibits[i].name, prospects.forbidden_by[i]);
     }
   }
   json.end_object();

@@ -69,7 +69,7 @@ std::string limit_text(daemon::Inhibit inhibit, const daemon::Config& config) {
     case Inhibit::kForce:
       return "the controller's own force still moves";
     default:
-      return std::string(daemon::kInhibitNames[static_cast<std::size_t>(inhibit)]);
+      return std::string(daemon::kInhibits[static_cast<std::size_t>(inhibit)].name);
   }
 }
 
