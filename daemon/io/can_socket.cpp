@@ -38,6 +38,7 @@ bool set_option(int fd, int level, int name, const T& value) noexcept {
 }
 
 can_filter filter_of(const WantedFrames& wanted) noexcept {
+  if (wanted.every) return {0, 0};
   // Exactly this identifier of this kind, or any of its parameter group, and no remote frames.
   return {wanted.id.value | (wanted.id.extended ? CAN_EFF_FLAG : 0),
           can::identifier_mask(wanted.id, wanted.by_group) | CAN_EFF_FLAG | CAN_RTR_FLAG};

@@ -145,10 +145,10 @@ void BusView::take_arming(const daemon::SampleReport& report) {
   settling_.step(now);
   const std::uint32_t inhibits = arming_.inhibits();
 
-  // No foot forbids it, and one or two conditions alone are missing: those are told.
+  // No foot forbids it, and few conditions alone are missing: those are told.
   const std::uint32_t conditions = inhibits & ~kClearance;
   const bool near =
-      conditions != 0 && (conditions & kDriver) == 0 && std::popcount(conditions) <= 2;
+      conditions != 0 && (conditions & kDriver) == 0 && std::popcount(conditions) <= kNearMisses;
   if (!near) {
     missing_ = 0;
   } else if (conditions != missing_) {

@@ -90,7 +90,7 @@ class BusView final : public daemon::SampleSink {
   std::array<std::uint64_t, daemon::kInhibitCount> unclear_samples_{};
   Opportunity now_;
   double best_reach_ = 0.0;
-  std::uint32_t missing_ = 0;  // one or two conditions, all others hold
+  std::uint32_t missing_ = 0;  // few conditions, all others hold
   daemon::MonoTime missing_since_ = 0, newest_ = 0;
   bool missing_counted_ = false;
 };

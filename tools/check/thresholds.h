@@ -82,4 +82,8 @@ inline constexpr double kPressureRises = 0.15;
 inline constexpr double kRatioSpread = 0.15;  // standard deviation of log(ratio), for that
 inline constexpr double kCorrelationSure = 0.5;
 
+// --- experiments --------------------------------------------------------------------------------
+// Chosen: with more conditions missing the car was not about to coast as an experiment needs it.
+inline constexpr int kNearMisses = 3;
+
 }  // namespace beltgrip::check

@@ -162,16 +162,18 @@ Verdict judge(const RoleWatch& watch, const std::vector<Window>& windows,
         verdict.sentence += "; " + reach;
       } else if (seen && prospects.judged) {
         verdict.sentence += "; this drive had no opportunity for an experiment";
-        const auto most =
-            std::max_element(prospects.forbidden_by.begin(), prospects.forbidden_by.end());
-        if (*most > 0) {
-          const auto which = most - prospects.forbidden_by.begin();
-          verdict.sentence += ": " + limit_text(static_cast<daemon::Inhibit>(which), config);
+        const std::uint64_t most =
+            *std::max_element(prospects.forbidden_by.begin(), prospects.forbidden_by.end());
+        std::string why;
+        for (std::size_t i = 0; most > 0 && i < prospects.forbidden_by.size(); ++i) {
+          if (prospects.forbidden_by[i] < most) continue;
+          why += (why.empty() ? ": " : ", ") + limit_text(static_cast<daemon::Inhibit>(i), config);
         }
+        verdict.sentence += why;
       }
       break;
   }
-  verdict.sentence += ".";
+  if (!verdict.sentence.ends_with('?')) verdict.sentence += '.';
   return verdict;
 }
 

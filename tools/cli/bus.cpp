@@ -60,6 +60,22 @@ std::unique_ptr<daemon::Port> open_bus(const std::string& name,
   return std::move(std::get<std::unique_ptr<daemon::SocketPort>>(opened));
 }
 
+std::unique_ptr<daemon::Port> open_buses_whole(const daemon::Config& config, int stop_fd) {
+  if (config.interface.starts_with(kInproc)) return open_bus(config.interface, {}, stop_fd);
+  std::vector<daemon::BusToOpen> buses{{config.interface, "bus.interface"}};
+  std::vector<daemon::WantedFrames> wanted{{.id = {}, .bus = 0, .every = true}};
+  if (config.further_bus) {
+    buses.push_back(
+        {config.further_bus->interface, "bus." + config.further_bus->name + ".interface"});
+    wanted.push_back({.id = {}, .bus = 1, .every = true});
+  }
+  auto opened = daemon::SocketPort::open(buses, wanted, stop_fd);
+  if (const auto* error = std::get_if<daemon::BusError>(&opened)) {
+    throw Failure{kUnavailable, error->text};
+  }
+  return std::move(std::get<std::unique_ptr<daemon::SocketPort>>(opened));
+}
+
 bool play(daemon::Port& port, const std::string& name, double speed,
           const std::function<bool(can::StampedFrame&)>& next) {
   const daemon::MonoTime origin = port.now();

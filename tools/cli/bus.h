@@ -10,6 +10,7 @@
 
 #include "can_dbc/frame/can_frame.h"
 #include "daemon/core/base/port.h"
+#include "daemon/core/config/config.h"
 
 namespace beltgrip::cli {
 
@@ -17,6 +18,9 @@ namespace beltgrip::cli {
 // `stop_fd` (stop_signals.h) is readable, the port's waiting ends.
 std::unique_ptr<daemon::Port> open_bus(const std::string& name,
                                        const std::vector<can::CanId>& identifiers, int stop_fd);
+
+// The buses of a configuration, and every frame on them. Throws Failure 69.
+std::unique_ptr<daemon::Port> open_buses_whole(const daemon::Config& config, int stop_fd);
 
 // Sends what next() gives, at the frames' distances in time divided by speed. False when it was
 // stopped before the end. Throws Failure 69 when the bus goes away.

@@ -22,6 +22,7 @@
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
 #include "tools/cli/stop_signals.h"
+#include "tools/cli/table_hint.h"
 #include "tools/ports/replay_port.h"
 #include "tools/text/terminal.h"
 
@@ -86,11 +87,9 @@ void look_at_log(const std::string& path, const daemon::Config& config, check::R
   const auto timeline = open_timeline({path}, "", config.identifiers, further_interface(config));
   ports::ReplayPort port(*timeline, {});
   if (port.empty()) {
-    const can::LogStats stats = timeline->stats();
-    throw Failure{kBadInput,
-                  path + ": no readable frame in " + std::to_string(stats.lines) +
-                      " lines; expected a CAN log (candump -L, .asc, .trc, .blf, .mf4): a table of "
-                      "signals has no frames, and without time stamps it is no record of a drive"};
+    throw Failure{kBadInput, path + ": no readable frame in " +
+                                 std::to_string(timeline->stats().lines) + " lines" +
+                                 table_hint(path)};
   }
   look(port, config, watch, {}, seen);
   const can::LogStats stats = timeline->stats();
@@ -115,7 +114,7 @@ void run(const Options& options) {
   Seen seen;
   std::string what;
   if (live) {
-    const auto port = open_bus(config.interface, {}, stop_descriptor());
+    const auto port = open_buses_whole(config, stop_descriptor());
     look(*port, config, watch, static_cast<daemon::Duration>(options.live_s * 1e9), seen);
     char seconds[32];
     std::snprintf(seconds, sizeof seconds, "%.4g", options.live_s);

@@ -12,6 +12,7 @@
 #include "daemon/core/publish/own_frames.h"
 #include "estimator/method/possible_friction.h"
 #include "tools/cli/exit_codes.h"
+#include "tools/cli/table_hint.h"
 #include "tools/ports/log_timeline.h"
 #include "tools/ports/record_port.h"
 #include "tools/ports/replay_port.h"
@@ -162,7 +163,7 @@ Failure no_frames(const ReplayResult& result, const can::LogStats& stats,
   if (!stats.first_bad.empty()) {
     text += ", line " + std::to_string(stats.first_bad[0].line) + ": " + stats.first_bad[0].reason;
   }
-  return {kBadInput, text};
+  return {kBadInput, text + table_hint(result.log)};
 }
 
 std::string format(const char* pattern, auto... arguments) {

@@ -25,11 +25,12 @@ struct RxFrame {
   std::uint8_t bus = 0;              // that it came from, < kBusMax
 };
 
-// Frames that are wanted: those of one identifier, or of its J1939 parameter group.
+// Frames that are wanted: those of one identifier, or of its J1939 parameter group, or all.
 struct WantedFrames {
   can::CanId id;
   bool by_group = false;
   std::uint8_t bus = 0;
+  bool every = false;
 };
 
 enum class Wake : std::uint8_t {

@@ -71,6 +71,28 @@ TEST_F(Bus, ReplayPlaysALogAtItsOwnPace) {
   EXPECT_LT(ms, 2000);
 }
 
+// check sees every frame, those of no role too, and sends none.
+TEST_F(Bus, CheckListensAndSendsNothing) {
+  const std::string place = folder();
+  ASSERT_EQ(
+      beltgrip({"simulate", "--scenario", "coast-overdrive", "--duration", "8", "--out-dir", place})
+          .status,
+      0);
+  const BusSocket bus("vcan0");
+  Process car({program("beltgrip"), "replay", place + "/trace.log", "--bus", "vcan0"});
+  const RunResult result =
+      beltgrip({"check", "--live", "4", "--config", place + "/beltgrip.toml", "--json", "-"});
+  EXPECT_EQ(result.status, 0) << result.err;
+  car.signal(SIGTERM);
+  car.wait(kLimit);
+  const auto found = nlohmann::json::parse(result.out);
+  EXPECT_TRUE(found.at("roles").at("primary_speed").at("seen"));
+  EXPECT_NEAR(found.at("roles").at("primary_speed").at("rate_Hz"), 100.0, 20.0);
+  while (const auto frame = bus.receive(Milliseconds{20})) {
+    EXPECT_LT(frame->frame.can_id, 0x6A0U);
+  }
+}
+
 TEST_F(Bus, ABusThatIsNotThereIs69) {
   for (const std::vector<std::string>& arguments :
        {std::vector<std::string>{"monitor", "vcan9"},

@@ -1,0 +1,63 @@
+// The small parts of a check, on cases computed by hand.
+#include <gtest/gtest.h>
+
+#include "tools/check/judge_across.h"
+#include "tools/check/text.h"
+#include "tools/check/thinned.h"
+
+namespace beltgrip::check {
+namespace {
+
+TEST(Thinned, KeepsAnEvenShareHoweverLongItIs) {
+  Thinned<double> thinned;
+  constexpr int kMany = 100'000;
+  for (int i = 0; i < kMany; ++i) thinned.add(i);
+  EXPECT_EQ(thinned.seen(), 100'000U);
+  EXPECT_LE(thinned.values().size(), Thinned<double>::kMost);
+  EXPECT_GE(thinned.values().size(), Thinned<double>::kMost / 2);
+  const double stride = thinned.values()[1];
+  for (std::size_t i = 0; i < thinned.values().size(); ++i) {
+    ASSERT_EQ(thinned.values()[i], stride * static_cast<double>(i));
+  }
+  EXPECT_NEAR(quantile(thinned.values(), 0.5), 0.5 * kMany, stride);
+}
+
+TEST(Text, Numbers) {
+  EXPECT_EQ(grouped(7280.4), "7,280");
+  EXPECT_EQ(grouped(-1234567.0), "-1,234,567");
+  EXPECT_EQ(grouped(-0.2), "0");
+  EXPECT_EQ(number(0.125), "0.125");
+  EXPECT_EQ(number(28651.2), "28,651");
+  EXPECT_EQ(number(0.00025), "0.00025");
+}
+
+// A car of the default variator: ratio from low to overdrive and back, 0.06 m a radian.
+std::vector<Window> drive(bool swapped) {
+  std::vector<Window> windows;
+  for (int i = 0; i < 200; ++i) {
+    Window window;
+    window.mean.fill(std::numeric_limits<double>::quiet_NaN());
+    window.change.fill(std::numeric_limits<double>::quiet_NaN());
+    const double ratio = 0.41 + 1.83 * std::abs(i % 100 - 50) / 50.0;
+    const double primary = 180.0, secondary = ratio * primary;
+    const auto set = [&](Role role, double value) {
+      window.mean[static_cast<std::size_t>(role)] = value;
+    };
+    set(Role::kPrimarySpeed, swapped ? secondary : primary);
+    set(Role::kSecondarySpeed, swapped ? primary : secondary);
+    set(Role::kVehicleSpeed, 0.06 * secondary);
+    windows.push_back(window);
+  }
+  return windows;
+}
+
+TEST(Across, TheWheelsTellWhichPulleyIsWhich) {
+  EXPECT_TRUE(judge_across(drive(false), {}).empty());
+  const Findings found = judge_across(drive(true), {});
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].weight, Weight::kWrong);
+  EXPECT_NE(found[0].text.find("swapped"), std::string::npos) << found[0].text;
+}
+
+}  // namespace
+}  // namespace beltgrip::check

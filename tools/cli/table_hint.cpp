@@ -1,0 +1,69 @@
+#include "tools/cli/table_hint.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <fstream>
+#include <string_view>
+#include <vector>
+
+namespace beltgrip::cli {
+
+namespace {
+
+constexpr int kLinesLooked = 60;
+constexpr std::size_t kColumnsLeast = 3;
+
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view kBlank = " \t\r\"";
+  const std::size_t first = text.find_first_not_of(kBlank);
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
+}
+
+std::vector<std::string> cells_of(std::string_view line, char separator) {
+  std::vector<std::string> cells;
+  for (std::size_t at = 0; at <= line.size();) {
+    const std::size_t end = std::min(line.find(separator, at), line.size());
+    cells.emplace_back(trimmed(line.substr(at, end - at)));
+    at = end + 1;
+  }
+  return cells;
+}
+
+// Names, no numbers.
+bool is_head(const std::vector<std::string>& cells) {
+  const auto named = std::count_if(cells.begin(), cells.end(), [](const std::string& cell) {
+    return !cell.empty() && std::isalpha(static_cast<unsigned char>(cell.front())) != 0;
+  });
+  return cells.size() >= kColumnsLeast && 10 * named >= 9 * static_cast<long>(cells.size());
+}
+
+bool is_time(std::string cell) {
+  for (char& c : cell) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return cell == "t" || cell.starts_with("t[") || cell.starts_with("t_") ||
+         cell.starts_with("time");
+}
+
+}  // namespace
+
+std::string table_hint(const std::string& path) {
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(path, none)) return {};  // a pipe cannot be read twice
+  std::ifstream file(path, std::ios::binary);
+  std::string line;
+  for (int i = 0; i < kLinesLooked && std::getline(file, line); ++i) {
+    if (line.empty() || line.front() == '#') continue;
+    for (const char separator : {',', ';', '\t'}) {
+      const std::vector<std::string> cells = cells_of(line, separator);
+      if (!is_head(cells)) continue;
+      const bool timed = std::any_of(cells.begin(), cells.end(), is_time);
+      return "; it looks like a table of " + std::to_string(cells.size()) + " signals" +
+             (timed ? "" : " without a time column") +
+             ": expected a CAN log (candump -L, .asc, .trc, .blf, .mf4)";
+    }
+  }
+  return {};
+}
+
+}  // namespace beltgrip::cli
