@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "can_dbc/dbc/parser.h"
+#include "daemon/core/config/config_model.h"
 #include "daemon/core/publish/own_frames.h"
 #include "estimator/physics/machine_effects.h"
 #include "tests/support/program.h"
@@ -75,6 +76,21 @@ std::string frames() {
   return out.str();
 }
 
+void add_model(std::ostream& out) {
+  out << "\n## The model file\n"
+      << "`beltgrip diagnose --model-out` writes it, `model` in `[estimator]` names it. "
+         "`[variator]` "
+      << "has the keys of the section above. `[effects.NAME]` has those of `tools/DIAGNOSE.md`. "
+      << "What is left out stays as it is.\n\n"
+      << "| section | key | unit | meaning |\n|---|---|---|---|\n";
+  for (const auto& options : {daemon::friction_options(), daemon::driveline_options()}) {
+    for (const daemon::OptionRow& option : options) {
+      out << "| `[" << option.section << "]` | `" << option.key << "` | " << option.unit << " | "
+          << cell(option.help) << " |\n";
+    }
+  }
+}
+
 // The commented default file, section by section.
 std::string configuration() {
   const RunResult printed =
@@ -97,6 +113,7 @@ std::string configuration() {
     if (open) out << line << "\n";
   }
   out << "```\n";
+  add_model(out);
   return out.str();
 }
 

@@ -8,6 +8,7 @@
 
 #include "daemon/core/config/config_document.h"
 #include "daemon/core/config/config_options.h"
+#include "daemon/core/config/option_reader.h"
 
 namespace beltgrip::daemon {
 namespace {
@@ -17,10 +18,61 @@ using estimator::EffectRow;
 using estimator::MachineEffects;
 
 constexpr std::size_t kFileSizeMax = std::size_t{1} << 20;
-constexpr std::array<std::string_view, 8> kDrivelineKeys{
-    "deformation_per_kN",       "loss_constant_Nm",   "loss_per_rad_s_Nm",
-    "ratio_overdrive_relative", "ratio_low_relative", "secondary_inertia_kg_m2",
-    "command_offset_Pa",        "command_gain"};
+
+using Kind = OptionRow::Kind;
+
+constexpr OptionRow key(std::string_view section, std::string_view name, std::string_view unit,
+                        std::string_view help) {
+  OptionRow row;
+  row.section = section;
+  row.key = name;
+  row.kind = Kind::kNumber;
+  row.unit = unit;
+  row.help = help;
+  return row;
+}
+
+constexpr OptionRow kFriction[] = {
+    key("friction", "mu_max", "", "Peak of the traction curve."),
+    key("friction", "peak_slip_overdrive_percent", "%",
+        "Slip at the peak, at the overdrive end stop."),
+    key("friction", "peak_slip_low_percent", "%", "The same at the low end stop."),
+    key("friction", "shape_N_overdrive", "",
+        "Departure of the traction curve from the nominal one at its knot N, at the overdrive end "
+        "stop."),
+    key("friction", "shape_N_low", "", "The same at the low end stop."),
+};
+
+constexpr OptionRow kDriveline[] = {
+    key("driveline", "deformation_per_kN", "1/kN",
+        "Share of the ratio that the deformation of the pulleys takes, per clamping force."),
+    key("driveline", "loss_constant_Nm", "Nm", "Torque that is lost before the belt, constant."),
+    key("driveline", "loss_per_rad_s_Nm", "Nm s/rad", "And per speed of the primary pulley."),
+    key("driveline", "ratio_overdrive_relative", "",
+        "By which share the ratio at the overdrive end stop is greater than in [variator]."),
+    key("driveline", "ratio_low_relative", "", "The same at the low end stop."),
+    key("driveline", "secondary_inertia_kg_m2", "kg m2",
+        "Inertia between the belt and secondary_torque."),
+    key("driveline", "command_offset_Pa", "Pa",
+        "By how much the secondary pressure is above its command."),
+    key("driveline", "command_gain", "", "And by which share of the command."),
+};
+
+// "shape_N_low" stands for any N.
+bool is_called(const OptionRow& option, std::string_view name) {
+  constexpr std::string_view kAny = "_N_";
+  const std::size_t any = option.key.find(kAny);
+  if (any == std::string_view::npos) return name == option.key;
+  return name.starts_with(option.key.substr(0, any + 1)) &&
+         name.ends_with(option.key.substr(any + kAny.size() - 1));
+}
+
+const OptionRow* row_of(std::span<const OptionRow> options, std::string_view name) {
+  for (const OptionRow& option : options) {
+    if (is_called(option, name)) return &option;
+  }
+  return nullptr;
+}
 
 std::string number(double value) {
   char buffer[32];
@@ -32,142 +84,119 @@ std::string number(double value) {
 
 class Reader {
  public:
-  Reader(const std::string& name, const ModelFile& base) : name_(name), model_(base) {}
+  Reader(const std::string& name, const ModelFile& base) : errors_(name, found_), model_(base) {}
 
   ModelFile read(const std::string& text) {
     auto parsed = parse_toml(text);
     if (const auto* error = std::get_if<TomlSyntaxError>(&parsed)) {
-      fail(error->line, "syntax: " + error->text);
+      errors_.add(error->line, "syntax", in_quotes(error->text), "TOML");
+    } else {
+      for (const TomlNode& section : std::get<TomlNode>(parsed).children) read_section(section);
     }
-    for (const TomlNode& section : std::get<TomlNode>(parsed).children) {
-      if (section.type != TomlType::kTable) {
-        fail(section.line, section.key + ": found " + section.found() + ", expected a section");
-      }
-      if (section.key == "variator") {
-        read_variator(section);
-      } else if (section.key == "friction") {
-        read_numbers(section, is_friction_key, model_.friction);
-      } else if (section.key == "driveline") {
-        read_numbers(section, is_driveline_key, model_.driveline);
-      } else if (section.key == "effects") {
-        for (const TomlNode& effect : section.children) read_effect(effect);
-      } else {
-        fail(section.line, section.key +
-                               ": found an unknown section, expected variator, friction, "
-                               "driveline or effects.ID");
-      }
-    }
+    if (!found_.empty()) throw ModelError{false, found_.front().text};
     return model_;
   }
 
  private:
-  [[noreturn]] void fail(std::uint32_t line, const std::string& what) const {
-    throw ModelError{false, name_ + ":" + std::to_string(line) + ": " + what};
-  }
-  double number_of(const std::string& where, const TomlNode& node) const {
-    if (!node.is_number() || !std::isfinite(node.number)) {
-      fail(node.line, where + "." + node.key + ": found " + node.found() + ", expected a number");
+  void read_section(const TomlNode& section) {
+    const std::vector<std::string> names{"variator", "friction", "driveline", "effects"};
+    if (section.type != TomlType::kTable) {
+      errors_.add(section.line, section.key, section.found(), "a section");
+    } else if (section.key == "variator") {
+      read_variator(section);
+    } else if (section.key == "friction") {
+      read_numbers(section, kFriction, model_.friction);
+    } else if (section.key == "driveline") {
+      read_numbers(section, kDriveline, model_.driveline);
+    } else if (section.key == "effects") {
+      for (const TomlNode& effect : section.children) read_effect(effect);
+    } else {
+      errors_.add(section.line, section.key, "an unknown section",
+                  "variator, friction, driveline or effects.ID" + nearest_hint(section.key, names));
     }
-    return node.number;
   }
 
   void read_variator(const TomlNode& section) {
     Config config;
     config.variator = model_.variator;
+    std::vector<Option> options;
+    for (const Option& option : option_table()) {
+      if (option.section == "variator") options.push_back(option);
+    }
     for (const TomlNode& node : section.children) {
-      const auto options = option_table();
-      const auto option = std::find_if(options.begin(), options.end(), [&](const auto& each) {
-        return each.section == "variator" && each.key == node.key;
-      });
+      const std::string where = key_of(section.key, node.key);
+      const auto option = std::find_if(options.begin(), options.end(),
+                                       [&](const Option& each) { return each.key == node.key; });
       if (option == options.end()) {
-        fail(node.line, "variator." + node.key +
-                            ": found an unknown key, expected one of the "
-                            "configuration's [variator]");
+        errors_.add(node.line, where, "an unknown key",
+                    "a key of [variator]" + nearest_hint(node.key, key_names(options)));
+      } else if (read_value(*option, where, node, config, errors_)) {
+        model_.variator_keys.push_back(node.key);
       }
-      const double value = number_of("variator", node);
-      if (!(value >= option->minimum && value <= option->maximum)) {
-        fail(node.line, "variator." + node.key + ": found " + node.found() +
-                            ", expected a number from " + number(option->minimum) + " to " +
-                            number(option->maximum));
-      }
-      option->number(config) = value * option->factor;
-      model_.variator_keys.push_back(node.key);
     }
     model_.variator = config.variator;
   }
 
-  void read_numbers(const TomlNode& section, bool (*known)(std::string_view),
+  void read_numbers(const TomlNode& section, std::span<const OptionRow> options,
                     std::map<std::string, double>& into) {
     for (const TomlNode& node : section.children) {
-      if (!known(node.key)) {
-        fail(node.line, section.key + "." + node.key + ": found an unknown key");
+      const OptionRow* option = row_of(options, node.key);
+      if (option == nullptr) {
+        add_unknown_key(section.key, node, key_names(options), errors_);
+      } else if (!fits(*option, node)) {
+        errors_.add(node.line, key_of(section.key, node.key), node.found(), expected_text(*option));
+      } else {
+        into[node.key] = node.number;
       }
-      into[node.key] = number_of(section.key, node);
     }
   }
 
+  // Parameters and role of an effect as in its rows of the table of effects.
   void read_effect(const TomlNode& section) {
-    const auto keys = effect_rows();
-    const auto of_this = [&](const EffectRow& key) { return key.id == section.key; };
-    if (section.type != TomlType::kTable || std::none_of(keys.begin(), keys.end(), of_this)) {
-      std::vector<std::string> names;
-      for (const EffectRow& key : keys) names.emplace_back(key.id);
-      fail(section.line, "effects." + section.key + ": found an unknown effect" +
-                             nearest_hint(section.key, names));
+    const std::string where = key_of("effects", section.key);
+    std::vector<std::string> effects;
+    std::vector<OptionRow> options;
+    const EffectRow* effect_row = nullptr;
+    for (const EffectRow& row : effect_rows()) {
+      effects.emplace_back(row.id);
+      if (row.id != section.key) continue;
+      if (effect_row == nullptr) effect_row = &row;
+      options.push_back(key(row.id, row.parameter, row.unit, row.equation));
     }
-    ModelEffect effect;
-    for (const TomlNode& node : section.children) {
-      if (node.key == "role") {
-        if (node.type != TomlType::kText) {
-          fail(node.line, "effects." + section.key + ".role: found " + node.found() +
-                              ", expected the name of a role");
-        }
-        effect.role = node.text;
-        continue;
-      }
-      std::string names;
-      for (const EffectRow& key : keys) {
-        if (of_this(key)) names += (names.empty() ? "" : ", ") + std::string(key.parameter);
-      }
-      if (std::none_of(keys.begin(), keys.end(), [&](const EffectRow& key) {
-            return of_this(key) && key.parameter == node.key;
-          })) {
-        fail(node.line, "effects." + section.key + "." + node.key +
-                            ": found an unknown key, expected one of " + names);
-      }
-      effect.parameters[node.key] = number_of("effects." + section.key, node);
+    if (section.type != TomlType::kTable || effect_row == nullptr) {
+      errors_.add(section.line, where, "an unknown effect",
+                  "the name of an effect" + nearest_hint(section.key, effects));
+      return;
     }
-    const auto row = std::find_if(keys.begin(), keys.end(), of_this);
-    if (!takes_role(*row, effect.role)) {
-      std::string roles;
-      for (const estimator::EffectRole& each : row->roles) {
-        const bool last = &each == &row->roles.back();
-        roles += (roles.empty() ? "" : last ? " or " : ", ") + std::string(each.role);
+    TomlNode parameters = section;
+    parameters.key = where;
+    std::erase_if(parameters.children, [](const TomlNode& node) { return node.key == "role"; });
+    ModelEffect& effect = model_.effects[section.key] = {};
+    if (const TomlNode* role = section.find("role")) {
+      effect.role = role->text;
+      if (role->type != TomlType::kText) {
+        errors_.add(role->line, key_of(where, "role"), role->found(), "the name of a role");
       }
-      fail(section.line, "effects." + section.key + ".role: found " + in_quotes(effect.role) +
-                             ", expected " + roles);
     }
-    model_.effects[section.key] = effect;
+    read_numbers(parameters, options, effect.parameters);
+    if (takes_role(*effect_row, effect.role)) return;
+    std::vector<std::string> roles;
+    for (const estimator::EffectRole& each : effect_row->roles) roles.emplace_back(each.role);
+    errors_.add(section.line, key_of(where, "role"), in_quotes(effect.role), names_text(roles));
   }
 
-  std::string name_;
+  std::vector<ConfigError> found_;
+  ConfigErrors errors_;
   ModelFile model_;
 };
 
 }  // namespace
 
-bool is_friction_key(std::string_view name) {
-  if (name == "mu_max" || name == "peak_slip_overdrive_percent" ||
-      name == "peak_slip_low_percent") {
-    return true;
-  }
-  // shape_N_overdrive, shape_N_low: departures of the curve from the nominal one.
-  return name.starts_with("shape_") && (name.ends_with("_overdrive") || name.ends_with("_low"));
-}
+std::span<const OptionRow> friction_options() { return kFriction; }
+std::span<const OptionRow> driveline_options() { return kDriveline; }
 
-bool is_driveline_key(std::string_view name) {
-  return std::find(kDrivelineKeys.begin(), kDrivelineKeys.end(), name) != kDrivelineKeys.end();
-}
+bool is_friction_key(std::string_view name) { return row_of(kFriction, name) != nullptr; }
+bool is_driveline_key(std::string_view name) { return row_of(kDriveline, name) != nullptr; }
 
 ModelFile parse_model(const std::string& text, const std::string& name, const ModelFile& base) {
   return Reader(name, base).read(text);

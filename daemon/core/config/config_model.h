@@ -4,11 +4,13 @@
 #pragma once
 
 #include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "daemon/core/config/config_text.h"
+#include "daemon/core/config/option.h"
 #include "estimator/physics/machine_effects.h"
 #include "estimator/physics/parameters.h"
 
@@ -33,6 +35,9 @@ struct ModelError {
   std::string text;  // one line: file, line, key, found, expected
 };
 
+// The keys of [friction] and [driveline]; those of [effects.ID] are in the table of effects.
+std::span<const OptionRow> friction_options();
+std::span<const OptionRow> driveline_options();
 bool is_friction_key(std::string_view name);
 bool is_driveline_key(std::string_view name);
 

@@ -70,14 +70,18 @@ TEST(ModelFile, ARoleSaysWhichInstanceIsMeant) {
 
 TEST(ModelFile, ErrorsNameFileLineAndKey) {
   EXPECT_EQ(error_of("[effects.magic]\nsize = 1\n"),
-            "m.toml:1: effects.magic: found an unknown effect");
+            "m.toml:1: effects.magic: found an unknown effect, expected the name of an effect");
   EXPECT_EQ(error_of("[effects.wear]\nsteps = 1\n"),
-            "m.toml:2: effects.wear.steps: found an unknown key, expected one of step, at, "
-            "per_experiment");
+            "m.toml:2: effects.wear.steps: found an unknown key, expected step, at or "
+            "per_experiment; nearest is \"step\"");
   EXPECT_EQ(error_of("[variator]\nratio_low = \"a\"\n"),
-            "m.toml:2: variator.ratio_low: found \"a\", expected a number");
+            "m.toml:2: variator.ratio_low: found \"a\", expected a number from 0.1 to 10");
   EXPECT_EQ(error_of("[variator]\nratio_low = 99.0\n"),
-            "m.toml:2: variator.ratio_low: found 99, expected a number from 0.1 to 10.0");
+            "m.toml:2: variator.ratio_low: found 99, expected a number from 0.1 to 10");
+  EXPECT_EQ(error_of("[driveline]\ncomand_gain = 1\n")
+                .find("m.toml:2: driveline.comand_gain: found an unknown key, expected "
+                      "deformation_per_kN, "),
+            0U);
 }
 
 }  // namespace

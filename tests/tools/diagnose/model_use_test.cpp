@@ -153,7 +153,7 @@ TEST_F(Machine, AModelThatCannotBeUsedIsSaid) {
   const RunResult bad = beltgrip({"simulate", "--model", place_.path("bad.toml")});
   EXPECT_EQ(bad.status, 78);
   EXPECT_NE(bad.err.find("bad.toml:2: effects.torque_bias.bias: found an unknown key, expected "
-                         "one of bias_Nm"),
+                         "bias_Nm"),
             std::string::npos)
       << bad.err;
   EXPECT_EQ(beltgrip({"simulate", "--model", place_.path("none.toml")}).status, 66);
