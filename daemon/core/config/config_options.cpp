@@ -3,6 +3,7 @@
 #include <array>
 #include <numbers>
 
+#include "daemon/core/base/named.h"
 #include "daemon/core/config/config_bus.h"
 #include "daemon/core/config/config_uds.h"
 
@@ -11,19 +12,41 @@ namespace beltgrip::daemon {
 namespace {
 
 using estimator::EstimatorSettings;
+using estimator::Method;
+using estimator::RatioChoice;
+using estimator::StopRule;
 using estimator::VariatorParameters;
 using namespace option_row;
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kEndless = OptionRow::kEndless;
 
-constexpr std::string_view kMethods[] = {"robust", "paper"};
-constexpr std::string_view kTriggers[] = {"coast_down", "steady", "signal", "always"};
-constexpr std::string_view kControls[] = {"observe", "command"};
-constexpr std::string_view kRatios[] = {"overdrive", "low", "either"};
-constexpr std::string_view kDiagnostics[] = {"listen", "poll"};
-constexpr std::string_view kStops[] = {"peak", "confidence"};
-constexpr std::string_view kByteOrders[] = {"little", "big"};
+// The words of an enumeration, one for each value in its order; else it does not compile.
+template <typename Enum, std::size_t kCount>
+consteval std::array<std::string_view, kCount> words(const std::array<Named<Enum>, kCount>& rows) {
+  if (!in_wire_order(rows)) throw "not in the order of the enumeration";
+  std::array<std::string_view, kCount> out;
+  for (std::size_t i = 0; i < kCount; ++i) out[i] = rows[i].name;
+  return out;
+}
+
+constexpr auto kMethods =
+    words<Method, 2>({{{Method::kRobust, "robust"}, {Method::kPaper, "paper"}}});
+constexpr auto kTriggers = words<Trigger, 4>({{{Trigger::kCoastDown, "coast_down"},
+                                               {Trigger::kSteady, "steady"},
+                                               {Trigger::kSignal, "signal"},
+                                               {Trigger::kAlways, "always"}}});
+constexpr auto kControls =
+    words<Control, 2>({{{Control::kObserve, "observe"}, {Control::kCommand, "command"}}});
+constexpr auto kRatios = words<RatioChoice, 3>({{{RatioChoice::kOverdrive, "overdrive"},
+                                                 {RatioChoice::kLow, "low"},
+                                                 {RatioChoice::kEither, "either"}}});
+constexpr auto kDiagnostics =
+    words<Diagnostics, 2>({{{Diagnostics::kListen, "listen"}, {Diagnostics::kPoll, "poll"}}});
+constexpr auto kStops =
+    words<StopRule, 2>({{{StopRule::kPeak, "peak"}, {StopRule::kConfidence, "confidence"}}});
+constexpr auto kByteOrders = words<can::ByteOrder, 2>(
+    {{{can::ByteOrder::kLittle, "little"}, {can::ByteOrder::kBig, "big"}}});
 constexpr std::string_view kPathsExpected = "an array of paths: [\"vehicle.dbc\"]";
 
 // Sections that are read into the Config itself.
@@ -280,7 +303,8 @@ constexpr OptionOf<UdsSource> kUdsOptions[] = {
         .required(),
     choice<&UdsSource::signal, &can::SignalDef::byte_order>(
         "signals.ROLE.uds", "byte_order", kByteOrders,
-        "\"big\": the byte with the highest bits comes first (Motorola); \"little\": that with the "
+        "\"big\": the byte with the highest bits comes first (Motorola);\n\"little\": that with "
+        "the "
         "lowest (Intel).")
         .expecting("\"big\" or \"little\""),
     number<&UdsSource::signal, &can::SignalDef::scale>("signals.ROLE.uds", "scale", "", -kEndless,
