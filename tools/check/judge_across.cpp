@@ -275,9 +275,23 @@ void Across::lockup() {
                "%.0f %% of it for %.0f %% of the time only: another signal, or true_when",
                quantile(engine, 0.5), 400.0 * kSameSpeed, 100.0 * together));
   } else if (closed_s > kStandsClosed_s && is_bound(Role::kBrakePressed) &&
-             braked_s > kCrcWrongShare * closed_s && braked_s > 0.9 * closed_s) {
+             braked_s > kMostly * closed_s) {
     doubt(format("lockup_closed only while the brake is pressed (%.1f of %.1f s): is it the brake?",
                  braked_s, closed_s));
+  }
+  // Open, and yet one shaft all the time.
+  std::vector<double> open;
+  for (const Window& window : windows_) {
+    if (!(window[Role::kLockupClosed] < 0.01) || !(window[Role::kEngineSpeed] > 0.0)) continue;
+    if (!(window[Role::kPrimarySpeed] > kMoving_rad_s)) continue;
+    open.push_back(window[Role::kEngineSpeed] / window[Role::kPrimarySpeed]);
+  }
+  const double as_one = share_of(open, [](double r) { return std::abs(r - 1.0) < kSameSpeed; });
+  if (open.size() >= 4 * kWindowsLeast && as_one > kMostly) {
+    doubt(
+        format("lockup_closed is 0 while engine and primary turn as one (within %.1f %% for "
+               "%.0f %% of %.0f s): true_when or scale the wrong way round?",
+               100.0 * kSameSpeed, 100.0 * as_one, kWindow_s * static_cast<double>(open.size())));
   }
 }
 

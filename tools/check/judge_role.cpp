@@ -241,6 +241,14 @@ void Judge::rate() {
 }
 
 void Judge::gaps() {
+  if (course_.silent_s > kSilentLeast_s && course_.silent_s > kSilentPeriods / course_.rate_Hz()) {
+    const std::string text =
+        course_.silent_from_s == 0.0
+            ? format("not in the first %.1f s of the log", course_.silent_s)
+            : format("never again after %.1f s, for the last %.1f s of the log",
+                     course_.silent_from_s, course_.silent_s);
+    doubt(text + ": a node that sleeps, or a cut?");
+  }
   if (course_.gap_count == 0) return;
   std::string text =
       format("%llu gap%s, the longest %.2f s", static_cast<unsigned long long>(course_.gap_count),

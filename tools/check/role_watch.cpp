@@ -58,6 +58,24 @@ void RoleWatch::begin_log() {
   if (asks) diagnostics_.emplace(config_);
 }
 
+void RoleWatch::end_log() {
+  if (!first_) return;
+  for (std::size_t i = 0; i < courses_.size(); ++i) {
+    RoleCourse& course = courses_[i];
+    if (!states_[i].heard) continue;
+    const double end_s = last_span_s_ - seconds(states_[i].heard_at - *first_);
+    const double before_s = states_[i].begun_s;
+    if (end_s > course.silent_s) {
+      course.silent_s = end_s;
+      course.silent_from_s = last_span_s_ - end_s;
+    }
+    if (before_s > course.silent_s) {
+      course.silent_s = before_s;
+      course.silent_from_s = 0.0;
+    }
+  }
+}
+
 const RoleCourse* RoleWatch::find(Role role) const {
   for (const RoleCourse& course : courses_) {
     if (course.binding->role == role) return &course;
@@ -186,6 +204,7 @@ void RoleWatch::take_time(RoleCourse& course, State& state, MonoTime t) {
   const double t_s = seconds(t - *first_);
   if (!state.heard) {
     state.heard = true;
+    state.begun_s = t_s;
     course.first_s = course.span_s == 0.0 ? t_s : course.first_s;
   } else {
     const double interval_s = seconds(t - state.heard_at);

@@ -47,9 +47,10 @@ struct RoleCourse {
   double step = 0.0;  // greatest common step of its raw values; 0: it never moved
   double longest_gap_s = 0.0;
   std::uint64_t gap_count = 0;
-  double span_s = 0.0;     // of its frames, pauses between logs left out
-  std::vector<Gap> gaps;   // the first ones
-  Thinned<double> spread;  // values
+  double span_s = 0.0;                         // of its frames, pauses between logs left out
+  double silent_s = 0.0, silent_from_s = 0.0;  // longest end, or beginning, of a log without it
+  std::vector<Gap> gaps;                       // the first ones
+  Thinned<double> spread;                      // values
   Thinned<double> intervals_s;
   Thinned<double> bends;               // second differences
   std::vector<can::CanFrame> refused;  // the first whose CRC is wrong
@@ -71,6 +72,7 @@ class RoleWatch {
   explicit RoleWatch(const daemon::Config& config);
 
   void begin_log();  // what follows has another clock
+  void end_log();    // after the last frame of each
   void on_frame(const daemon::RxFrame& frame);
 
   const std::vector<RoleCourse>& roles() const { return courses_; }
@@ -84,6 +86,7 @@ class RoleWatch {
   struct State {
     bool heard = false;
     MonoTime heard_at = 0;
+    double begun_s = 0.0;
     std::optional<std::uint32_t> counter;
     int known = 0;  // values in a row, for differences: 0, 1, 2
     double previous = 0.0, before = 0.0;

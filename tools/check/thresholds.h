@@ -17,6 +17,8 @@ inline constexpr double kGapLeast_s = 0.05, kGapPeriods = 2.5;
 // Chosen: from here on gaps are told of as coming at regular times; scatter by their median.
 inline constexpr int kRegularGaps = 3;
 inline constexpr double kRegularScatter = 0.1;
+// Chosen: nodes of one bus wake and fall asleep within a second or two of each other.
+inline constexpr double kSilentLeast_s = 3.0, kSilentPeriods = 20.0;
 // Derived: the sampler waits for at most 50 ms (daemon/core/input/sampler.h), of a slower signal
 // the slope is followed.
 inline constexpr double kRateLeast_Hz = 10.0;
@@ -68,6 +70,8 @@ inline constexpr double kPerMinute = 9.549296585513721;  // 1/min in a rad/s
 // Chosen: below these a car stands.
 inline constexpr double kStanding_rad_s = 5.0, kMoving_rad_s = 40.0;
 inline constexpr double kStandsClosed_s = 2.0;
+// Chosen: an open converter turns as one shaft now and then, at little torque, not nearly always.
+inline constexpr double kMostly = 0.9;
 // Measured (all shipped scenarios: +0.75 and more where torque moves by 15 Nm).
 inline constexpr double kTorqueSpread_Nm = 10.0;
 inline constexpr double kTorqueAgainst = -0.5;
@@ -81,6 +85,15 @@ inline constexpr double kCarriedShare = 0.05;  // of the windows
 inline constexpr double kPressureRises = 0.15;
 inline constexpr double kRatioSpread = 0.15;  // standard deviation of log(ratio), for that
 inline constexpr double kCorrelationSure = 0.5;
+
+// --- against what calibrate measures ------------------------------------------------------------
+inline constexpr double kConstantDeviations = 3.0;
+// Derived: a delay of the torque of 5 ms is within one sample; a ratio that is off by 1 % is half
+// the slip at the peak; an inertia off by 15 % is some newton metres in a coast-down.
+inline constexpr double kDelayTold_s = 5e-3;
+inline constexpr double kRatioOff = 0.01, kInertiaOff = 0.15;
+// Derived: 10 kPa are 113 N of clamp force, a twentieth of it in a coast-down.
+inline constexpr double kZeroTold_Pa = 10e3;
 
 // --- experiments --------------------------------------------------------------------------------
 // Chosen: with more conditions missing the car was not about to coast as an experiment needs it.

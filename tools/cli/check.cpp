@@ -1,6 +1,8 @@
 // beltgrip check: is a configuration fit for a car? What a log or a bus shows of every role, what
 // belongs together, which experiments the driving allows, and what is missing.
+#include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <memory>
@@ -11,7 +13,9 @@
 
 #include "can_dbc/dbc/parser.h"
 #include "daemon/core/loop/loop.h"
+#include "tools/calibrate/calibrate.h"
 #include "tools/check/bus_view.h"
+#include "tools/check/judge_constants.h"
 #include "tools/check/listening_port.h"
 #include "tools/check/report.h"
 #include "tools/check/role_watch.h"
@@ -19,6 +23,7 @@
 #include "tools/cli/bus.h"
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"
+#include "tools/cli/log_table.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
 #include "tools/cli/stop_signals.h"
@@ -80,6 +85,7 @@ void look(daemon::Port& port, const daemon::Config& config, check::RoleWatch& wa
   check::BusView view(config, watch, pipeline, seen.windows, seen.prospects);
   daemon::run_loop(listening_port, pipeline, quiet.estimator.sample_rate_hz,
                    estimator::StopReason::kTraceEnd, &view);
+  watch.end_log();
 }
 
 void look_at_log(const std::string& path, const daemon::Config& config, check::RoleWatch& watch,
@@ -96,6 +102,24 @@ void look_at_log(const std::string& path, const daemon::Config& config, check::R
   if (stats.lines_bad > 0) {
     warn(path + ": " + std::to_string(stats.lines_bad) + " unreadable lines");
   }
+}
+
+// The constants as these drives show them, where the signals are right and the logs can be read
+// once more: into memory, so not of very long ones.
+check::Findings constants(const std::vector<std::string>& logs, const daemon::Config& config,
+                          const check::RoleWatch& watch, const check::Verdict& verdict) {
+  constexpr std::uint64_t kFramesMost = 5'000'000;
+  const auto is_file = [](const std::string& log) {
+    std::error_code none;
+    return std::filesystem::is_regular_file(log, none);
+  };
+  if (verdict.ready == check::Ready::kNone || watch.frames() > kFramesMost || logs.empty()) {
+    return {};
+  }
+  if (!std::all_of(logs.begin(), logs.end(), is_file)) return {};
+  std::vector<diagnose::SignalTable> tables;
+  for (const std::string& log : logs) tables.push_back(read_log(log, config, true));
+  return check::judge_constants(calibrate::calibrate(tables, config), config);
 }
 
 void run(const Options& options) {
@@ -124,8 +148,11 @@ void run(const Options& options) {
     look_at_log(log, config, watch, seen);
     what += (what.empty() ? "" : ", ") + log;
   }
-  const check::Verdict verdict = check::judge(watch, seen.windows.values(), seen.prospects, config,
-                                              dbc_units(config), !what.empty());
+  check::Verdict verdict = check::judge(watch, seen.windows.values(), seen.prospects, config,
+                                        dbc_units(config), !what.empty());
+  for (check::Finding& each : constants(options.logs, config, watch, verdict)) {
+    verdict.across.push_back(std::move(each));
+  }
   const check::Checked checked{config, watch, seen.prospects, verdict, what};
   if (json) {
     json->write(check::json(checked));

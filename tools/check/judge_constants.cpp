@@ -1,0 +1,45 @@
+#include "tools/check/judge_constants.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tools/check/text.h"
+#include "tools/check/thresholds.h"
+
+namespace beltgrip::check {
+
+Findings judge_constants(std::span<const calibrate::Finding> measured,
+                         const daemon::Config& config) {
+  Findings found;
+  for (const calibrate::Finding& each : measured) {
+    if (!each.value) continue;
+    const double value = *each.value;
+    const double sure = kConstantDeviations * each.std;
+    if (each.key.starts_with("delay.")) {
+      if (std::abs(value) < std::max(sure, kDelayTold_s)) continue;
+      found.push_back(
+          {Weight::kNote, each.key.substr(6) +
+                              format(" tells %.0f ms %s (+- %.0f)", 1e3 * std::abs(value),
+                                     value > 0.0 ? "late" : "early", 1e3 * each.std) +
+                              ": delay_ms, as beltgrip calibrate writes it"});
+    } else if (each.key.starts_with("variator.")) {
+      if (each.configured <= 0.0) continue;
+      const bool ratio = each.key.starts_with("variator.ratio");
+      const double allowed = each.configured * (ratio ? kRatioOff : kInertiaOff);
+      if (std::abs(value - each.configured) < std::max(sure, allowed)) continue;
+      const bool assumed =
+          std::find(config.assumed.begin(), config.assumed.end(), each.key) != config.assumed.end();
+      found.push_back(
+          {Weight::kDoubt, each.key + format(" reads as %.4g +- %.2g, %s %.4g", value, each.std,
+                                             assumed ? "assumed" : "configured", each.configured)});
+    } else if (std::abs(value) > std::max(sure, kZeroTold_Pa)) {
+      found.push_back(
+          {Weight::kDoubt, each.key + format(" reads %.3g kPa where all stands still: offset, as "
+                                             "beltgrip calibrate writes it",
+                                             1e-3 * value)});
+    }
+  }
+  return found;
+}
+
+}  // namespace beltgrip::check
