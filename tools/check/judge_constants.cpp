@@ -11,8 +11,20 @@ namespace beltgrip::check {
 Findings judge_constants(std::span<const calibrate::Finding> measured,
                          const daemon::Config& config) {
   Findings found;
+  // Where nothing shows that the converter is closed, slip in it passes for inertia and delay.
+  const bool closed_shows = std::any_of(
+      config.roles.begin(), config.roles.end(),
+      [](const daemon::RoleBinding& role) { return role.role == daemon::Role::kEngineSpeed; });
+  // And a delay that comes with an inertia that was refused is no better.
+  const bool inertia_known =
+      std::any_of(measured.begin(), measured.end(), [](const calibrate::Finding& each) {
+        return each.key == "variator.primary_inertia_kg_m2" && each.value;
+      });
   for (const calibrate::Finding& each : measured) {
     if (!each.value) continue;
+    const bool by_torque =
+        each.key == "delay.engine_torque" || each.key == "variator.primary_inertia_kg_m2";
+    if (by_torque && !(closed_shows && inertia_known)) continue;
     const double value = *each.value;
     const double sure = kConstantDeviations * each.std;
     if (each.key.starts_with("delay.")) {

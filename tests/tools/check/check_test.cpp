@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "tools/check/judge_across.h"
+#include "tools/check/judge_constants.h"
 #include "tools/check/text.h"
 #include "tools/check/thinned.h"
 
@@ -57,6 +58,34 @@ TEST(Across, TheWheelsTellWhichPulleyIsWhich) {
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].weight, Weight::kWrong);
   EXPECT_NE(found[0].text.find("swapped"), std::string::npos) << found[0].text;
+}
+
+daemon::Config with_engine_speed(bool bound) {
+  daemon::Config config;
+  if (bound) config.roles.emplace_back().role = Role::kEngineSpeed;
+  return config;
+}
+
+calibrate::Finding finding(const char* key, std::optional<double> value, double std,
+                           double configured) {
+  return {key, value, std, configured, "", ""};
+}
+
+TEST(Constants, AreHeldAgainstTheConfigurationWhereTheyCanBeTrusted) {
+  const std::vector<calibrate::Finding> measured{
+      finding("variator.ratio_overdrive", 2.31, 0.001, 2.25),
+      finding("variator.ratio_low", 0.406, 0.0002, 0.405),
+      finding("variator.primary_inertia_kg_m2", 0.13, 0.005, 0.18),
+      finding("delay.engine_torque", 0.03, 0.004, 0.0)};
+  EXPECT_EQ(judge_constants(measured, with_engine_speed(true)).size(), 3U);
+  const Findings found = judge_constants(measured, with_engine_speed(false));
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].weight, Weight::kDoubt);
+  EXPECT_EQ(found[0].text, "variator.ratio_overdrive reads as 2.31 +- 0.001, configured 2.25");
+  // The inertia refused: its delay says nothing.
+  const std::vector<calibrate::Finding> refused{
+      finding("variator.primary_inertia_kg_m2", {}, 0.0, 0.18), measured[3]};
+  EXPECT_TRUE(judge_constants(refused, with_engine_speed(true)).empty());
 }
 
 }  // namespace
