@@ -98,6 +98,10 @@ std::string experiments_text(const Prospects& prospects, const daemon::Config& c
     return text;
   }
   const bool coast = config.trigger == daemon::Trigger::kCoastDown;
+  if (prospects.opportunities == 0) {
+    return std::string("this drive never ") + (coast ? "coasted" : "drove steadily") +
+           " as an experiment needs it";
+  }
   std::string text = std::to_string(prospects.opportunities) +
                      (prospects.opportunities == 1 ? " time" : " times") + " this drive " +
                      (coast ? "coasted" : "drove steadily") + " as an experiment needs it, in " +

@@ -141,6 +141,7 @@ Verdict judge(const RoleWatch& watch, const std::vector<Window>& windows,
   switch (verdict.ready) {
     case Ready::kNone:
       verdict.sentence = "Not ready: " + verdict.missing.front();
+      if (wrong > 1) verdict.sentence += "; and " + std::to_string(wrong - 1) + " more, see above";
       break;
     case Ready::kObserve:
       verdict.sentence = "Ready to observe" + only_configuration;
