@@ -8,8 +8,8 @@
 #include <string>
 
 #include "tools/cli/own_frame_view.h"
-#include "tools/sim/rig_simulation.h"
 #include "tools/sim/rig_scenario.h"
+#include "tools/sim/rig_simulation.h"
 
 namespace beltgrip::cli {
 
