@@ -205,7 +205,7 @@ void BusView::end_opportunity() {
   held_ = false;
   if (!settled_) return;
   ++prospects_.opportunities;
-  now_.begin_s = static_cast<double>(held_since_ - *begin_) * 1e-9;
+  now_.begin_s = static_cast<double>(held_since_ - begin_.value_or(held_since_)) * 1e-9;
   now_.length_s = static_cast<double>(newest_ - held_since_) * 1e-9;
   // Without the inertia the slip limits cannot be judged: reach alone counts.
   const bool by_reach_alone = config_.variator.primary_inertia_kg_m2 <= 0.0;

@@ -155,9 +155,11 @@ std::string text(const Checked& checked) {
       if (times == 0) continue;
       const std::string name(daemon::kInhibits[i].name);
       const std::string what = limit_text(static_cast<daemon::Inhibit>(i), checked.config);
+      std::string said = name;
+      if (what != name) said.append(": ").append(what);
       out += wrapped(format("  kept away %llu time%s: ", static_cast<unsigned long long>(times),
                             times == 1 ? "" : "s"),
-                     what == name ? name : name + ": " + what);
+                     said);
     }
     const std::string reach = reach_text(checked.prospects, checked.config);
     if (!reach.empty()) out += wrapped("  ", reach);

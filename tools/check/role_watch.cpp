@@ -87,7 +87,7 @@ void RoleWatch::on_frame(const daemon::RxFrame& frame) {
   if (frame.frame.error) return;
   ++frames_;
   if (!first_) first_ = frame.t;
-  last_span_s_ = std::max(last_span_s_, seconds(frame.t - *first_));
+  last_span_s_ = std::max(last_span_s_, seconds(frame.t - first_.value_or(frame.t)));
   const std::pair key{frame.bus, frame.frame.id};
   if (census_.size() < kIdentifiersMost || census_.contains(key)) {
     Heard& heard = census_[key];
@@ -101,6 +101,7 @@ void RoleWatch::on_frame(const daemon::RxFrame& frame) {
 }
 
 void RoleWatch::take_frame(RoleCourse& course, State& state, const daemon::RxFrame& frame) {
+  if (!course.binding) return;
   const daemon::RoleBinding& binding = *course.binding;
   if (binding.uds) {
     const daemon::SignalHistory& history = diagnostics_->history(binding.role);
@@ -110,7 +111,7 @@ void RoleWatch::take_frame(RoleCourse& course, State& state, const daemon::RxFra
     ++course.values;
     ++course.in_range;
     take_time(course, state, frame.t);
-    take_value(course, state, history.newest_value(), seconds(frame.t - *first_));
+    take_value(course, state, history.newest_value(), seconds(frame.t - first_.value_or(frame.t)));
     return;
   }
   if (frame.bus != binding.bus) return;
@@ -160,7 +161,7 @@ void RoleWatch::take_frame(RoleCourse& course, State& state, const daemon::RxFra
     course.step = static_cast<double>(std::gcd(so_far, least)) * unit;
   }
   state.raw = raw;
-  take_value(course, state, value, seconds(frame.t - *first_));
+  take_value(course, state, value, seconds(frame.t - first_.value_or(frame.t)));
 }
 
 // Counts what the daemon would refuse. False: what the frame says is not believed either.
@@ -201,7 +202,7 @@ bool RoleWatch::protection_holds(RoleCourse& course, State& state, const can::Ca
 }
 
 void RoleWatch::take_time(RoleCourse& course, State& state, MonoTime t) {
-  const double t_s = seconds(t - *first_);
+  const double t_s = seconds(t - first_.value_or(t));
   if (!state.heard) {
     state.heard = true;
     state.begun_s = t_s;

@@ -118,6 +118,7 @@ check::Findings constants(const std::vector<std::string>& logs, const daemon::Co
   }
   if (!std::all_of(logs.begin(), logs.end(), is_file)) return {};
   std::vector<diagnose::SignalTable> tables;
+  tables.reserve(logs.size());
   for (const std::string& log : logs) tables.push_back(read_log(log, config, true));
   return check::judge_constants(calibrate::calibrate(tables, config), config);
 }

@@ -315,6 +315,7 @@ std::vector<std::string> signal_names(const can::Database& dbc) {
 
 std::vector<std::string> message_names(const can::Database& dbc) {
   std::vector<std::string> names;
+  names.reserve(dbc.messages.size());
   for (const can::MessageDef& message : dbc.messages) names.push_back(message.name);
   return names;
 }

@@ -25,10 +25,12 @@ void ScenarioEffects::put(ScenarioReader& reader, estimator::MachineEffects& mac
     if (!takes_role(row, role)) {
       std::string roles;
       for (const estimator::EffectRole& each : row.roles) {
-        roles += (roles.empty() ? "" : ", ") + std::string(each.role);
+        roles.append(roles.empty() ? "" : ", ").append(each.role);
       }
+      std::string said = "found role = \"";
+      said.append(role).append("\", expected one of ").append(roles);
       reader.contradiction("effects." + std::string(row.id) + "." + std::string(row.parameter),
-                           "found role = \"" + role + "\", expected one of " + roles);
+                           said);
       continue;
     }
     if (double estimator::MachineEffects::*const value = value_of(row, role)) {

@@ -182,8 +182,9 @@ void Loader::read_signals() {
     return;
   }
   read_catalogue(config_.dbc, "bus.dbc", line, catalogue_);
-  if (has_further_dbc()) {
-    const FurtherBus& bus = *config_.further_bus;
+  const std::optional<FurtherBus>& further = config_.further_bus;
+  if (further && has_further_dbc()) {
+    const FurtherBus& bus = *further;
     read_catalogue(bus.dbc, key_of("bus", bus.name) + ".dbc", line_of(root_, "bus", bus.name),
                    further_catalogue_);
   }

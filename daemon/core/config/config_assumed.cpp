@@ -36,8 +36,9 @@ void assume_constants(const TomlNode& root, const std::vector<std::string>& mode
 }
 
 void assume_accuracy(Role role, bool decides, SensorText& sensor, Config& config) {
-  const estimator::ChannelAccuracy& typical =
-      estimator::typical_accuracy(*sensor_of(role)).accuracy;
+  const std::optional<estimator::Sensor> channel = sensor_of(role);
+  if (!channel) return;
+  const estimator::ChannelAccuracy& typical = estimator::typical_accuracy(*channel).accuracy;
   const std::string key = key_of("sensors", role_name(role));
   const auto value = [&](std::optional<double>& stated, double usual, std::string_view name) {
     if (stated) return;

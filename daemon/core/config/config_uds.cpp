@@ -40,8 +40,10 @@ struct RolePlace {
 // No other frame has the identifiers of a request and its answer.
 void check_alone(const Config& config, const RoleBinding& role, const RolePlace& place,
                  ConfigErrors& errors) {
+  if (!role.uds) return;
+  const UdsSource& source = *role.uds;
   for (const auto& [name, id] :
-       {std::pair("request", role.uds->request), std::pair("response", role.uds->response)}) {
+       {std::pair("request", source.request), std::pair("response", source.response)}) {
     const std::string key = key_of(place.key + ".uds", name);
     if (role.bus == 0 && is_own(config.identifiers, id)) {
       errors.add(place.line, key, "an identifier of BeltGrip's own frames",
@@ -60,6 +62,7 @@ void check_alone(const Config& config, const RoleBinding& role, const RolePlace&
 // An ECU has one identifier for requests and one for answers.
 void check_pairs(const Config& config, const RoleBinding& role, const RolePlace& place,
                  ConfigErrors& errors) {
+  if (!role.uds) return;
   const UdsSource& source = *role.uds;
   for (const RoleBinding& other : config.roles) {
     if (!other.uds || other.bus != role.bus || other.role >= role.role) continue;
@@ -77,7 +80,7 @@ void check_pairs(const Config& config, const RoleBinding& role, const RolePlace&
 }
 
 void check_poll(const RoleBinding& role, const RolePlace& place, ConfigErrors& errors) {
-  if (is_functional(role.uds->request)) {
+  if (role.uds && is_functional(role.uds->request)) {
     errors.add(place.line, place.key + ".uds.request", "the address of all ECUs at once",
                "that of one ECU, as bus.diagnostics is \"poll\"");
   }

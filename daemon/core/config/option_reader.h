@@ -21,6 +21,7 @@ bool read_paths(const OptionRow& option, const std::string& key, const TomlNode&
 template <typename Rows>
 std::vector<std::string> key_names(const Rows& options) {
   std::vector<std::string> names;
+  names.reserve(std::size(options));
   for (const OptionRow& option : options) names.emplace_back(option.key);
   return names;
 }
