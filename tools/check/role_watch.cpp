@@ -104,6 +104,7 @@ void RoleWatch::take_frame(RoleCourse& course, State& state, const daemon::RxFra
   if (!course.binding) return;
   const daemon::RoleBinding& binding = *course.binding;
   if (binding.uds) {
+    if (!diagnostics_) return;
     const daemon::SignalHistory& history = diagnostics_->history(binding.role);
     if (history.empty() || history.newest() == state.diagnostics) return;
     state.diagnostics = history.newest();
