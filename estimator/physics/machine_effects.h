@@ -80,7 +80,8 @@ struct EffectRow {
   std::string_view acts_on;     // friction, ratio, torque, clamp force, speed
   std::string_view depends_on;  // what the residual follows
   std::string_view separating;  // the experiment that tells it from its twins
-  // Most rows leave it out. NOLINTNEXTLINE(readability-redundant-member-init)
+  // Most rows leave it out, and g++ warns of that where it has no initializer.
+  // NOLINTNEXTLINE(readability-redundant-member-init)
   std::span<const EffectRole> roles = {};
 };
 

@@ -35,7 +35,7 @@ enum class Fault : std::uint8_t {
 };
 // Bits 24 to 43 of BeltGripStatus; the gate refuses a status frame with a bit beyond
 // (guard/tx_gate).
-inline constexpr std::size_t kFaultCount = 20;
+inline constexpr std::size_t kFaultCount = 20;  // of the enumeration above
 
 // Signal names are "Fault" followed by these.
 inline constexpr std::array<Named<Fault>, kFaultCount> kFaults{

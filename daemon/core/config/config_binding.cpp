@@ -9,8 +9,10 @@ namespace beltgrip::daemon {
 
 namespace {
 
+// Chosen: ends a circle of multiplexers. DBC files nest two or three.
 constexpr std::size_t kMuxDepth = 16;
-constexpr std::size_t kNamedMost = 256;  // values at which a flag is 1
+// Values at which a flag is 1. Derived: all of a signal of 8 bits.
+constexpr std::size_t kNamedMost = 256;
 constexpr std::uint32_t kClassicPayload = 8;
 
 std::string signal_text(const can::SignalDef& signal) {
@@ -107,7 +109,8 @@ bool RoleBinder::read_true_when(const can::SignalDef& signal, RoleBinding& bindi
                                                    nearest_hint(each.text, labels));
   }
   // Each frame is compared with them.
-  if (values.size() > kNamedMost) return wrong(node, "at most 256 values");
+  if (values.size() > kNamedMost)
+    return wrong(node, "at most " + std::to_string(kNamedMost) + " values");
   return true;
 }
 

@@ -59,7 +59,7 @@ std::string key_of(std::string_view table, std::string_view key) {
 }
 
 std::string nearest_hint(std::string_view name, const std::vector<std::string>& names) {
-  constexpr std::size_t kNameMax = 128;
+  constexpr std::size_t kNameMax = 128;  // chosen: a DBC name has 32, and the cost is its square
   if (name.size() > kNameMax) return {};
   const std::string wanted = lower(name);
   std::size_t best_distance = 3 + name.size() / 4;

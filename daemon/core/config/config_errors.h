@@ -9,6 +9,7 @@
 
 namespace beltgrip::daemon {
 
+// sysexits.h: EX_DATAERR, EX_NOINPUT, EX_CONFIG.
 inline constexpr int kExitData = 65, kExitNoInput = 66, kExitConfiguration = 78;
 
 struct ConfigError {

@@ -38,7 +38,7 @@ bool has_other(const RoleBinding& flag, const can::SignalDef& signal) {
     const auto [low, high] = std::minmax({raw_at(flag.minimum), raw_at(flag.maximum)});
     range = {low, high};
   }
-  constexpr std::size_t kAtTheEnds = 2;  // outside by a rounding
+  constexpr std::size_t kAtTheEnds = 2;  // derived: at each end one may lie outside by a rounding
   std::size_t looked_at = 0;
   for (std::int64_t raw = range.low; looked_at <= flag.true_when.size() + kAtTheEnds; ++looked_at) {
     if (!is_named(flag, raw) && in_range(flag, static_cast<std::uint64_t>(raw))) return true;

@@ -10,6 +10,7 @@ namespace beltgrip::daemon {
 
 namespace {
 
+// Chosen, each far beyond what a person writes: what a wrong path (/dev/zero) or a circle may cost.
 constexpr std::size_t kSizeMax = std::size_t{1} << 20;  // of a configuration, with all its files
 constexpr std::size_t kIncludeDepthMax = 8;             // files within each other
 constexpr std::size_t kIncludedMax = 64;

@@ -63,6 +63,7 @@ std::optional<estimator::Sensor> sensor_of(Role role);
 // What is assumed of a key of [variator] that is left out; empty: nothing.
 std::string assumption_text(const Option& option);
 
+// Chosen: the period of a sample; an ECU answers in 5 to 50 ms.
 inline constexpr double kPollPeriodMinimum_ms = 10.0;
 
 }  // namespace beltgrip::daemon
