@@ -26,7 +26,10 @@ double density(const ChannelNoise& noise) {
 class Knowledge {
  public:
   Knowledge(const Scenario& s, const Trace& trace, double stop_s)
-      : s_(s), trace_(trace), base_(parameters(s.curve)), curve_(parameter_count(s.curve.family)) {
+      : s_(s),
+        trace_(trace),
+        base_(parameters(s.curve)),
+        curve_(parameter_count(s.curve.family())) {
     const int size = curve_ + 4;
     const double radius =
         s.low ? s.variator.primary_radius_low_m : s.variator.primary_radius_overdrive_m;
@@ -48,6 +51,15 @@ class Knowledge {
       return std::abs(trace.clamp_N[i] / last_N - 1.0) < kStandsStill;
     };
     const bool floor = end > second && near_last(end - second);
+    steps_.resize(static_cast<std::size_t>(curve_));
+    for (std::size_t p = 0; p < steps_.size(); ++p) {
+      auto up = base_, down = base_;
+      steps_[p].size = 1e-4 * std::max(1e-3, std::abs(base_[p]));
+      up[p] += steps_[p].size;
+      down[p] -= steps_[p].size;
+      steps_[p].up = with_parameters(s.curve, up);
+      steps_[p].down = with_parameters(s.curve, down);
+    }
     information_ = Eigen::MatrixXd::Zero(size, size);
     for (std::size_t i = 0; i < end; ++i) {
       const double t = static_cast<double>(i) * sample_s;
@@ -72,14 +84,8 @@ class Knowledge {
     Eigen::VectorXd g = Eigen::VectorXd::Zero(curve_ + 4);
     const double slip = trace_.slip[i];
     for (int p = 0; p < curve_; ++p) {
-      const auto at = static_cast<std::size_t>(p);
-      auto up = base_, down = base_;
-      const double step = 1e-4 * std::max(1e-3, std::abs(base_[at]));
-      up[at] += step;
-      down[at] -= step;
-      g(p) = (with_parameters(s_.curve, up).value(slip) -
-              with_parameters(s_.curve, down).value(slip)) /
-             (2.0 * step);
+      const Step& step = steps_[static_cast<std::size_t>(p)];
+      g(p) = (step.up.value(slip) - step.down.value(slip)) / (2.0 * step.size);
     }
     g(curve_) = -slope_at(i) * trace_.clamp_N[i] / 1e4;
     return g;
@@ -105,6 +111,11 @@ class Knowledge {
   const Trace& trace_;
   std::array<double, kCurveParameters> base_;
   int curve_;
+  struct Step {  // the curve with one parameter a little up and down
+    double size = 0.0;
+    FrictionCurve up, down;
+  };
+  std::vector<Step> steps_;
   Eigen::MatrixXd information_;
 };
 
@@ -113,7 +124,7 @@ class Knowledge {
 double mu_max_bound(const Scenario& s, const Trace& trace, double stop_s) {
   if (!trace.peak_reached) return 0.0;
   const Knowledge known(s, trace, stop_s);
-  return known.deviation(known.of_mu_max()) / s.curve.mu_max;
+  return known.deviation(known.of_mu_max()) / s.curve.mu_max();
 }
 
 double reached_bound(const Scenario& s, const Trace& trace, double stop_s) {
@@ -128,11 +139,10 @@ double reached_bound(const Scenario& s, const Trace& trace, double stop_s) {
 
 namespace {
 
-// The form of a curve by slip over that of its peak, with the shape changed.
+// The form of a curve by slip over that of its peak.
 class Stretched {
  public:
-  Stretched(FrictionCurve curve, double shape_factor) : slip_peak_(curve.slip_peak) {
-    curve.shape *= shape_factor;
+  explicit Stretched(const FrictionCurve& curve) : slip_peak_(curve.slip_peak()) {
     for (int i = 0; i <= kSize; ++i) table_[i] = curve.value(slip_peak_ * kLast * i / kSize);
     reached_ = curve.slip_reached(kNearTop) / slip_peak_;
   }
@@ -172,8 +182,13 @@ DetectionBound detection_bound(const Scenario& s, const Trace& trace) {
   const double slip_density =
       1e4 * (density(s.omega_p) / square(s.omega_p_rad_s) + density(s.omega_s) / square(omega_s));
   std::vector<Stretched> forms;
+  const bool has_shape = parameter_count(s.curve.family()) == kCurveParameters;
   for (const double factor : {0.8, 0.9, 1.0, 1.1, 1.25}) {
-    if (factor == 1.0 || s.curve.family != Family::kBrush) forms.emplace_back(s.curve, factor);
+    if (factor != 1.0 && !has_shape) continue;
+    auto changed = parameters(s.curve);
+    changed.back() *= factor;
+    const FrictionCurve form = with_parameters(s.curve, changed);
+    if (form.possible()) forms.emplace_back(form);
   }
   const double top_slip = s.curve.slip_reached(Stretched::kNearTop);
   std::vector<Evidence> seen;
@@ -218,7 +233,7 @@ DetectionBound detection_bound(const Scenario& s, const Trace& trace) {
     }
     const double past =
         trace.slip_star[i + kSamples / 2] -
-        (s.curve.family == Family::kFlatTop ? trace.slip_star_leave : trace.slip_star_peak);
+        (s.curve.family() == Family::kPlateau ? trace.slip_star_leave : trace.slip_star_peak);
     while (filled < kPastSteps && past > kPastStep_percent * static_cast<double>(filled)) {
       out.stopped[filled++] = power;
     }

@@ -1,5 +1,5 @@
-// Friction curves of the panel's virtual variators: families with a sharp peak, a round one, a flat
-// top or none. Slip in percent, true slip (without deformation). Tests only; shares nothing with
+// Friction curves of the panel's virtual variators: six families and splines with a top, and curves
+// that rise on. Slip in percent, true slip (without deformation). Tests only; shares nothing with
 // the estimator.
 #pragma once
 
@@ -8,35 +8,78 @@
 namespace beltgrip::panel {
 
 enum class Family {
-  kKink,        // tanh rise, then a linear fall: a corner at the peak
-  kMagic,       // magic formula D sin(C atan(B s - E (B s - atan B s)))
-  kStribeck,    // saturating rise times a Stribeck decay
-  kFlatTop,     // rise, a plateau, then a smooth fall
-  kBrush,       // cubic rise of the brush model, then a linear fall
-  kBurckhardt,  // c1 (1 - exp(-c2 s)) - c3 s
-  kMonotone     // saturates or keeps rising: no peak
+  kMagic,        // magic formula sin(C atan(x - E (x - atan x)))
+  kStribeck,     // saturating rise times a Stribeck decay
+  kRational,     // (2 + k) u / (u^2 + k u + 1)
+  kPlateau,      // cubic rise, a level stretch, then a rounded linear fall
+  kExponential,  // exponential rise, then a linear fall: a corner at the peak
+  kPower,        // power laws on both sides of the peak
+  kSpline,       // monotone on either side, through drawn knots
+  kRising        // keeps rising: no peak
 };
-inline constexpr int kFamilies = 7;
+inline constexpr int kFamilies = 8;
 const char* family_name(Family family);
 
-// mu(s), odd in s. Shape parameters are scaled such that the largest value is mu_max, at slip_peak.
-struct FrictionCurve {
-  Family family = Family::kKink;
-  double mu_max = 0.1;     // kMonotone: the value it tends to (or has at 10 %)
-  double slip_peak = 2.0;  // percent; kFlatTop: middle of the plateau
-  double fall_per_percent = 1.5e-3;
-  double shape = 0.0;  // family's own: see friction_curve.cpp
-  double value(double slip) const;
+// Points of slip behind the top over which the fall is meant.
+inline constexpr double kFallSpan_percent = 3.0;
+// Where a curve rises on, mu_max is its value at this slip.
+inline constexpr double kRisingTo_percent = 10.0;
+
+// A spline's knots: three on the rise at a quarter, half and three quarters of the peak's slip, in
+// units of the top; the shares of the fall at 1 and at 8 points behind the top.
+using Knots = std::array<double, 5>;
+inline constexpr Knots kPlainKnots = {0.6, 0.85, 0.96, 0.3, 1.8};
+
+class FrictionCurve {
+ public:
+  FrictionCurve() : FrictionCurve(Family::kExponential, 0.1, 2.0, 1.5e-3, 4.0) {}
+  // slip_peak: percent; of a plateau its beginning; of a rising curve that of its knee. shape is
+  // the family's own: E; the steepness of a rise; a plateau's width in points; the exponent of a
+  // rise; what still comes slowly.
+  FrictionCurve(Family family, double mu_max, double slip_peak_percent, double fall_per_percent,
+                double shape, const Knots& knots = kPlainKnots);
+
+  double value(double slip_percent) const;  // odd
+  // The family has a curve of that peak and fall.
+  bool possible() const { return possible_; }
   // Ends of the stretch in which mu >= (1 - relative) mu_max.
   double slip_reached(double relative) const;
   double slip_left(double relative) const;
+  // The same form with another top.
+  FrictionCurve with_mu_max(double mu_max) const;
+
+  Family family() const { return family_; }
+  bool has_peak() const { return family_ != Family::kRising; }
+  double mu_max() const { return mu_max_; }
+  double slip_peak() const { return slip_peak_; }
+  double fall_per_percent() const { return fall_; }
+  double shape() const { return shape_; }
+  const Knots& knots() const { return knots_; }
+
+ private:
+  double unit(double slip) const;  // of mu_max
+  double spline(double slip) const;
+  void prepare_magic();
+  void prepare_stribeck();
+  void prepare_rational();
+  void prepare_spline();
+
+  Family family_;
+  double mu_max_, slip_peak_, fall_, shape_;
+  Knots knots_;
+  bool possible_ = true;
+  double drop_;                    // of mu_max over the span, relative
+  double a_ = 0.0, x_peak_ = 1.0;  // what the fall asks of the family; the peak in its own slip
+  double top_ = 1.0;               // of the unscaled form
+  static constexpr int kPlaces = 9;
+  std::array<double, kPlaces> place_{}, height_{}, slope_{};
 };
 
-// Parameters by name for the bound: mu_max, slip_peak, fall, shape.
+// Parameters by name for the bound, those that the family has: mu_max, slip_peak, fall, shape.
 inline constexpr int kCurveParameters = 4;
 std::array<double, kCurveParameters> parameters(const FrictionCurve& curve);
-FrictionCurve with_parameters(FrictionCurve curve, const std::array<double, kCurveParameters>& p);
-// How many of them the family has (a prefix).
+FrictionCurve with_parameters(const FrictionCurve& curve,
+                              const std::array<double, kCurveParameters>& p);
 int parameter_count(Family family);
 
 }  // namespace beltgrip::panel

@@ -4,8 +4,10 @@
 #include <atomic>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <thread>
+
+#include "drawing.h"
+#include "percentile.h"
 
 namespace beltgrip::panel {
 namespace {
@@ -13,29 +15,13 @@ namespace {
 using estimator::Method;
 using estimator::PeakKind;
 
-constexpr double kSlowRamp_N_per_s = 300.0;         // slip at the stop is judged up to this
 constexpr double kLeastSpeed_rad_s = 0.85 * 105.0;  // the daemon's, by default; slower: it ends
 constexpr double kBoundWanted = 0.97;
 constexpr double kOneSided99 = 2.326;
 constexpr std::size_t kOnePoint = static_cast<std::size_t>(1.0 / kPastStep_percent + 0.5);
 
-double percentile(std::vector<double> values, double share) {
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto last = static_cast<double>(values.size() - 1);
-  const auto k = static_cast<std::ptrdiff_t>(std::round(share * last));
-  std::nth_element(values.begin(), values.begin() + k, values.end());
-  return values[static_cast<std::size_t>(k)];
-}
-
-double share(int part, int whole) { return whole > 0 ? 100.0 * part / whole : 0.0; }
-
 const Outcome& outcome(const Judged& trace, Method method) {
   return method == Method::kPaper ? trace.paper : trace.robust;
-}
-
-// What a lower bound may not exceed: the top of the curve, or what it rises to.
-double top_of(const FrictionCurve& curve) {
-  return curve.family == Family::kMonotone ? curve.value(60.0) : curve.mu_max;
 }
 
 }  // namespace
@@ -50,6 +36,7 @@ Judged judge(Scenario scenario, const JudgeOptions& options) {
   const RunOptions paper{.method = Method::kPaper, .with_accuracies = options.biased};
   Judged out;
   out.has_peak = trace.peak_reached;
+  out.mu_max = trace.mu_max;
   if (out.has_peak) {
     const auto at = static_cast<std::size_t>(trace.t_peak_s * scenario.sample_rate_hz);
     out.omega_p_at_peak_rad_s = trace.samples[std::min(at, trace.samples.size() - 1)].omega_p_rad_s;
@@ -94,7 +81,7 @@ Figures figures(const std::vector<Judged>& traces, Method method, std::optional<
     if (o.beyond_10_percent) ++beyond;
     if (o.peak.kind == PeakKind::kLowerBound) {
       ++all_bounds;
-      if (o.peak.mu_max <= top_of(trace.scenario.curve)) ++right;
+      if (o.peak.mu_max <= std::max(trace.mu_max, o.mu_reached)) ++right;
     }
     if (!trace.has_peak) {
       ++f.others;
@@ -124,7 +111,7 @@ Figures figures(const std::vector<Judged>& traces, Method method, std::optional<
     }
     if (o.peak.kind != PeakKind::kValue) continue;
     ++values;
-    const double truth = trace.scenario.curve.mu_max;
+    const double truth = trace.mu_max;
     if (o.peak.ci95_low <= truth && truth <= o.peak.ci95_high) ++covered;
     magnitude.push_back(std::abs(o.relative_error));
     sum += o.relative_error;
@@ -226,7 +213,7 @@ ForecastFigures forecast_figures(const std::vector<Judged>& traces, std::size_t 
     ++f.reached;
     if (e.mu_max <= 0.0) continue;
     ++said;
-    const double truth = trace.scenario.curve.mu_max;
+    const double truth = trace.mu_max;
     if (e.low <= truth && truth <= e.high) ++covered;
     if (e.high < e.mu_reached) ++behind;
     width.push_back(100.0 * (e.high - e.low) / truth);
@@ -265,7 +252,7 @@ DisturbedFigures disturbed_figures(const std::vector<Judged>& traces,
     if (!trace.has_peak || (noise && trace.scenario.noise != *noise)) continue;
     ++f.traces;
     const estimator::PeakEstimate& peak = trace.robust.peak;
-    const double truth = mu_max_of(trace.scenario);
+    const double truth = trace.mu_max;
     if (peak.contradictory) {
       ++flagged;
     } else if (peak.kind != PeakKind::kValue) {
@@ -318,7 +305,7 @@ void print_confidence(std::FILE* out, const std::vector<Judged>& traces) {
       if (o.slip_share_at_stop < 1.0) ++before;
       slip.push_back(100.0 * o.slip_share_at_stop);
       error.push_back(100.0 * std::abs(o.relative_error));
-      const double truth = trace.scenario.curve.mu_max;
+      const double truth = trace.mu_max;
       if (o.peak.ci95_low <= truth && truth <= o.peak.ci95_high) ++covered;
     }
     std::fprintf(out,
@@ -346,8 +333,8 @@ bool write_csv(const char* path, const std::vector<Judged>& traces, bool paper) 
           "%llu,%s,%s,%s,%s,%d,%d,%.2f,%.1f,%.5f,%.3f,%d,%d,%d,%d,%.3f,%.3f,%.3f,%d,%.6f,%.6f,"
           "%.6f,%.6f,%.6f,%.3f,%.3f,%.5f,%.6f,%.6f,%.3f,%.3f,%s\n",
           static_cast<unsigned long long>(s.seed), method == Method::kPaper ? "paper" : "robust",
-          family_name(s.curve.family), noise_name(s.noise), plant_name(s.plant), s.overrun, s.low,
-          s.torque_Nm, s.ramp_N_per_s, s.curve.mu_max, s.curve.slip_peak, trace.has_peak, o.stopped,
+          family_name(s.curve.family()), noise_name(s.noise), plant_name(s.plant), s.overrun, s.low,
+          s.torque_Nm, s.ramp_N_per_s, trace.mu_max, s.curve.slip_peak(), trace.has_peak, o.stopped,
           static_cast<int>(o.reason), o.early, o.delay_s, o.slip_past_percent,
           o.slip_past_peak_percent, static_cast<int>(o.peak.kind), o.peak.mu_max, o.peak.mu_max_std,
           o.peak.ci95_low, o.peak.ci95_high, o.relative_error, o.peak.sigma_peak_percent, o.stop_s,

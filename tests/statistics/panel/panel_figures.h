@@ -15,6 +15,7 @@ namespace beltgrip::panel {
 struct Judged {  // one trace
   Scenario scenario;
   bool has_peak = false;
+  double mu_max = 0.0;  // the truth
   double omega_p_at_peak_rad_s = 0.0;
   Outcome paper, robust;
   double bound = 0.0;  // of the relative deviation of mu_max, from the data up to robust's stop
@@ -55,6 +56,9 @@ struct Figures {
   double bound_p1 = 0.0;             // bound / reached that 99 % exceed
   int carried = 0;
 };
+
+// Slip at the stop is judged on ramps up to this: the default of ramp_rate_max_N_per_s.
+inline constexpr double kSlowRamp_N_per_s = 300.0;
 
 // A stop at the very peak leaves data that do not determine mu_max at all.
 inline constexpr double kBoundCounts = 0.05;

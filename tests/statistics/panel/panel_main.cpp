@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "drawing.h"
+#include "panel_bands.h"
 #include "panel_figures.h"
 #include "wear_run.h"
 
@@ -93,6 +95,7 @@ int main(int argc, char** argv) {
     return 0;
   }
   print_table(stdout, traces, options.paper);
+  print_bands(stdout, traces);
   print_stops_by_speed(stdout, traces);
   if (options.confidence_width > 0.0) {
     print_confidence(stdout, traces);

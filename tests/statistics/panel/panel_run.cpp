@@ -34,7 +34,7 @@ Outcome run(const Scenario& scenario, const Trace& trace, const RunOptions& opti
     out.mu_reached = std::max(out.mu_reached, trace.mu[i]);
     for (std::size_t k = 0; k < std::size(kForecastAt); ++k) {
       if (!out.has_peak || out.expected[k].reached ||
-          trace.slip[i] < kForecastAt[k] * scenario.curve.slip_peak) {
+          trace.slip[i] < kForecastAt[k] * scenario.curve.slip_peak()) {
         continue;
       }
       out.expected[k] = {true, now.mu_max_expected, now.mu_max_low, now.mu_max_high,
@@ -47,13 +47,13 @@ Outcome run(const Scenario& scenario, const Trace& trace, const RunOptions& opti
     }
   }
   out.stop_s = static_cast<double>(last) * sample_s;
-  out.slip_share_at_stop = trace.slip[last] / scenario.curve.slip_peak;
+  out.slip_share_at_stop = trace.slip[last] / scenario.curve.slip_peak();
   out.peak_passed = trace.peak_reached && out.stop_s >= trace.t_peak_s;
   out.delay_s = out.stop_s - trace.t_peak_s;
   out.early = out.stopped && out.stop_s < trace.t_reached_s;
   out.beyond_10_percent = trace.slip_star[last] > 10.0 + std::max(0.0, trace.slip_star[0]);
   out.slip_past_peak_percent = trace.slip_star[last] - trace.slip_star_peak;
-  out.slip_past_percent = scenario.curve.family == Family::kFlatTop
+  out.slip_past_percent = scenario.curve.family() == Family::kPlateau
                               ? trace.slip_star[last] - trace.slip_star_leave
                               : out.slip_past_peak_percent;
   do {
@@ -62,7 +62,7 @@ Outcome run(const Scenario& scenario, const Trace& trace, const RunOptions& opti
   } while (!estimator->conclude() && out.conclude_calls < 1000000);
   out.peak = estimator->peak();
   if (out.peak.kind == estimator::PeakKind::kValue) {
-    out.relative_error = out.peak.mu_max / scenario.curve.mu_max - 1.0;
+    out.relative_error = out.peak.mu_max / trace.mu_max - 1.0;
   }
   return out;
 }

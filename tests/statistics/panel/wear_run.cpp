@@ -6,6 +6,7 @@
 #include <thread>
 #include <vector>
 
+#include "drawing.h"
 #include "estimator/belt/belt_history.h"
 #include "panel_run.h"
 #include "random.h"
@@ -32,17 +33,17 @@ double deviation(const std::vector<double>& values) {
 Belt judge_belt(std::uint64_t seed, NoiseClass noise, double drop) {
   Random random(seed ^ 0x99999999ULL);
   Scenario belt = draw_scenario(seed);
-  while (belt.curve.family == Family::kMonotone) belt = draw_scenario(random.bits());
+  while (!belt.curve.has_peak()) belt = draw_scenario(random.bits());
   set_noise(belt, noise);
   belt.mu_floor = 1e9;
   belt.ramp_N_per_s = random.log_between(kSlowest_N_per_s, kFastest_N_per_s);
-  const double mu_max = belt.curve.mu_max;
+  const FrictionCurve fresh = belt.curve;
   Belt out;
   std::vector<double> sides[2];
   for (int i = 0; i < 2 * kExperiments; ++i) {
     belt.seed = random.bits();
     belt.hold_s = random.between(1.5, 3.0);
-    belt.curve.mu_max = mu_max * (i < kExperiments ? 1.0 : 1.0 - drop);
+    belt.curve = fresh.with_mu_max(fresh.mu_max() * (i < kExperiments ? 1.0 : 1.0 - drop));
     const Outcome outcome = run(belt, simulate(belt), {});
     if (outcome.peak.kind != estimator::PeakKind::kValue) continue;
     ++out.values;
