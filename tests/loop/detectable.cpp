@@ -28,6 +28,18 @@ struct Row {
 
 }  // namespace
 
+namespace {
+
+// Time from one frame of a message to the next, as the user said it, or the DBC.
+double period_s(const daemon::Config& config, const can::MessageDef& message) {
+  for (const daemon::RoleBinding& role : config.roles) {
+    if (!role.uds && role.id == message.id && role.period_ms) return 1e-3 * *role.period_ms;
+  }
+  return 1e-3 * message.cycle_ms.value();
+}
+
+}  // namespace
+
 Detectable::Detectable(const daemon::Config& config) {
   const bool coast = config.trigger == daemon::Trigger::kCoastDown;
   const Row rows[] = {
@@ -51,7 +63,7 @@ Detectable::Detectable(const daemon::Config& config) {
         out.codec = can::SignalCodec(signal);
         out.minimum = signal.minimum;
         out.maximum = signal.maximum;
-        out.stale_s = std::max(kStale_s, kStalePeriods * 1e-3 * message.cycle_ms.value());
+        out.stale_s = std::max(kStale_s, kStalePeriods * period_s(config, message));
         out.flag = row.flag;
         out.below = row.below;
         out.above = row.above;
@@ -63,7 +75,7 @@ Detectable::Detectable(const daemon::Config& config) {
     Message message;
     message.id = definition.id;
     message.length = static_cast<std::uint8_t>(definition.length);
-    message.period_s = 1e-3 * definition.cycle_ms.value();
+    message.period_s = period_s(config, definition);
     for (const can::SignalDef& signal : definition.signals) {
       if (signal.name.ends_with("Counter")) message.counter = can::SignalCodec(signal);
       if (signal.name.ends_with("Crc")) message.crc_byte = signal.start_bit / 8;

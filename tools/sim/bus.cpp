@@ -47,11 +47,14 @@ const ChannelRow kChannels[] = {
     {"RigMode", [](const Signals& s) { return static_cast<double>(s.mode); }},
 };
 
+bool carries(const can::MessageDef& message, std::string_view name) {
+  return std::any_of(message.signals.begin(), message.signals.end(),
+                     [&](const can::SignalDef& signal) { return signal.name == name; });
+}
+
 bool carries(const can::Database& dbc, std::string_view name) {
-  return std::any_of(dbc.messages.begin(), dbc.messages.end(), [&](const can::MessageDef& message) {
-    return std::any_of(message.signals.begin(), message.signals.end(),
-                       [&](const can::SignalDef& signal) { return signal.name == name; });
-  });
+  return std::any_of(dbc.messages.begin(), dbc.messages.end(),
+                     [&](const can::MessageDef& message) { return carries(message, name); });
 }
 
 // CRC-8 of AUTOSAR E2E profile 1, bit by bit, over the identifier and all other bytes.
@@ -83,7 +86,7 @@ Bus::Bus(const can::Database& dbc, const BusStyle& style, const World& world, st
   add_channels(sensors, seed);
   Random phase(seed, "frame phase");
   for (const can::MessageDef& definition : dbc.messages) {
-    add_message(definition, std::llround(world.step_s * 1e9), phase);
+    add_message(definition, world, phase);
   }
   past_.resize(longest_delay(world.faults) + 1);
 }
@@ -110,16 +113,19 @@ void Bus::add_channels(const SensorParameters& sensors, std::uint64_t seed) {
   }
 }
 
-void Bus::add_message(const can::MessageDef& definition, std::int64_t step_ns, Random& phase) {
+void Bus::add_message(const can::MessageDef& definition, const World& world, Random& phase) {
   Message message;
   message.id = definition.id;
   message.name = definition.name;
   message.length = static_cast<std::uint8_t>(definition.length);
-  message.period_ns = std::llround(definition.cycle_ms.value_or(0.0) * 1e6);
+  const bool slow =
+      world.sensors.pressure_period_s > 0.0 && carries(definition, "SecondaryPressure");
+  message.period_ns = slow ? std::llround(world.sensors.pressure_period_s * 1e9)
+                           : std::llround(definition.cycle_ms.value_or(0.0) * 1e6);
   if (message.period_ns <= 0) throw std::logic_error(definition.name + " has no cycle time");
   message.next_ns =
       style_.neighbours
-          ? static_cast<std::int64_t>(messages_.size()) * step_ns
+          ? static_cast<std::int64_t>(messages_.size()) * std::llround(world.step_s * 1e9)
           : static_cast<std::int64_t>(phase.uniform() * static_cast<double>(message.period_ns));
   for (const can::SignalDef& signal : definition.signals) {
     if (signal.name.ends_with(kCounterSuffix)) {

@@ -71,7 +71,7 @@ class Bus {
   };
 
   void add_channels(const SensorParameters& sensors, std::uint64_t seed);
-  void add_message(const can::MessageDef& definition, std::int64_t step_ns, Random& phase);
+  void add_message(const can::MessageDef& definition, const World& world, Random& phase);
   // Steps that the slowest sensor looks back, with the worst fault.
   std::size_t longest_delay(const std::vector<FaultStep>& faults) const;
   std::size_t steps(double delay_s) const;

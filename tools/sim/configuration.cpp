@@ -77,6 +77,12 @@ std::string vehicle_configuration(const VehicleScenario& scenario, const std::st
   const auto radius = [&v](double ratio) {
     return estimator::running_radii(ratio, v.belt_length_m, v.centre_distance_m).primary_m;
   };
+  const double period_s = scenario.sensors.pressure_period_s;
+  char pressure[80];
+  std::snprintf(pressure, sizeof pressure,
+                period_s > 0.0 ? "{ signal = \"TCU_Pressure.SecondaryPressure\", period_ms = %.6g }"
+                               : "\"TCU_Pressure.SecondaryPressure\"",
+                1e3 * period_s);
   char text[4096];
   std::snprintf(text, sizeof text,
                 "# BeltGrip in the simulated vehicle (scenario %s).\n"
@@ -88,7 +94,7 @@ std::string vehicle_configuration(const VehicleScenario& scenario, const std::st
                 "[signals]\n"
                 "primary_speed        = \"TCU_Speed.PrimarySpeed\"\n"
                 "secondary_speed      = \"TCU_Speed.SecondarySpeed\"\n"
-                "secondary_pressure   = \"TCU_Pressure.SecondaryPressure\"\n"
+                "secondary_pressure   = %s\n"
                 "engine_torque        = { signal = \"ECU_Engine.EngineTorque\", offset = %.6g }\n"
                 "engine_speed         = \"ECU_Engine.EngineSpeed\"\n"
                 "accelerator_pedal    = \"ECU_Engine.AcceleratorPedal\"\n"
@@ -136,12 +142,12 @@ std::string vehicle_configuration(const VehicleScenario& scenario, const std::st
                 "actuator_lag_s              = %.6g\n"
                 "cooldown_s                  = %.6g\n"
                 "cooldown_m                  = %.6g\n",
-                scenario.name.c_str(), interface.c_str(), dbc_file.c_str(), known.torque_offset_Nm,
-                known.torque_bias_Nm, known.torque_gain, known.pressure_bias_Pa,
-                known.pressure_gain, v.half_wedge_angle_rad * 180.0 / std::numbers::pi, v.ratio_low,
-                v.ratio_overdrive, radius(v.ratio_overdrive), radius(v.ratio_low),
-                v.secondary_piston_area_m2, v.secondary_spring_force_N,
-                v.secondary_centrifugal_N_s2,
+                scenario.name.c_str(), interface.c_str(), dbc_file.c_str(), pressure,
+                known.torque_offset_Nm, known.torque_bias_Nm, known.torque_gain,
+                known.pressure_bias_Pa, known.pressure_gain,
+                v.half_wedge_angle_rad * 180.0 / std::numbers::pi, v.ratio_low, v.ratio_overdrive,
+                radius(v.ratio_overdrive), radius(v.ratio_low), v.secondary_piston_area_m2,
+                v.secondary_spring_force_N, v.secondary_centrifugal_N_s2,
                 scenario.engine.inertia_kg_m2 + v.primary_inertia_kg_m2,
                 known.steady ? "steady" : "coast_down", scenario.hydraulics.pressure_floor_Pa,
                 1.2 * scenario.hydraulics.dead_time_s, 1.2 * scenario.hydraulics.lag_s,

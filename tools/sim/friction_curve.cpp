@@ -46,7 +46,8 @@ FrictionPoint magnitude(const FrictionCurve& curve, double slip) {
   if (slip <= peak_slip) return rise(curve.mu_max / std::tanh(kSteepness), peak_slip, slip);
   const double fall = 100.0 * curve.fall_per_percent;
   const bool two = curve.shape == CurveShape::kTwoPeaks;
-  const double from = two ? 2.0 * peak_slip : peak_slip;
+  const double from = two ? 2.0 * peak_slip : curve.fall_slip();
+  if (!two && slip <= from) return {curve.mu_max, 0.0};
   const double top = two ? curve.mu_max * (1.0 - kSecondLower) : curve.mu_max;
   const double drop = curve.mu_max * curve.fall_at_once / kDropWithin;
   const bool drops = slip - from < kDropWithin;

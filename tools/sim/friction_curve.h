@@ -3,7 +3,8 @@
 //
 //   tanh_fall      mu_pk tanh(2.2 s / s_pk) / tanh(2.2) up to the peak, then a linear fall that
 //   ends
-//                  at half the peak. A kink at the peak: the hard case for a local fit.
+//                  at half the peak. A kink at the peak: the hard case for a local fit. With a
+//                  plateau the fall begins so much later.
 //   magic_formula  D sin(C atan(B s)), smooth at the peak; C = 1.3, B puts the peak at s_pk.
 //                  fall_at_once drops by that share within 0.1 % of slip beyond the peak.
 //   two_peaks      as tanh_fall to the peak, a dip of 3 % and a second peak 1 % lower at twice its
@@ -21,6 +22,10 @@ struct FrictionCurve {
   double peak_slip_percent = 2.0;
   double fall_per_percent = 1.5e-3;  // tanh_fall, two_peaks: mu lost per percent beyond the peak
   double fall_at_once = 0.0;         // tanh_fall only: share
+  double plateau_percent = 0.0;      // tanh_fall only: of slip
+
+  // Where the friction begins to fall, as a fraction.
+  double fall_slip() const { return (peak_slip_percent + plateau_percent) / 100.0; }
 };
 
 struct FrictionPoint {

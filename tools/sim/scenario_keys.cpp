@@ -70,6 +70,8 @@ constexpr NumberKey<S> kSensors[] = {
     // The frames of a car wait for the bus.
     {"frame_delay_s", &S::frame_delay_s, 1e-5, 1.0, kLate, 1.0, kVehicle},
     {"frame_jitter_s", &S::frame_jitter_s, 0.0, 1.0, kLate},
+    {"pressure_period_s", &S::pressure_period_s, 0.0, 1.0, "0: as often as the DBC says", 1.0,
+     kVehicle},
 };
 
 // Five keys each.
@@ -96,6 +98,7 @@ constexpr NumberKey<F> kCurve[] = {
      "friction needs some slip to reach its peak"},
     {"fall_per_percent", &F::fall_per_percent, 0.0, 0.1, "friction falls beyond its peak"},
     {"fall_at_once", &F::fall_at_once, 0.0, 0.5, "a share of the friction"},
+    {"plateau_percent", &F::plateau_percent, 0.0, 20.0, "friction that lies level for some slip"},
 };
 
 void name_sensors(ScenarioReader& reader, Plant plant, SensorParameters& sensors) {

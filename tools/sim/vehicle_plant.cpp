@@ -224,6 +224,7 @@ void VehiclePlant::observe(const DrivelineInput& input) {
   output_.mu = friction_at(held.curve, slip.value).mu;
   output_.mu_max = held.curve.mu_max;
   output_.peak_slip = held.curve.peak_slip_percent / 100.0;
+  output_.fall_slip = held.curve.fall_slip();
   output_.geometric_ratio = held.ratio;
   output_.primary_radius_m = held.radius_m;
   output_.belt_torque_Nm = held.torque_per_mu * output_.mu;

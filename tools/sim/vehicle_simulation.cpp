@@ -189,7 +189,7 @@ void VehicleSimulation::observe(double t_s) {
   request.slip_speed_max_m_s = std::max(request.slip_speed_max_m_s, belt.slip_speed_m_s);
   request.mu_star_max = std::max(request.mu_star_max, std::abs(belt.mu));
   request.force_min_N = std::min(request.force_min_N, truth_.secondary_force_N);
-  if (slip > belt.peak_slip) request.macro_energy_J += belt.slip_power_W * step_s_;
+  if (slip > belt.fall_slip) request.macro_energy_J += belt.slip_power_W * step_s_;
 }
 
 }  // namespace beltgrip::sim

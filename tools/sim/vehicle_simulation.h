@@ -43,7 +43,7 @@ struct RequestTruth {
   double slip_max = 0.0;  // fraction, magnitude
   double slip_speed_max_m_s = 0.0;
   double slip_at_end = 0.0;     // when the controller took its force back
-  double macro_energy_J = 0.0;  // dissipated beyond the slip at the peak
+  double macro_energy_J = 0.0;  // dissipated beyond the slip where friction begins to fall
   double mu_star_max = 0.0;     // largest coefficient in use
   double force_min_N = 0.0;
 };

@@ -55,6 +55,7 @@ struct SensorParameters {
   double lag_s = 0.0;  // of every signal, beside its own delay
   double frame_delay_s = 0.0;
   double frame_jitter_s = 0.0;
+  double pressure_period_s = 0.0;  // of the secondary pressure's message; 0: that of the DBC
 
   // What a model file says of the measuring chain. A channel that leads makes all others lag.
   void add(const estimator::MachineEffects& effects) {

@@ -33,7 +33,9 @@ std::string text(double value) {
 // that reads like a sensor's error (accessories, friction of the piston).
 daemon::Config configuration(const CampaignCase& given) {
   // The daemon knows the shipped vehicle, not the one that was drawn.
-  const sim::VehicleScenario nominal = sim::shipped_vehicle_scenario(given.base).scenario;
+  sim::VehicleScenario nominal = sim::shipped_vehicle_scenario(given.base).scenario;
+  // How often a signal comes its user can see.
+  nominal.sensors.pressure_period_s = given.scenario.sensors.pressure_period_s;
   std::map<std::string, std::string> settings;
   if (given.base == "cruise-drive-torque") settings["trigger"] = "\"steady\"";
   daemon::Config config = vehicle_config(nominal, settings);

@@ -51,6 +51,13 @@ TEST(FrictionCurve, PeaksWhereItSaysAndIsOdd) {
   const FrictionCurve fall{CurveShape::kTanhFall, 0.105, 2.0, 1.5e-3};
   EXPECT_NEAR(friction_at(fall, 0.12).mu, 0.105 - 10 * 1.5e-3, 1e-12);
   EXPECT_NEAR(friction_at(fall, 5.0).mu, 0.0525, 1e-12);
+  FrictionCurve plateau = fall;
+  plateau.plateau_percent = 1.5;
+  EXPECT_EQ(plateau.fall_slip(), 0.035);
+  EXPECT_EQ(friction_at(plateau, 0.02).mu, 0.105);
+  EXPECT_EQ(friction_at(plateau, 0.034).mu, 0.105);
+  EXPECT_EQ(friction_at(plateau, 0.034).slope, 0.0);
+  EXPECT_NEAR(friction_at(plateau, 0.135).mu, 0.105 - 10 * 1.5e-3, 1e-12);
   const FrictionCurve saturating{CurveShape::kSaturating, 0.105, 2.0, 0.0};
   EXPECT_GT(friction_at(saturating, 0.05).slope, 0.0);
   EXPECT_LT(friction_at(saturating, 1.0).mu, 0.105 + 1e-12);

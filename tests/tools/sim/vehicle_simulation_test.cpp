@@ -266,6 +266,18 @@ TEST(VehiclePort, EveryMessageComesInItsOwnPeriodWithJitterAndInOrder) {
   }
 }
 
+TEST(VehiclePort, APressureThatComesSlowlyIsAloneInIt) {
+  VehicleScenario slow = scenario("coast-overdrive");
+  slow.sensors.pressure_period_s = 0.1;
+  std::map<std::uint32_t, int> counts;
+  for (const auto& frame : frames(slow, 1, 5.0)) ++counts[frame.frame.id.value];
+  EXPECT_NEAR(counts[304], 50, 1);
+  EXPECT_NEAR(counts[288], 500, 1);
+  EXPECT_NE(vehicle_configuration(slow, "can0", "vehicle.dbc")
+                .find("{ signal = \"TCU_Pressure.SecondaryPressure\", period_ms = 100 }"),
+            std::string::npos);
+}
+
 // Values of one signal by the DBC's own codec.
 std::vector<double> values(const std::vector<can::StampedFrame>& all, const char* message,
                            const char* signal) {
