@@ -17,6 +17,7 @@
 
 #include "can_dbc/text/printable.h"
 #include "daemon/command_line/command_line.h"
+#include "daemon/core/base/exit_code.h"
 #include "daemon/core/config/config.h"
 #include "daemon/core/config/config_fingerprint.h"
 #include "daemon/core/loop/loop.h"
@@ -42,7 +43,6 @@ namespace {
 using namespace beltgrip;
 using namespace beltgrip::daemon;
 
-enum ExitCode { kDone = 0, kUsage = 64, kUnavailable = 69, kInternal = 70 };
 constexpr std::string_view kInproc = "inproc:";
 
 struct Arguments {

@@ -10,8 +10,8 @@ namespace beltgrip::check {
 
 namespace {
 
-using cli::JsonWriter;
-using cli::kJsonNull;
+using text::JsonWriter;
+using text::kJsonNull;
 
 constexpr std::size_t kColumns = 100;
 

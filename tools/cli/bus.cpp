@@ -6,7 +6,7 @@
 
 #include "daemon/io/inproc_bus.h"
 #include "daemon/io/socket_port.h"
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 
 namespace beltgrip::cli {
 

@@ -79,12 +79,12 @@ std::string table(const std::vector<Finding>& findings) {
 }
 
 std::string json_text(const std::vector<Finding>& findings) {
-  JsonWriter json;
+  text::JsonWriter json;
   json.begin_object().key("findings").begin_array();
   for (const Finding& each : findings) {
     const double half = 1.96 * each.std;
-    json.begin_object().field("key", each.key).field("value", each.value.value_or(kJsonNull));
-    json.field("std", each.value ? each.std : kJsonNull);
+    json.begin_object().field("key", each.key).field("value", each.value.value_or(text::kJsonNull));
+    json.field("std", each.value ? each.std : text::kJsonNull);
     json.key("ci95");
     if (each.value) {
       json.begin_array().value(*each.value - half).value(*each.value + half).end_array();
@@ -221,7 +221,7 @@ void run(const Options& options) {
   for (const std::string& path : options.logs) {
     logs.push_back(read_log(path, config, true));
     for (const std::string& note : logs.back().notes) {
-      warn(note);
+      text::warn(note);
     }
   }
   std::vector<Finding> findings = calibrate::calibrate(logs, config);
@@ -230,7 +230,7 @@ void run(const Options& options) {
   if (out) out->write(toml(findings, config, options));
   if (json) json->close();
   if (out) out->close();
-  if (options.json != "-" && options.out != "-") print(stdout, table(findings));
+  if (options.json != "-" && options.out != "-") text::print(stdout, table(findings));
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 
 #include "can_dbc/text/printable.h"
 #include "daemon/io/can_link.h"
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 #include "tools/text/json_writer.h"
 #include "tools/text/terminal.h"
 
@@ -30,7 +30,7 @@ CanLink link_of(const std::string& interface) {
   return *std::move(link);
 }
 
-void field(JsonWriter& json, const char* name, const auto& value) {
+void field(text::JsonWriter& json, const char* name, const auto& value) {
   json.key(name);
   if (value) {
     json.value(*value);
@@ -40,7 +40,7 @@ void field(JsonWriter& json, const char* name, const auto& value) {
 }
 
 std::string json_text(const CanLink& link) {
-  JsonWriter json;
+  text::JsonWriter json;
   json.begin_object().field("interface", link.interface).field("up", link.up);
   json.field("driver", link.driver).field("controller", link.has_controller);
   field(json, "state", link.state);

@@ -100,7 +100,7 @@ void look_at_log(const std::string& path, const daemon::Config& config, check::R
   look(port, config, watch, {}, seen);
   const can::LogStats stats = timeline->stats();
   if (stats.lines_bad > 0) {
-    warn(path + ": " + std::to_string(stats.lines_bad) + " unreadable lines");
+    text::warn(path + ": " + std::to_string(stats.lines_bad) + " unreadable lines");
   }
 }
 
@@ -159,7 +159,7 @@ void run(const Options& options) {
     json->write(check::json(checked));
     json->close();
   }
-  if (options.json != "-") print(stdout, check::text(checked));
+  if (options.json != "-") text::print(stdout, check::text(checked));
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "daemon/command_line/command_line.h"
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 
 namespace beltgrip::cli {
 

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 #include "tools/cli/output_file.h"
 #include "tools/text/terminal.h"
 
@@ -15,7 +15,7 @@ namespace beltgrip::cli {
 daemon::Config load_configuration(const std::string& path, const std::string& method) {
   daemon::ConfigResult result = daemon::load_config(path);
   for (const std::string& warning : result.warnings) {
-    warn(warning);
+    text::warn(warning);
   }
   if (!result.config) {
     Failure failure{result.exit_code(), ""};

@@ -11,7 +11,7 @@
 #include "tools/cli/dbc_decode.h"
 #include "tools/cli/dbc_file.h"
 #include "tools/cli/dbc_json.h"
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 #include "tools/cli/output_file.h"
 #include "tools/text/terminal.h"
 
@@ -38,7 +38,7 @@ void check(const std::string& path, bool strict) {
   const std::string read = counted(result.database.messages.size(), "message") + ", " +
                            counted(signals, "signal") + " read";
   const std::string outcome = found.warnings == 0 ? path + ": no problems" : summary;
-  print(stderr, can::printable(outcome) + "; " + read + "\n");
+  text::print(stderr, can::printable(outcome) + "; " + read + "\n");
 }
 
 // --- show ----------------------------------------------------------------------------------------
@@ -89,7 +89,8 @@ void print_signal(const can::SignalDef& signal) {
                 number_text(signal.maximum).c_str());
   }
   if (signal.is_multiplexer) std::printf(", multiplexer");
-  if (signal.multiplexed_by) print(stdout, can::printable(selection_text(*signal.multiplexed_by)));
+  if (signal.multiplexed_by)
+    text::print(stdout, can::printable(selection_text(*signal.multiplexed_by)));
   std::printf("\n");
   for (const auto& [key, label] : signal.values) {
     std::printf("      %s = %s\n", can::value_key_text(signal, key).c_str(),

@@ -17,7 +17,7 @@
 #include "can_dbc/text/printable.h"
 #include "tools/cli/dbc_file.h"
 #include "tools/cli/decoded_frame.h"
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/stop_signals.h"
 #include "tools/text/terminal.h"
@@ -98,10 +98,10 @@ class Decoder {
     const auto& conflicts = index_.conflicts();
     for (std::size_t i = 0; i < std::min(conflicts.size(), kConflictsShown); ++i) {
       const can::MessageIndex::Conflict& conflict = conflicts[i];
-      print(stderr, paths[conflict.ignored.database] + ": message " +
-                        message_at(conflict.ignored).name + " has the identifier of " +
-                        message_at(conflict.used).name + " in " + paths[conflict.used.database] +
-                        ", which is used\n");
+      text::print(stderr, paths[conflict.ignored.database] + ": message " +
+                              message_at(conflict.ignored).name + " has the identifier of " +
+                              message_at(conflict.used).name + " in " +
+                              paths[conflict.used.database] + ", which is used\n");
     }
     if (conflicts.size() > kConflictsShown) {
       std::fprintf(stderr, "and %zu more messages with an identifier used before\n",
@@ -239,7 +239,7 @@ void decode_log(Decoder& decoder, const DecodeOptions& options, const std::strin
 
   const can::LogStats& stats = log->stats();
   for (const can::BadLine& bad : stats.first_bad) {
-    print(stderr, log_path + ":" + std::to_string(bad.line) + ": " + bad.reason + "\n");
+    text::print(stderr, log_path + ":" + std::to_string(bad.line) + ": " + bad.reason + "\n");
   }
   const bool all = options.messages.empty() && options.signals.empty();
   std::fprintf(stderr,
@@ -297,7 +297,7 @@ void decode(const DecodeOptions& options) {
       any = true;
     } catch (const Failure& found) {
       if (found.exit_code != kNoInput && found.exit_code != kBadInput) throw;
-      if (failure) print(stderr, found.text + "\n");
+      if (failure) text::print(stderr, found.text + "\n");
       if (!failure) failure = found;
     }
   }

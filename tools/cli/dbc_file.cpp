@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "can_dbc/text/printable.h"
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 #include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
@@ -60,8 +60,8 @@ std::string text_of(const ProblemCount& problems) {
 void mention_problems(const std::string& path, const std::vector<can::Problem>& problems) {
   const ProblemCount found = count(problems);
   if (found.warnings + found.errors == 0) return;
-  print(stderr,
-        can::printable(path) + ": " + text_of(found) + " (beltgrip dbc check lists them)\n");
+  text::print(stderr,
+              can::printable(path) + ": " + text_of(found) + " (beltgrip dbc check lists them)\n");
 }
 
 }  // namespace beltgrip::cli

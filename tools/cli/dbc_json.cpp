@@ -236,7 +236,7 @@ class DatabaseWriter {
   }
 
   const Database& database_;
-  JsonWriter json_;
+  text::JsonWriter json_;
   std::map<std::string_view, bool> is_number_;
 };
 

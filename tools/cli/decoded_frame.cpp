@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "can_dbc/text/printable.h"
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 #include "tools/text/json_writer.h"
 
 namespace beltgrip::cli {
@@ -50,7 +50,7 @@ void append_seconds(std::string& line, std::int64_t t_ns) {
   }
 }
 
-std::string json_text(std::string_view text) { return JsonWriter().value(text).take(); }
+std::string json_text(std::string_view text) { return text::JsonWriter().value(text).take(); }
 
 class JsonFrames : public FrameWriter {
  public:

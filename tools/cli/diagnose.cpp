@@ -37,10 +37,10 @@ daemon::Config load(const Options& options) {
                       std::all_of(options.held_out.begin(), options.held_out.end(), is_table);
   const daemon::ConfigResult result = daemon::load_config(
       options.config, tables ? daemon::ConfigScope::kVariator : daemon::ConfigScope::kSignals);
-  for (const std::string& warning : result.warnings) warn(warning);
+  for (const std::string& warning : result.warnings) text::warn(warning);
   if (!result.config) {
     for (std::size_t i = 0; i + 1 < result.errors.size(); ++i) {
-      complain(result.errors[i].text);
+      text::complain(result.errors[i].text);
     }
     throw Failure{result.exit_code(), result.errors.back().text};
   }
@@ -138,7 +138,7 @@ void run(const Options& options) {
     answer.diagnosis.reruns = rerun(all, options.model.empty() ? config : told(config, before),
                                     told(config, answer.extended));
   }
-  if (options.json != "-") print(stdout, diagnose::plain_text(answer.diagnosis));
+  if (options.json != "-") text::print(stdout, diagnose::plain_text(answer.diagnosis));
   if (json) {
     json->write(diagnose::json_text(answer.diagnosis));
     json->close();

@@ -115,7 +115,7 @@ History read(const Options& options) {
       throw Failure{kBadInput, history.path + ": found no history (" + opened.text +
                                    "), expected the history.db of a daemon"};
     }
-    warn(history.path + ": damaged (" + opened.text + ")");
+    text::warn(history.path + ": damaged (" + opened.text + ")");
   }
   if (content.trouble != HistoryTrouble::kNone) {
     throw Failure{kBadInput,
@@ -124,7 +124,7 @@ History read(const Options& options) {
   history.damaged = content.damaged;
   history.rows = std::move(content.rows);
   if (history.damaged > 0) {
-    warn(history.path + ": " + std::to_string(history.damaged) + " rows damaged or missing");
+    text::warn(history.path + ": " + std::to_string(history.damaged) + " rows damaged or missing");
   }
   return history;
 }
@@ -169,7 +169,7 @@ std::string notes_text(std::uint32_t notes, const char* separator) {
   return text;
 }
 
-std::string lower(std::string_view name) { return snake_case(name); }
+std::string lower(std::string_view name) { return text::snake_case(name); }
 
 // One column of the rows, for JSON and CSV alike: text, or a number that may be missing.
 struct Cell {
@@ -187,7 +187,7 @@ std::vector<Cell> cells(const HistoryRow& row) {
     return Cell{name, true, std::move(content), 0.0};
   };
   const auto number = [](const char* name, double content, bool given = true) {
-    return Cell{name, false, {}, given ? content : kJsonNull};
+    return Cell{name, false, {}, given ? content : text::kJsonNull};
   };
   return {number("id", static_cast<double>(row.id)),
           number("time_s", row.time_s),
@@ -223,7 +223,7 @@ std::string number_text(double value) {
 
 std::string json_lines(const History& history) {
   std::string out;
-  JsonWriter json;
+  text::JsonWriter json;
   for (const HistoryRow& row : history.rows) {
     json.begin_object().field("type", "experiment");
     for (const Cell& cell : cells(row)) {
@@ -245,8 +245,8 @@ std::string json_lines(const History& history) {
     json.field("experiments", fused.experiments);
     json.field("repeatability_percent", fused.repeatability_percent);
     const bool drift = fused.drift_percent_std > 0.0;
-    json.field("drift_percent_per_experiment", drift ? fused.drift_percent : kJsonNull);
-    json.field("drift_percent_std", drift ? fused.drift_percent_std : kJsonNull);
+    json.field("drift_percent_per_experiment", drift ? fused.drift_percent : text::kJsonNull);
+    json.field("drift_percent_std", drift ? fused.drift_percent_std : text::kJsonNull);
     json.key("wear");
     const estimator::WearTest& wear = group.wear;
     if (wear.judged) {
@@ -363,7 +363,7 @@ void run(const Options& options) {
   if (csv_file) csv_file->write(csv(history));
   if (json_file) json_file->close();
   if (csv_file) csv_file->close();
-  if (options.json != "-" && options.csv != "-") print(stdout, table(history));
+  if (options.json != "-" && options.csv != "-") text::print(stdout, table(history));
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "daemon/core/input/input_monitor.h"
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 #include "tools/cli/replay_run.h"
 
 namespace beltgrip::cli {

@@ -3,7 +3,7 @@
 #include <map>
 
 #include "daemon/core/config/config_model.h"
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 
 namespace beltgrip::cli {
 namespace {

@@ -21,7 +21,7 @@ int fail(const std::string& text, int exit_code) {
   std::fflush(stdout);
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
-    complain(text.substr(begin, end - begin));
+    text::complain(text.substr(begin, end - begin));
     begin = end + 1;
   }
   return exit_code;
@@ -93,7 +93,7 @@ int main(int argc, char** argv) {
   try {
     return beltgrip::cli::run(argc, argv);
   } catch (const std::exception& error) {
-    beltgrip::cli::complain(std::string("internal error: ") + error.what());
-    return beltgrip::cli::kInternal;
+    beltgrip::text::complain(std::string("internal error: ") + error.what());
+    return beltgrip::kInternal;
   }
 }

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 
 namespace beltgrip::cli {
 

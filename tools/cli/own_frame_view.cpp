@@ -45,7 +45,7 @@ std::string fixed(const OwnFrameView& view, const char* signal, int decimals) {
 }
 
 std::string lower(const std::string& label) {
-  std::string text = snake_case(label);
+  std::string text = text::snake_case(label);
   for (char& c : text) {
     if (c == '_') c = ' ';
   }
@@ -93,7 +93,7 @@ std::optional<OwnFrameView> OwnFrameDecoder::decode(const can::CanFrame& frame) 
 }
 
 std::string json_line(std::int64_t t_ns, const OwnFrameView& view) {
-  JsonWriter json;
+  text::JsonWriter json;
   json.begin_object()
       .key("t_s")
       .raw(seconds_text(t_ns))

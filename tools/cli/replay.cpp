@@ -154,20 +154,20 @@ void run(const Options& options) {
       tasks, std::max(jobs, 1u), [&](Task& task) { run_task(task, options, config, outputs); },
       [&](Task& task) {
         if (task.failure) {
-          complain(task.failure->text);
+          text::complain(task.failure->text);
           if (exit_code == kDone) exit_code = task.failure->exit_code;
           return;
         }
         for (const std::string& warning : task.result->warnings) {
-          warn(warning);
+          text::warn(warning);
         }
         any = true;
         frames += task.result->frames;
         if (json) json->write(experiment_lines(*task.result) + summary_line(*task.result));
         if (text_to_stdout) {
-          print(stdout, text(*task.result));
+          text::print(stdout, text(*task.result));
         } else if (task.result->experiments.empty()) {
-          complain(task.result->log + ": " + no_experiment(*task.result));
+          text::complain(task.result->log + ": " + no_experiment(*task.result));
         }
       });
   if (!any) throw Failure{exit_code, ""};  // what earlier runs left stays

@@ -11,7 +11,7 @@
 #include "daemon/core/publish/names.h"
 #include "daemon/core/publish/own_frames.h"
 #include "estimator/method/possible_friction.h"
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 #include "tools/cli/table_hint.h"
 #include "tools/ports/log_timeline.h"
 #include "tools/ports/record_port.h"
@@ -175,10 +175,10 @@ std::string format(const char* pattern, auto... arguments) {
 }  // namespace
 
 std::string outcome_text(daemon::Outcome outcome) {
-  return snake_case(daemon::outcome_name(outcome));
+  return text::snake_case(daemon::outcome_name(outcome));
 }
 std::string reason_text(estimator::StopReason reason) {
-  return snake_case(daemon::stop_reason_name(reason));
+  return text::snake_case(daemon::stop_reason_name(reason));
 }
 
 std::string seconds_text(std::int64_t t_ns) {
@@ -361,7 +361,7 @@ constexpr double kSlipMost_percent = 100.0;
 
 namespace {
 
-void interval(JsonWriter& json, bool known, double low, double high) {
+void interval(text::JsonWriter& json, bool known, double low, double high) {
   if (known) {
     json.begin_array().value(low).value(high).end_array();
   } else {
@@ -416,7 +416,7 @@ std::string why(const daemon::ExperimentResult& e, const std::string& lost) {
 
 std::string experiment_lines(const ReplayResult& result) {
   std::string lines;
-  JsonWriter json;
+  text::JsonWriter json;
   for (std::size_t i = 0; i < result.experiments.size(); ++i) {
     const daemon::ExperimentResult& e = result.experiments[i];
     const bool completed = e.outcome == daemon::Outcome::kCompleted;
@@ -430,8 +430,8 @@ std::string experiment_lines(const ReplayResult& result) {
         .raw(e.stopped ? seconds_text(e.end) : "null")
         .field("outcome", outcome_text(e.outcome))
         .field("stop_reason", reason_text(e.stop_reason))
-        .field("mu_max", completed ? e.peak.mu_max : kJsonNull)
-        .field("mu_max_std", completed ? e.peak.mu_max_std : kJsonNull)
+        .field("mu_max", completed ? e.peak.mu_max : text::kJsonNull)
+        .field("mu_max_std", completed ? e.peak.mu_max_std : text::kJsonNull)
         .key("mu_max_ci95");
     interval(json, completed, e.peak.ci95_low, e.peak.ci95_high);
     json.key("mu_max_ci95_noise");
@@ -440,14 +440,14 @@ std::string experiment_lines(const ReplayResult& result) {
     for (const std::string& key : result.assumed) json.value(key);
     json.end_array();
     json.field("reason", why(e, result.lost[i]));
-    json.field("mu_max_lower_bound", has_bound(e) ? e.peak.mu_max : kJsonNull)
-        .field("sigma_stop_percent", slips ? e.sigma_stop_percent : kJsonNull)
+    json.field("mu_max_lower_bound", has_bound(e) ? e.peak.mu_max : text::kJsonNull)
+        .field("sigma_stop_percent", slips ? e.sigma_stop_percent : text::kJsonNull)
         .field("contradictory", e.peak.contradictory)
         .field("impossible", e.peak.impossible)
-        .field("sigma_peak_percent", completed ? e.peak.sigma_peak_percent : kJsonNull)
+        .field("sigma_peak_percent", completed ? e.peak.sigma_peak_percent : text::kJsonNull)
         .field("samples", e.samples)
-        .field("direction", snake_case(daemon::direction_name(e.direction)))
-        .field("ratio", snake_case(daemon::end_stop_name(e.end_stop)))
+        .field("direction", text::snake_case(daemon::direction_name(e.direction)))
+        .field("ratio", text::snake_case(daemon::end_stop_name(e.end_stop)))
         .end_object();
     lines += json.take() + "\n";
   }
@@ -455,7 +455,7 @@ std::string experiment_lines(const ReplayResult& result) {
 }
 
 std::string summary_line(const ReplayResult& result) {
-  JsonWriter json;
+  text::JsonWriter json;
   json.begin_object()
       .field("type", "summary")
       .field("log", result.log)
@@ -496,8 +496,9 @@ std::string text(const ReplayResult& result) {
   std::string out = result.log + "\n";
   for (std::size_t i = 0; i < result.experiments.size(); ++i) {
     const daemon::ExperimentResult& e = result.experiments[i];
-    out += "  " + outcome_text(e.outcome) + ", " + snake_case(daemon::direction_name(e.direction)) +
-           ", " + snake_case(daemon::end_stop_name(e.end_stop)) + ": ";
+    out += "  " + outcome_text(e.outcome) + ", " +
+           text::snake_case(daemon::direction_name(e.direction)) + ", " +
+           text::snake_case(daemon::end_stop_name(e.end_stop)) + ": ";
     const double end_s = static_cast<double>(e.end) * 1e-9;
     const double length_s = static_cast<double>(e.end - e.start) * 1e-9;
     out += e.stopped ? format("stopped at %.3f s", end_s) : format("ended at %.3f s", end_s);

@@ -89,7 +89,7 @@ void run(const Options& options) {
     const ReplayResult result =
         replay({log}, options.interface, config, ReplayOutputs{.also = &courses});
     for (const std::string& warning : result.warnings) {
-      warn(warning);
+      text::warn(warning);
     }
     if (result.experiments.empty()) none += log + ": " + no_experiment(result) + "\n";
     for (auto& each : courses.take()) experiments.push_back(std::move(each));
@@ -110,7 +110,7 @@ void run(const Options& options) {
   }
   report::add_experiments(page, experiments, phases);
   write_file(options.out, inputs, page.text());
-  print(stdout, std::to_string(experiments.size()) + " experiments: " + options.out + "\n");
+  text::print(stdout, std::to_string(experiments.size()) + " experiments: " + options.out + "\n");
 }
 
 }  // namespace

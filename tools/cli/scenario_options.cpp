@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "daemon/core/config/toml_bounds.h"
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/vehicle_scenario.h"
 #include "tools/text/json_writer.h"

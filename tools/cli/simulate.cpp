@@ -198,7 +198,7 @@ void run(const Options& options) {
     json->write(experiment_lines(run.daemon) + run.truth_json + summary_line(run.daemon));
     json->close();
   }
-  if (results && !to_stdout) print(stdout, text(run.daemon) + run.truth_text);
+  if (results && !to_stdout) text::print(stdout, text(run.daemon) + run.truth_text);
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 #include "can_dbc/log/can_log.h"
 #include "tools/cli/bus.h"
 #include "tools/cli/configuration.h"
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 #include "tools/cli/stop_signals.h"
 #include "tools/sim/configuration.h"
 #include "tools/sim/resources.h"
@@ -36,7 +36,7 @@ double seconds(const sim::VehicleSimulation& vehicle) {
   return static_cast<double>(vehicle.now_ns()) * 1e-9;
 }
 
-void write_request(JsonWriter& json, const sim::RequestTruth& request) {
+void write_request(text::JsonWriter& json, const sim::RequestTruth& request) {
   json.begin_object()
       .field("begin_s", request.begin_s)
       .field("end_s", request.end_s)
@@ -68,7 +68,7 @@ std::string truth_json(const sim::VehicleSimulation& vehicle, std::uint64_t seed
     energy_J = std::max(energy_J, request.macro_energy_J);
     outside += inside_limits(request) ? 0 : 1;
   }
-  JsonWriter json;
+  text::JsonWriter json;
   json.begin_object()
       .field("type", "truth")
       .field("scenario", vehicle.scenario().name)

@@ -17,7 +17,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 #include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
@@ -85,8 +85,9 @@ std::string ask(const std::string& path) {
 
 void show(const nlohmann::ordered_json& status) {
   const auto line = [](const std::string& name, const std::string& text) {
-    print(stdout, can::printable(name) + std::string(name.size() < 16 ? 16 - name.size() : 0, ' ') +
-                      " " + can::printable(text) + "\n");
+    text::print(stdout, can::printable(name) +
+                            std::string(name.size() < 16 ? 16 - name.size() : 0, ' ') + " " +
+                            can::printable(text) + "\n");
   };
   const auto list = [](const nlohmann::ordered_json& names) {
     std::string text;
@@ -147,7 +148,7 @@ void add_status(command_line::Command app) {
     const auto status = nlohmann::ordered_json::parse(text, nullptr, false);
     if (status.is_discarded()) throw Failure{kBadInput, path + ": the answer is not whole"};
     if (options->json) {
-      print(stdout, text);
+      text::print(stdout, text);
     } else {
       try {
         show(status);

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "tools/cli/exit_codes.h"
+#include "tools/cli/failure.h"
 #include "tools/cli/replay_run.h"
 #include "tools/text/json_writer.h"
 #include "tools/text/terminal.h"
@@ -34,7 +34,7 @@ Truth make_truth(const sim::RigScenario& scenario, std::uint64_t seed, std::int6
 }
 
 std::string truth_json(const Truth& truth) {
-  JsonWriter json;
+  text::JsonWriter json;
   json.begin_object()
       .field("type", "truth")
       .field("scenario", truth.scenario)
@@ -50,11 +50,11 @@ std::string truth_json(const Truth& truth) {
     json.begin_object()
         .field("mu_max", experiment.mu_max)
         .field("start_s", experiment.start_s)
-        .field("peak_s", experiment.peak_s.value_or(kJsonNull))
-        .field("slip_peak_percent", peak ? experiment.slip_peak_percent : kJsonNull)
-        .field("sigma_peak_percent", peak ? experiment.sigma_star_peak_percent : kJsonNull)
-        .field("clamp_force_peak_N", peak ? experiment.clamp_force_peak_N : kJsonNull)
-        .field("let_go_s", experiment.let_go_s.value_or(kJsonNull))
+        .field("peak_s", experiment.peak_s.value_or(text::kJsonNull))
+        .field("slip_peak_percent", peak ? experiment.slip_peak_percent : text::kJsonNull)
+        .field("sigma_peak_percent", peak ? experiment.sigma_star_peak_percent : text::kJsonNull)
+        .field("clamp_force_peak_N", peak ? experiment.clamp_force_peak_N : text::kJsonNull)
+        .field("let_go_s", experiment.let_go_s.value_or(text::kJsonNull))
         .field("sigma_max_percent", experiment.sigma_star_max_percent)
         .end_object();
   }

@@ -13,7 +13,7 @@
 
 #include "can_dbc/text/encoding.h"
 
-namespace beltgrip::cli {
+namespace beltgrip::text {
 
 // As a number: null.
 inline constexpr double kJsonNull = std::numeric_limits<double>::quiet_NaN();
@@ -122,4 +122,4 @@ class JsonWriter {
   bool after_key_ = false;
 };
 
-}  // namespace beltgrip::cli
+}  // namespace beltgrip::text

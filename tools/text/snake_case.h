@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-namespace beltgrip::cli {
+namespace beltgrip::text {
 
 inline std::string snake_case(std::string_view name) {
   std::string result;
@@ -16,4 +16,4 @@ inline std::string snake_case(std::string_view name) {
   return result;
 }
 
-}  // namespace beltgrip::cli
+}  // namespace beltgrip::text

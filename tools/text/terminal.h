@@ -8,7 +8,7 @@
 
 #include "can_dbc/text/printable.h"
 
-namespace beltgrip::cli {
+namespace beltgrip::text {
 
 inline void print(std::FILE* out, std::string_view text) {
   const std::string safe = can::printable_lines(text);
@@ -20,4 +20,4 @@ inline void complain(std::string_view line) {
 }
 inline void warn(std::string_view line) { complain("warning: " + std::string(line)); }
 
-}  // namespace beltgrip::cli
+}  // namespace beltgrip::text

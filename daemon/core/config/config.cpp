@@ -269,7 +269,7 @@ void Loader::read_model_file() {
     model_keys_ = model.variator_keys;
     config_.corrected = whole_machine(model);
   } catch (const ModelError& error) {
-    result_.errors.push_back({error.missing_file ? kExitNoInput : kExitConfiguration, error.text});
+    result_.errors.push_back({error.missing_file ? kNoInput : kConfiguration, error.text});
   }
 }
 

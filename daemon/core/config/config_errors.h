@@ -7,15 +7,14 @@
 #include <string_view>
 #include <vector>
 
+#include "daemon/core/base/exit_code.h"
+
 namespace beltgrip::daemon {
 
-// sysexits.h: EX_DATAERR, EX_NOINPUT, EX_CONFIG.
-inline constexpr int kExitData = 65, kExitNoInput = 66, kExitConfiguration = 78;
-
 struct ConfigError {
-  int exit_code = kExitConfiguration;  // 66 a file is missing or unreadable, 65 a DBC without a
-                                       // readable message, 78 everything else
-  std::string text;                    // "FILE:LINE: key: found ..., expected ..."
+  // kNoInput: a file is missing or unreadable; kBadInput: a DBC without a readable message.
+  int exit_code = kConfiguration;
+  std::string text;  // "FILE:LINE: key: found ..., expected ..."
 };
 
 // Collects errors with their position.
@@ -27,7 +26,7 @@ class ConfigErrors {
   std::uint32_t add_file(const std::string& file);
   std::string place(std::uint32_t line) const;  // "FILE:LINE"
   void add(std::uint32_t line, const std::string& key, const std::string& found,
-           const std::string& expected, int exit_code = kExitConfiguration);
+           const std::string& expected, int exit_code = kConfiguration);
   // Of a file as a whole.
   void add_of_file(const std::string& file, const std::string& found, const std::string& expected,
                    int exit_code);

@@ -74,12 +74,12 @@ bool DocumentReader::read_file(const std::string& path, const std::string& shown
   const std::string reason = read_text_file(path, kSizeMax - size_, kind_, text);
   if (!reason.empty() && included_at != 0) {
     errors_.add(included_at, "include", in_quotes(shown) + " that cannot be read (" + reason + ")",
-                "the path of a configuration", kExitNoInput);
+                "the path of a configuration", kNoInput);
     return false;
   }
   if (!reason.empty()) {
     errors_.add_of_file(path, "no readable file (" + reason + ")", "a configuration in TOML",
-                        kExitNoInput);
+                        kNoInput);
     return false;
   }
   if (text.size() > kSizeMax - size_) {

@@ -45,7 +45,7 @@ void SignalCatalogue::add_file(const std::string& key, const std::string& path,
   if (!reason.empty()) {
     errors.add(line, key, in_quotes(path) + " that cannot be read (" + reason + ")",
                "the path of a DBC file, relative to " + (directory.empty() ? "." : directory),
-               kExitNoInput);
+               kNoInput);
     complete_ = false;
     return;
   }
@@ -57,7 +57,7 @@ void SignalCatalogue::add_file(const std::string& key, const std::string& path,
       why = "line " + std::to_string(first.line) + ": " + first.text;
     }
     errors.add(line, key, in_quotes(path) + " without a readable message (" + why + ")",
-               "a DBC file", kExitData);
+               "a DBC file", kBadInput);
     complete_ = false;
     return;
   }

@@ -21,7 +21,7 @@ const char* verdict_text(Verdict verdict) {
   return nullptr;
 }
 
-void interval(cli::JsonWriter& json, double low, double high) {
+void interval(text::JsonWriter& json, double low, double high) {
   json.key("ci95").begin_array().value(low).value(high).end_array();
 }
 
@@ -41,7 +41,7 @@ std::string figure_text(const Rerun& rerun, const RerunFigure& figure) {
 }
 
 std::string json_text(const Diagnosis& d) {
-  cli::JsonWriter json;
+  text::JsonWriter json;
   json.begin_object();
   const char* verdict = verdict_text(d.verdict);
   json.key("verdict");

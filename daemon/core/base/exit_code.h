@@ -1,9 +1,7 @@
-// Exit codes of both programs (sysexits) as one type, and the failure that carries one. Tools only.
+// Exit codes of both programs: those of sysexits.h. Start-up and tools.
 #pragma once
 
-#include <string>
-
-namespace beltgrip::cli {
+namespace beltgrip {
 
 enum ExitCode : int {
   kDone = 0,
@@ -17,10 +15,4 @@ enum ExitCode : int {
   kConfiguration = 78,  // the configuration or scenario, or what it names
 };
 
-// Thrown by a subcommand, caught once in main: one line on standard error, then the exit code.
-struct Failure {
-  int exit_code = kInternal;
-  std::string text;
-};
-
-}  // namespace beltgrip::cli
+}  // namespace beltgrip
