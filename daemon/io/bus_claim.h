@@ -7,7 +7,7 @@
 #include <string>
 
 #include "daemon/core/base/port.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 
 namespace beltgrip::daemon {
 

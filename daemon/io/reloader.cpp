@@ -3,8 +3,9 @@
 #include <charconv>
 #include <utility>
 
-#include "daemon/core/config/config_fingerprint.h"
-#include "daemon/core/config/config_reload.h"
+#include "daemon/core/config/load/config_fingerprint.h"
+#include "daemon/core/config/load/config_reload.h"
+#include "daemon/core/config/load/load_config.h"
 #include "daemon/core/publish/own_frames.h"
 #include "daemon/io/rt_setup.h"
 

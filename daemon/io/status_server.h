@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/observe/observation.h"
 
 namespace beltgrip::daemon {

@@ -140,7 +140,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Planted{"estimator/a.cpp", "const char* a = R\"(new \" throw)\";"},
                     Planted{"estimator/a.cpp", "int renewed = 1'000'000; int n = renewed;"},
                     Planted{"estimator/a.cpp", "char c = '\"'; int n = 0; char d = '\"';"},
-                    Planted{"daemon/core/config/config.cpp", "roles.push_back(role);"},
+                    Planted{"daemon/core/config/load/load_config.cpp", "roles.push_back(role);"},
                     Planted{"can_dbc/a.cpp", "void Writer::write(int a) {}"},
                     Planted{"daemon/io/socket_port.cpp", "#include <sys/socket.h>"},
                     Planted{"tools/sim/a.cpp",

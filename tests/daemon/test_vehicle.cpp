@@ -1,4 +1,5 @@
 #include "tests/daemon/test_vehicle.h"
+#include "daemon/core/config/load/load_config.h"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "can_dbc/frame/can_frame.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 
 namespace beltgrip::test {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "can_dbc/dbc/parser.h"
-#include "daemon/core/config/config_model.h"
+#include "daemon/core/config/options/config_model.h"
 #include "daemon/core/publish/own_frames.h"
 #include "estimator/physics/machine_effects.h"
 #include "tests/support/program.h"

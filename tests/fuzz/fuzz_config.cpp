@@ -8,8 +8,9 @@
 #include <filesystem>
 #include <string>
 
-#include "daemon/core/config/config.h"
-#include "daemon/core/config/config_options.h"
+#include "daemon/core/config/load/load_config.h"
+#include "daemon/core/config/options/config.h"
+#include "daemon/core/config/options/config_options.h"
 
 namespace {
 

@@ -12,7 +12,8 @@
 #include <filesystem>
 #include <string>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/load/load_config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/loop/pipeline.h"
 
 namespace {

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/guard/tx_gate.h"
 #include "daemon/core/input/input_monitor.h"
 

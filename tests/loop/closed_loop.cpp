@@ -8,6 +8,7 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "daemon/core/config/load/load_config.h"
 #include "daemon/core/loop/loop.h"
 #include "tests/loop/detectable.h"
 #include "tests/support/invariants.h"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/experiment/experiment.h"
 #include "tools/sim/vehicle_simulation.h"
 

@@ -11,7 +11,7 @@
 
 #include "can_dbc/dbc/signal_codec.h"
 #include "daemon/core/base/port.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 
 namespace beltgrip::test {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "daemon/core/base/port.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/experiment/experiment.h"
 #include "tools/sim/vehicle_parameters.h"
 

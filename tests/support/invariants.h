@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/loop/loop.h"
 #include "daemon/core/observe/event.h"
 

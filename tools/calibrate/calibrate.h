@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "tools/diagnose/data/signal_table.h"
 
 namespace beltgrip::calibrate {
@@ -16,7 +16,7 @@ namespace beltgrip::calibrate {
 struct Finding {
   std::string key;              // of the configuration, or a name where there is no such key
   std::optional<double> value;  // nothing: refused
-  double std = 0.0;             // half the width of the 95 % interval over 1.96
+  double std = 0.0;             // half the width of the 95 % interval over kNormal95
   double configured = 0.0;
   std::string unit;
   std::string text;  // what it rests on, or why it is refused

@@ -18,7 +18,7 @@ struct Observations {
 struct ClusterFit {
   bool solved = false;
   Eigen::VectorXd value;
-  // So that value +- 1.96 std is a 95 % interval also for few clusters.
+  // So that value +- kNormal95 std is a 95 % interval also for few clusters.
   Eigen::VectorXd std;
   double residual_std = 0.0;
   int clusters = 0;

@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/experiment/arming.h"
 #include "daemon/core/loop/loop.h"
 #include "daemon/core/loop/pipeline.h"

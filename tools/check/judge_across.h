@@ -3,7 +3,7 @@
 // Tools only.
 #pragma once
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "tools/check/bus_view.h"
 #include "tools/check/finding.h"
 #include "tools/check/thinned.h"

@@ -4,7 +4,7 @@
 
 #include <span>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "tools/calibrate/calibrate.h"
 #include "tools/check/finding.h"
 

@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "tools/check/finding.h"
 #include "tools/check/role_watch.h"
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "daemon/core/config/load/load_config.h"
 #include "tools/check/text.h"
 #include "tools/text/json_writer.h"
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "tools/check/bus_view.h"
 #include "tools/check/role_watch.h"
 #include "tools/check/verdict.h"

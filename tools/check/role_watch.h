@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "daemon/core/base/port.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/input/input_monitor.h"
 #include "tools/check/thinned.h"
 

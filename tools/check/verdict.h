@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "tools/check/bus_view.h"
 #include "tools/check/finding.h"
 #include "tools/check/judge_role.h"

@@ -10,7 +10,7 @@
 
 #include "can_dbc/frame/can_frame.h"
 #include "daemon/core/base/port.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 
 namespace beltgrip::cli {
 

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/statistics/interval.h"
 #include "tools/calibrate/calibrate.h"
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"
@@ -82,7 +83,7 @@ std::string json_text(const std::vector<Finding>& findings) {
   text::JsonWriter json;
   json.begin_object().key("findings").begin_array();
   for (const Finding& each : findings) {
-    const double half = 1.96 * each.std;
+    const double half = estimator::kNormal95 * each.std;
     json.begin_object().field("key", each.key).field("value", each.value.value_or(text::kJsonNull));
     json.field("std", each.value ? each.std : text::kJsonNull);
     json.key("ci95");

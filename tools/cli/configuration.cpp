@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "daemon/core/config/load/load_config.h"
 #include "tools/cli/failure.h"
 #include "tools/cli/output_file.h"
 #include "tools/text/terminal.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 
 namespace beltgrip::cli {
 

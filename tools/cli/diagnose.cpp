@@ -9,7 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/load/load_config.h"
+#include "daemon/core/config/options/config.h"
 #include "tools/cli/log_table.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"

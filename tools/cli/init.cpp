@@ -9,8 +9,8 @@
 
 #include "can_dbc/dbc/parser.h"
 #include "can_dbc/text/printable.h"
-#include "daemon/core/config/config.h"
-#include "daemon/core/config/config_options.h"
+#include "daemon/core/config/options/config.h"
+#include "daemon/core/config/options/config_options.h"
 #include "tools/cli/command.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/role_guess.h"

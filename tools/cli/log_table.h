@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "tools/diagnose/data/signal_table.h"
 
 namespace beltgrip::cli {

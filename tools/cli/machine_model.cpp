@@ -2,7 +2,7 @@
 
 #include <map>
 
-#include "daemon/core/config/config_model.h"
+#include "daemon/core/config/options/config_model.h"
 #include "tools/cli/failure.h"
 
 namespace beltgrip::cli {

@@ -13,7 +13,7 @@
 #include "can_dbc/dbc/model.h"
 #include "can_dbc/frame/can_frame.h"
 #include "can_dbc/frame/e2e.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 
 namespace beltgrip::cli {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "daemon/core/base/port.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/experiment/arming.h"
 #include "daemon/core/loop/loop.h"
 #include "daemon/core/loop/pipeline.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "can_dbc/dbc/model.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 
 namespace beltgrip::cli {
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <sstream>
 
-#include "daemon/core/config/toml_bounds.h"
+#include "daemon/core/config/toml/toml_bounds.h"
 #include "tools/cli/failure.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/vehicle_scenario.h"

@@ -4,7 +4,7 @@
 #include <memory>
 #include <optional>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "estimator/method/slip_curve_estimator.h"
 #include "estimator/signal/input_correction.h"
 

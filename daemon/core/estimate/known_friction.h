@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "daemon/core/base/faults.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/estimate/ended_experiment.h"
 #include "estimator/belt/belt_history.h"
 #include "estimator/method/slip_curve_estimator.h"

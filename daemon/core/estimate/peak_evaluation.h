@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/estimate/ended_experiment.h"
 #include "daemon/core/estimate/estimate_stage.h"
 #include "estimator/physics/assumed_constants.h"

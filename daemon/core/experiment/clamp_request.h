@@ -23,7 +23,7 @@
 
 #include "daemon/core/base/limits.h"
 #include "daemon/core/base/mono_time.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/experiment/arming.h"
 #include "estimator/method/slip_curve_estimator.h"
 

@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "daemon/core/base/faults.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/estimate/ended_experiment.h"
 #include "daemon/core/estimate/estimate_stage.h"
 #include "daemon/core/estimate/known_friction.h"

@@ -18,7 +18,7 @@
 
 #include "can_dbc/frame/can_frame.h"
 #include "daemon/core/base/mono_time.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 
 namespace beltgrip::daemon {
 

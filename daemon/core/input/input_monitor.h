@@ -26,7 +26,7 @@
 
 #include "daemon/core/base/faults.h"
 #include "daemon/core/base/port.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/input/frame_guard.h"
 #include "daemon/core/input/signal_history.h"
 #include "daemon/core/input/spike_gate.h"

@@ -7,7 +7,7 @@
 
 #include "daemon/core/base/faults.h"
 #include "daemon/core/base/outbox.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/input/bus_watch.h"
 #include "daemon/core/input/input_monitor.h"
 #include "daemon/core/input/sampler.h"

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "estimator/method/slip_curve_estimator.h"
 
 namespace beltgrip::daemon {

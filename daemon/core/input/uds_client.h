@@ -25,7 +25,7 @@
 #include "can_dbc/uds/uds.h"
 #include "daemon/core/base/outbox.h"
 #include "daemon/core/base/port.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 
 namespace beltgrip::daemon {
 

@@ -12,7 +12,7 @@
 #include "daemon/core/base/faults.h"
 #include "daemon/core/base/outbox.h"
 #include "daemon/core/base/port.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/experiment/experiment.h"
 #include "daemon/core/input/input_monitor.h"
 #include "daemon/core/loop/sample_report.h"

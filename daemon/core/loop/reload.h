@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "daemon/core/base/port.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/loop/pipeline.h"
 
 namespace beltgrip::daemon {

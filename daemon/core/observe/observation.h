@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "daemon/core/base/latest_slot.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/loop/loop.h"
 #include "daemon/core/loop/pipeline.h"
 

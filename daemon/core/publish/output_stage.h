@@ -8,7 +8,7 @@
 #include "daemon/core/base/faults.h"
 #include "daemon/core/base/outbox.h"
 #include "daemon/core/base/port.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/guard/tx_gate.h"
 #include "daemon/core/publish/publisher.h"
 

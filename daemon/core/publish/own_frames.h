@@ -12,7 +12,7 @@
 #include "can_dbc/dbc/signal_codec.h"
 #include "can_dbc/frame/can_frame.h"
 #include "daemon/core/base/faults.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/experiment/experiment.h"
 #include "estimator/method/slip_curve_estimator.h"
 

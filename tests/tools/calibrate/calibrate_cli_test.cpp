@@ -7,7 +7,8 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/load/load_config.h"
+#include "daemon/core/config/options/config.h"
 #include "tests/support/program.h"
 #include "tests/tools/calibrate/drive.h"
 

@@ -5,7 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "can_dbc/dbc/parser.h"
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/load/load_config.h"
+#include "daemon/core/config/options/config.h"
 #include "tests/support/program.h"
 #include "tools/cli/role_guess.h"
 

@@ -18,7 +18,7 @@ namespace beltgrip::cli {
 namespace {
 
 TEST(JsonWriter, WritesWhatAParserReadsBack) {
-  JsonWriter json;
+  text::JsonWriter json;
   json.begin_object()
       .field("text", "a\"b\\c\n\x01\x7f µ")
       .field("number", 0.1)
@@ -59,7 +59,7 @@ TEST(Seconds, AreExact) {
 }
 
 TEST(Labels, AreTheWireNamesInSnakeCase) {
-  EXPECT_EQ(snake_case("MacroSlip"), "macro_slip");
+  EXPECT_EQ(text::snake_case("MacroSlip"), "macro_slip");
   EXPECT_EQ(reason_text(estimator::StopReason::kTraceEnd), "trace_end");
   EXPECT_EQ(reason_text(estimator::StopReason::kClampNotFollowed), "clamp_not_followed");
   EXPECT_EQ(reason_text(estimator::StopReason::kLag), "lag");

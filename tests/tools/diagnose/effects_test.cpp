@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <set>
 
-#include "daemon/core/config/config_model.h"
+#include "daemon/core/config/options/config_model.h"
 #include "estimator/physics/machine_effects.h"
 #include "tools/diagnose/model/effects/effect.h"
 #include "tools/sim/bus.h"

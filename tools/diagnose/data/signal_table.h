@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 
 namespace beltgrip::diagnose {
 

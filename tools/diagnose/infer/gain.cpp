@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <numeric>
 
+#include "estimator/statistics/interval.h"
 #include "tools/diagnose/infer/forward.h"
 
 namespace beltgrip::diagnose {
@@ -251,7 +252,8 @@ LeftOut leave_one_out(const Engine& engine, const Campaign& campaign, const Whit
                                  : 0.0);
     const double size = state.effects[slots[i]] / engine.scale(kNuisanceCount + slots[i]);
     const auto there = std::count_if(sizes.begin(), sizes.end(), [&](const Without& each) {
-      return (size + each.size[j]) * std::copysign(1.0, size) > 1.96 * std::sqrt(each.variance[j]);
+      return (size + each.size[j]) * std::copysign(1.0, size) >
+             estimator::kNormal95 * std::sqrt(each.variance[j]);
     });
     out.stability.push_back(static_cast<double>(there) /
                             std::max(1.0, static_cast<double>(sizes.size())));

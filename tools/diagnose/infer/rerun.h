@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "daemon/core/config/config.h"
+#include "daemon/core/config/options/config.h"
 #include "daemon/core/experiment/experiment.h"
 #include "tools/diagnose/data/diagnosis.h"
 #include "tools/diagnose/data/signal_table.h"

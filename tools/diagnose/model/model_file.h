@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "daemon/core/config/config_model.h"
+#include "daemon/core/config/options/config_model.h"
 #include "tools/diagnose/model/effects/effect.h"
 
 namespace beltgrip::diagnose {

@@ -6,6 +6,7 @@
 
 #include "estimator/physics/clamp_force.h"
 #include "estimator/statistics/distributions.h"
+#include "estimator/statistics/interval.h"
 #include "tools/diagnose/decide/namer.h"
 #include "tools/diagnose/decide/plausibility.h"
 #include "tools/diagnose/infer/engine.h"
@@ -233,8 +234,8 @@ class Run {
       const auto shown = [&](double v) { return ln ? std::exp(v) : v; };
       std::string name(engine.campaign().nuisances[static_cast<std::size_t>(p)].name);
       if (ln) name = name.substr(3);
-      out().machine[name] = {shown(value), shown(value - 1.96 * sigma),
-                             shown(value + 1.96 * sigma)};
+      out().machine[name] = {shown(value), shown(value - estimator::kNormal95 * sigma),
+                             shown(value + estimator::kNormal95 * sigma)};
     }
   }
 
@@ -323,8 +324,9 @@ class Run {
       finding.probability = 1.0;
       finding.equation = "omega_measured = omega_true (1 + a sin(phi + phi0))";
       finding.acts_on = "speed";
-      finding.parameters[ripple.shaft] = {ripple.amplitude, ripple.amplitude - 1.96 * ripple.sigma,
-                                          ripple.amplitude + 1.96 * ripple.sigma};
+      finding.parameters[ripple.shaft] = {ripple.amplitude,
+                                          ripple.amplitude - estimator::kNormal95 * ripple.sigma,
+                                          ripple.amplitude + estimator::kNormal95 * ripple.sigma};
     }
     for (Finding& finding : out().findings) {
       if (finding.aliases.empty()) finding.separate_by.clear();

@@ -8,7 +8,8 @@
 #include <random>
 #include <set>
 
-#include "daemon/core/config/config_fingerprint.h"
+#include "daemon/core/config/load/config_fingerprint.h"
+#include "daemon/core/config/load/load_config.h"
 #include "daemon/core/loop/pipeline.h"
 #include "daemon/core/publish/own_frames.h"
 #include "tests/daemon/frame_player.h"

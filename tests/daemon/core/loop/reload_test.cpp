@@ -10,6 +10,7 @@
 #include <map>
 
 #include "can_dbc/dbc/signal_codec.h"
+#include "daemon/core/config/load/load_config.h"
 #include "daemon/core/publish/own_frames.h"
 #include "daemon/io/history_keeper.h"
 #include "daemon/io/reloader.h"

@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "daemon/core/config/load/load_config.h"
 #include "daemon/core/loop/pipeline.h"
 #include "daemon/core/publish/own_frames.h"
 #include "daemon/io/history_keeper.h"

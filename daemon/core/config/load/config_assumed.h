@@ -1,0 +1,20 @@
+// What is left out is not known exactly: a result says what it rests on. Start-up and tools only.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "daemon/core/config/options/config.h"
+#include "daemon/core/config/options/config_options.h"
+#include "daemon/core/config/toml/config_document.h"
+
+namespace beltgrip::daemon {
+
+using SensorTexts = std::array<SensorText, kRoleCount>;  // by role
+
+// `model_keys`: of [variator], that the model file states.
+void assume(const TomlNode& root, const std::vector<std::string>& model_keys, SensorTexts& sensors,
+            Config& config);
+
+}  // namespace beltgrip::daemon

@@ -1,0 +1,28 @@
+// Reads the configuration and every file that it names. Start-up and tools only.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/core/config/options/config.h"
+#include "daemon/core/config/toml/config_errors.h"
+
+namespace beltgrip::daemon {
+
+struct ConfigResult {
+  std::optional<Config> config;       // set when errors is empty
+  std::vector<ConfigError> errors;    // all of them
+  std::vector<std::string> warnings;  // problems of the DBC files and the like, one line each
+
+  int exit_code() const { return errors.empty() ? 0 : errors.front().exit_code; }
+};
+
+// How much of it is wanted: for the daemon, for reading logs, or (without [signals] and DBC files)
+// for tables whose columns are named by role.
+enum class ConfigScope { kAll, kSignals, kVariator };
+ConfigResult load_config(const std::string& path, ConfigScope scope = ConfigScope::kAll);
+// One line: what results rest on that nobody stated; empty: nothing.
+std::string assumed_text(const Config& config);
+
+}  // namespace beltgrip::daemon
