@@ -211,6 +211,28 @@ class Sinks final : public SampleSink {
   ObservationSink& observations_;
 };
 
+// The last lines of the log.
+void say_what_was(LogSink& log, const PipelineCounters& counters, const LoopCounters& loop,
+                  const LoopMeters& meters) {
+  log.info("stopped: " + std::to_string(counters.frames) + " frames, " +
+           std::to_string(counters.frames_decoded) + " taken, " +
+           std::to_string(counters.frames_bad) + " bad, " + std::to_string(counters.samples) +
+           " samples, " + std::to_string(loop.samples_late) + " late, " +
+           std::to_string(loop.sends_failed) + " sends failed, " +
+           std::to_string(counters.frames_refused) + " refused");
+  if (const UdsCounters& uds = counters.diagnostics;
+      uds.requests + uds.answers + uds.refusals > 0) {
+    log.info("diagnostics: " + std::to_string(uds.requests) + " requests, " +
+             std::to_string(uds.answers) + " answers, " + std::to_string(uds.refusals) +
+             " refusals, " + std::to_string(uds.timeouts) + " without answer, " +
+             std::to_string(uds.broken) + " broken, " + std::to_string(uds.foreign) +
+             " frames of another tester");
+  }
+  log.info("latency: " + latency_text("wake-up", meters.wake_up) + "; " +
+           latency_text("sample to frame", meters.sample_to_frame) + "; " +
+           latency_text("frame age", meters.frame_age));
+}
+
 int run(const Arguments& arguments) {
   const ConfigResult loaded = load_config(arguments.config);
   for (const std::string& warning : loaded.warnings) complain(warning);
@@ -325,24 +347,7 @@ int run(const Arguments& arguments) {
   if (recorder != nullptr) recorder->stop();
   recorder_messages();
   service.stopping();
-  const PipelineCounters& counters = pipeline.counters();
-  log.info("stopped: " + std::to_string(counters.frames) + " frames, " +
-           std::to_string(counters.frames_decoded) + " taken, " +
-           std::to_string(counters.frames_bad) + " bad, " + std::to_string(counters.samples) +
-           " samples, " + std::to_string(loop.samples_late) + " late, " +
-           std::to_string(loop.sends_failed) + " sends failed, " +
-           std::to_string(counters.frames_refused) + " refused");
-  if (const UdsCounters& uds = counters.diagnostics;
-      uds.requests + uds.answers + uds.refusals > 0) {
-    log.info("diagnostics: " + std::to_string(uds.requests) + " requests, " +
-             std::to_string(uds.answers) + " answers, " + std::to_string(uds.refusals) +
-             " refusals, " + std::to_string(uds.timeouts) + " without answer, " +
-             std::to_string(uds.broken) + " broken, " + std::to_string(uds.foreign) +
-             " frames of another tester");
-  }
-  log.info("latency: " + latency_text("wake-up", meters.wake_up) + "; " +
-           latency_text("sample to frame", meters.sample_to_frame) + "; " +
-           latency_text("frame age", meters.frame_age));
+  say_what_was(log, pipeline.counters(), loop, meters);
   close(stop_fd);
   return kDone;
 }

@@ -7,6 +7,19 @@
 
 namespace beltgrip::command_line {
 
+namespace {
+constexpr const char* kVersionFlag = "-V,--version";
+
+void set_version_below(CLI::App& app, const std::string& text) {
+  for (CLI::App* command : app.get_subcommands(nullptr)) {
+    if (command->get_group().empty()) continue;
+    command->set_version_flag(kVersionFlag, text);
+    set_version_below(*command, text);
+  }
+}
+
+}  // namespace
+
 Option Option::required() const { return Option(option_->required()); }
 
 Option Option::type_name(const std::string& name) const { return Option(option_->type_name(name)); }
@@ -51,7 +64,12 @@ Command Command::add_hidden_subcommand(const std::string& name) const {
 void Command::require_subcommand() const { app_->require_subcommand(1); }
 
 void Command::set_version(const std::string& text) const {
-  app_->set_version_flag("--version", text);
+  app_->set_version_flag(kVersionFlag, text);
+}
+
+void Command::example(const std::string& line) const {
+  const std::string before = app_->get_footer();
+  app_->footer((before.empty() ? "Examples:" : before) + "\n  " + line);
 }
 
 void Command::callback(std::function<void()> function) const {
@@ -70,9 +88,7 @@ void Program::set_name(const std::string& name) { owned_->name(name); }
 void Program::set_column_width(std::size_t width) { owned_->get_formatter()->column_width(width); }
 
 void Program::set_version_of_subcommands(const std::string& text) {
-  for (CLI::App* command : owned_->get_subcommands(nullptr)) {
-    if (!command->get_group().empty()) command->set_version_flag("--version", text);
-  }
+  set_version_below(*owned_, text);
 }
 
 bool Program::has_subcommand(const std::string& name) const {

@@ -45,6 +45,8 @@ class Command {
   Command add_subcommand(const std::string& name, const std::string& help) const;
   // Known, but not shown in help; takes any arguments.
   Command add_hidden_subcommand(const std::string& name) const;
+  // A command line that help shows below the options, in the order of the calls.
+  void example(const std::string& line) const;
   // Exactly one subcommand must be given.
   void require_subcommand() const;
   void set_version(const std::string& text) const;

@@ -241,12 +241,18 @@ void add_calibrate(command_line::Command app) {
       "calibrate",
       "End-stop ratios, zero of the pressure, inertia and delays from recorded drives");
   auto options = std::make_shared<Options>();
-  command.add_option("log", options->logs, "CAN logs of drives, all of the same vehicle")
+  command.add_option("LOG", options->logs, "CAN logs of drives, all of the same vehicle")
+      .type_name("")
       .required();
-  command.add_option("--config", options->config, "BeltGrip's configuration").required();
-  command.add_option("--json", options->json, "As JSON, '-': standard output");
-  command.add_option("--out", options->out, "The keys as TOML, '-': standard output");
+  command.add_option("--config", options->config, "BeltGrip's configuration")
+      .type_name("FILE")
+      .required();
+  command.add_option("--json", options->json, "As JSON, '-': standard output").type_name("FILE");
+  command.add_option("--out", options->out, "The keys as TOML, '-': standard output")
+      .type_name("FILE");
   command.add_flag("--force", options->force, "Replace the file of --out where it exists");
+  command.example(
+      "beltgrip calibrate drive/trace.log --config drive/beltgrip.toml --out found.toml");
   command.callback([options] { run(*options); });
 }
 

@@ -156,7 +156,7 @@ void add_can(command_line::Command app) {
   auto options = std::make_shared<Options>();
   const auto subcommand = [&](const char* name, const char* help) {
     const command_line::Command command = can.add_subcommand(name, help);
-    command.add_option("interface", options->interface, "A CAN interface").required();
+    command.add_option("INTERFACE", options->interface, "A CAN interface").type_name("").required();
     return command;
   };
 
@@ -177,16 +177,18 @@ void add_can(command_line::Command app) {
                 "Frames that may wait for the controller")
       .envname("CAN_QUEUE_LENGTH")
       .range(1, 10'000);
+  up.example("beltgrip can up can0 --bitrate 500000");
   up.callback(
       [options] { demand(daemon::bring_up(link_of(options->interface), options->setting)); });
 
-  subcommand("down", "Take it down").callback([options] {
-    demand(daemon::bring_down(link_of(options->interface)));
-  });
+  const command_line::Command down = subcommand("down", "Take it down");
+  down.example("beltgrip can down can0");
+  down.callback([options] { demand(daemon::bring_down(link_of(options->interface))); });
 
   const command_line::Command status =
       subcommand("status", "State, error counters, bit timing, restarts, drops");
   status.add_flag("--json", options->json, "As one JSON object; null: nobody can say");
+  status.example("beltgrip can status can0");
   status.callback([options] {
     const CanLink link = link_of(options->interface);
     if (options->json) {

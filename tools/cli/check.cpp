@@ -169,13 +169,19 @@ void add_check(command_line::Command app) {
       "check",
       "Does a configuration fit the car: every role, what belongs together, what is missing");
   auto options = std::make_shared<Options>();
-  command.add_option("log", options->logs, "CAN logs of drives, all of the same vehicle");
-  command.add_option("--config", options->config, "BeltGrip's configuration").required();
+  command.add_option("LOG", options->logs, "CAN logs of drives, all of the same vehicle")
+      .type_name("");
+  command.add_option("--config", options->config, "BeltGrip's configuration")
+      .type_name("FILE")
+      .required();
   command
       .add_option("--live", options->live_s,
                   "Listen to the configuration's bus for so many seconds; nothing is sent")
+      .type_name("SECONDS")
       .range(0.1, 86400.0);
-  command.add_option("--json", options->json, "As JSON, '-': standard output");
+  command.add_option("--json", options->json, "As JSON, '-': standard output").type_name("FILE");
+  command.example("beltgrip check drive/trace.log --config drive/beltgrip.toml");
+  command.example("beltgrip check --live 60 --config mycar.toml");
   command.callback([options] { run(*options); });
 }
 

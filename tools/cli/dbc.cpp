@@ -9,6 +9,7 @@
 
 #include "can_dbc/text/printable.h"
 #include "tools/cli/dbc_decode.h"
+#include "tools/cli/dbc_encode.h"
 #include "tools/cli/dbc_file.h"
 #include "tools/cli/dbc_json.h"
 #include "tools/cli/failure.h"
@@ -134,34 +135,70 @@ void add_decode(command_line::Command dbc) {
   const command_line::Command command =
       dbc.add_subcommand("decode", "print the signals of a log's frames");
   command.add_option("--dbc", options->dbc_paths, "DBC file; several may be given")
+      .type_name("FILE")
       .required()
       .allow_extra_args(false);
-  command.add_option("LOG", options->log_paths,
-                     "candump, .asc, .trc or .csv logs, plain, .gz or .zst; - is standard input");
-  command.add_option("--text", options->text_path,
-                     "write one line a frame to this file, - for standard output (the default)");
-  command.add_option("--csv", options->csv_path,
-                     "write a table to this file, - for standard output: one column a signal");
-  command.add_option("--json", options->json_path,
-                     "write one JSON line a frame to this file, - for standard output");
+  command
+      .add_option("LOG", options->log_paths,
+                  "candump, .asc, .trc or .csv logs, plain, .gz or .zst; - is standard input")
+      .type_name("");
+  command
+      .add_option("--text", options->text_path,
+                  "write one line a frame to this file, - for standard output (the default)")
+      .type_name("FILE");
+  command
+      .add_option("--csv", options->csv_path,
+                  "write a table to this file, - for standard output: one column a signal")
+      .type_name("FILE");
+  command
+      .add_option("--json", options->json_path,
+                  "write one JSON line a frame to this file, - for standard output")
+      .type_name("FILE");
   command.add_flag("--raw", options->raw, "add the raw values; in CSV: instead of the physical");
   command
       .add_option("--messages", options->messages, "only the message of this name; may be repeated")
+      .type_name("NAME")
       .allow_extra_args(false);
   command
       .add_option("--signals", options->signals,
                   "only this signal, Name or Message.Name; may be repeated")
+      .type_name("NAME")
       .allow_extra_args(false);
-  command.add_option("--from", options->from_s, "begin so many seconds after the first frame");
-  command.add_option("--to", options->to_s, "end so many seconds after the first frame");
+  command.add_option("--from", options->from_s, "begin so many seconds after the first frame")
+      .type_name("SECONDS");
+  command.add_option("--to", options->to_s, "end so many seconds after the first frame")
+      .type_name("SECONDS");
+  command.example("beltgrip dbc decode drive/trace.log --dbc drive/vehicle.dbc --csv signals.csv");
+  command.example("candump -L can0 | beltgrip dbc decode - --dbc mycar.dbc");
   command.callback([options] { decode(*options); });
+}
+
+void add_encode(command_line::Command dbc) {
+  const auto options = std::make_shared<EncodeOptions>();
+  const command_line::Command command =
+      dbc.add_subcommand("encode", "print the frame that carries these values, for cansend");
+  command
+      .add_option("--dbc", options->dbc_paths,
+                  "DBC file; several may be given, the first with the message counts")
+      .type_name("FILE")
+      .required()
+      .allow_extra_args(false);
+  command.add_option("MESSAGE", options->message, "name of the message").type_name("").required();
+  command
+      .add_option("SIGNAL=VALUE", options->values,
+                  "physical value, or text of the value table; signals that are left out have "
+                  "their start value, or 0 on the bus")
+      .type_name("");
+  command.example(
+      "beltgrip dbc encode --dbc drive/vehicle.dbc ECU_Engine EngineSpeed=1200 EngineTorque=-31.5");
+  command.callback([options] { encode(*options); });
 }
 
 }  // namespace
 
 void add_dbc(command_line::Command app) {
   const command_line::Command dbc =
-      app.add_subcommand("dbc", "show, decode with, or check a DBC file");
+      app.add_subcommand("dbc", "show, decode and encode with, or check a DBC file");
   dbc.require_subcommand();
 
   struct Options {
@@ -173,17 +210,22 @@ void add_dbc(command_line::Command app) {
 
   const command_line::Command show_command =
       dbc.add_subcommand("show", "print what a DBC file says");
-  show_command.add_option("FILE", options->path, "DBC file").required();
-  show_command.add_option("--json", options->show_json_path,
-                          "write JSON to this file, - for standard output");
+  show_command.add_option("FILE", options->path, "DBC file").type_name("").required();
+  show_command
+      .add_option("--json", options->show_json_path,
+                  "write JSON to this file, - for standard output")
+      .type_name("FILE");
+  show_command.example("beltgrip dbc show drive/vehicle.dbc");
   show_command.callback([options] { show(options->path, options->show_json_path); });
 
   add_decode(dbc);
+  add_encode(dbc);
 
   const command_line::Command check_command =
       dbc.add_subcommand("check", "list every problem of a DBC file");
-  check_command.add_option("FILE", options->path, "DBC file").required();
+  check_command.add_option("FILE", options->path, "DBC file").type_name("").required();
   check_command.add_flag("--strict", options->strict, "refuse warnings too");
+  check_command.example("beltgrip dbc check drive/vehicle.dbc --strict");
   check_command.callback([options] { check(options->path, options->strict); });
 }
 

@@ -160,16 +160,27 @@ void add_diagnose(command_line::Command app) {
   const auto options = std::make_shared<Options>();
   const command_line::Command command = app.add_subcommand(
       "diagnose", "shows what the simulation gets wrong, names the cause, extends the model");
-  command.add_option("LOG", options->logs, "one experiment each: .csv, or a log").required();
-  command.add_option("--config", options->config, "configuration (TOML)").required();
-  command.add_option("--model", options->model, "model file: what the simulation believes");
-  command.add_option("--held-out", options->held_out, "experiments for the gain only");
-  command.add_option("--json", options->json, "result as JSON; - for standard output");
-  command.add_option("--report", options->report, "result with plots as one HTML file");
-  command.add_option("--model-out", options->model_out, "writes the extended model");
+  command.add_option("LOG", options->logs, "one experiment each: .csv, or a log")
+      .type_name("")
+      .required();
+  command.add_option("--config", options->config, "configuration (TOML)")
+      .type_name("FILE")
+      .required();
+  command.add_option("--model", options->model, "model file: what the simulation believes")
+      .type_name("FILE");
+  command.add_option("--held-out", options->held_out, "experiments for the gain only")
+      .type_name("FILE");
+  command.add_option("--json", options->json, "result as JSON; - for standard output")
+      .type_name("FILE");
+  command.add_option("--report", options->report, "result with plots as one HTML file")
+      .type_name("FILE");
+  command.add_option("--model-out", options->model_out, "writes the extended model")
+      .type_name("FILE");
   command.add_flag("--force", options->force, "replace the file of --model-out where it exists");
   command.add_option("--jobs", options->jobs, "threads; the same answer for any number")
       .range(1, 256);
+  command.example(
+      "beltgrip diagnose run*.csv --config mycar.toml --report found.html --model-out model.toml");
   command.callback([options] { run(*options); });
 }
 

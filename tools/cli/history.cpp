@@ -372,12 +372,19 @@ void add_history(command_line::Command app) {
   const command_line::Command command = app.add_subcommand(
       "history", "The experiments that the daemon has kept, and what they say together");
   auto options = std::make_shared<Options>();
-  command.add_option("file", options->file,
-                     "history.db or its folder (default: the configuration's state_dir, else " +
-                         std::string(kDefaultFolder) + ")");
-  command.add_option("--config", options->config, "BeltGrip's configuration, for its state_dir");
-  command.add_option("--json", options->json, "As JSON lines, '-': standard output");
-  command.add_option("--csv", options->csv, "The experiments as CSV, '-': standard output");
+  command
+      .add_option("FILE", options->file,
+                  "history.db or its folder (default: the configuration's state_dir, else " +
+                      std::string(kDefaultFolder) + ")")
+      .type_name("");
+  command.add_option("--config", options->config, "BeltGrip's configuration, for its state_dir")
+      .type_name("FILE");
+  command.add_option("--json", options->json, "As JSON lines, '-': standard output")
+      .type_name("FILE");
+  command.add_option("--csv", options->csv, "The experiments as CSV, '-': standard output")
+      .type_name("FILE");
+  command.example("beltgrip history");
+  command.example("beltgrip history --config mycar.toml --csv belt.csv");
   command.callback([options] { run(*options); });
 }
 

@@ -211,12 +211,15 @@ void add_init(command_line::Command app) {
   const command_line::Command command =
       app.add_subcommand("init", "Propose a configuration for DBC files");
   auto options = std::make_shared<Options>();
-  command.add_option("dbc", options->dbc, "The vehicle's DBC files").required();
+  command.add_option("DBC", options->dbc, "The vehicle's DBC files").type_name("").required();
   command.add_option("--interface", options->interface, "CAN interface to enter")
+      .type_name("INTERFACE")
       .capture_default_str();
   command.add_option("--out", options->out, "File to write, '-': standard output")
+      .type_name("FILE")
       .capture_default_str();
   command.add_flag("--force", options->force, "Replace a file that exists");
+  command.example("beltgrip init drive/vehicle.dbc --out mycar.toml");
   command.callback([options] { run(*options); });
 }
 

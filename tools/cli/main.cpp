@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "tools/cli/can.h"
 #include "tools/cli/command.h"
@@ -40,7 +42,20 @@ std::string unknown_subcommand(const command_line::Program& app, int argc, char*
   return argv[1];
 }
 
-int run(int argc, char** argv) {
+// "beltgrip help dbc show" is "beltgrip dbc show --help", and "beltgrip help" is "beltgrip --help".
+std::vector<char*> without_help_word(int argc, char** argv) {
+  static char help[] = "--help";
+  std::vector<char*> words(argv, argv + argc);
+  if (argc > 1 && std::string_view(argv[1]) == "help") {
+    words.erase(words.begin() + 1);
+    words.push_back(help);
+  }
+  return words;
+}
+
+int run(std::vector<char*> words) {
+  const int argc = static_cast<int>(words.size());
+  char** argv = words.data();
   command_line::Program app{
       "BeltGrip: measures the belt-pulley friction of a metal pushbelt CVT over CAN."};
   app.set_name("beltgrip");
@@ -91,7 +106,7 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   beltgrip::cli::take_stop_signals();
   try {
-    return beltgrip::cli::run(argc, argv);
+    return beltgrip::cli::run(beltgrip::cli::without_help_word(argc, argv));
   } catch (const std::exception& error) {
     beltgrip::text::complain(std::string("internal error: ") + error.what());
     return beltgrip::kInternal;

@@ -89,13 +89,18 @@ void add_monitor(command_line::Command app) {
   const command_line::Command command =
       app.add_subcommand("monitor", "Show BeltGrip's frames on a bus, decoded");
   auto options = std::make_shared<Options>();
-  command.add_option("bus", options->bus, "A SocketCAN interface").required();
+  command.add_option("BUS", options->bus, "A SocketCAN interface").type_name("").required();
   command.add_flag("--json", options->json, "A JSON line for each frame");
   command.add_option("--duration", options->duration_s, "Seconds to watch (default: until stopped)")
+      .type_name("SECONDS")
       .range(1e-3, 1e9);
-  command.add_option("--truth", options->truth,
-                     "truth.json of the simulation that is played onto the bus: shows its times, "
-                     "and its truth beside the result at the end");
+  command
+      .add_option("--truth", options->truth,
+                  "truth.json of the simulation that is played onto the bus: shows its times, "
+                  "and its truth beside the result at the end")
+      .type_name("FILE");
+  command.example("beltgrip monitor can0");
+  command.example("beltgrip monitor can0 --json --duration 60");
   command.callback([options] { run(*options); });
 }
 

@@ -184,24 +184,36 @@ void add_replay(command_line::Command app) {
   const command_line::Command command =
       app.add_subcommand("replay", "Run the daemon's pipeline over logs, the stamps are the clock");
   auto options = std::make_shared<Options>();
-  command.add_option("log", options->logs, "candump logs, also .gz and .zst; '-': standard input")
+  command.add_option("LOG", options->logs, "candump logs, also .gz and .zst; '-': standard input")
+      .type_name("")
       .required();
-  command.add_option("--config", options->config,
-                     "BeltGrip's configuration; required without --bus");
+  command
+      .add_option("--config", options->config, "BeltGrip's configuration; required without --bus")
+      .type_name("FILE");
   command.add_option("--method", options->method, "Instead of the configuration's")
+      .type_name("METHOD")
       .one_of({"robust", "paper"});
-  command.add_option("--interface", options->interface, "Frames of this interface only");
+  command.add_option("--interface", options->interface, "Frames of this interface only")
+      .type_name("INTERFACE");
   command.add_flag("--join", options->join, "The logs are one timeline, not separate runs");
   command.add_option("--jobs", options->jobs, "Logs at the same time (default: all processors)")
       .range(1, 1024);
-  command.add_option("--json", options->json, "Results as JSON lines, '-': standard output");
-  command.add_option("--trace", options->trace, "Every sample of the experiments as CSV");
-  command.add_option("--log-out", options->log_out,
-                     "What the daemon would have put on the bus, as a candump log");
-  command.add_option("--bus", options->bus, "Play the log onto this bus in real time instead");
+  command.add_option("--json", options->json, "Results as JSON lines, '-': standard output")
+      .type_name("FILE");
+  command.add_option("--trace", options->trace, "Every sample of the experiments as CSV")
+      .type_name("FILE");
+  command
+      .add_option("--log-out", options->log_out,
+                  "What the daemon would have put on the bus, as a candump log")
+      .type_name("FILE");
+  command.add_option("--bus", options->bus, "Play the log onto this bus in real time instead")
+      .type_name("BUS");
   command.add_option("--speed", options->speed, "Times real time, with --bus")
       .capture_default_str()
       .range(1e-3, 1e3);
+  command.example(
+      "beltgrip replay drive/trace.log --config drive/beltgrip.toml --json results.json");
+  command.example("candump -L can0 | beltgrip replay - --config mycar.toml");
   command.callback([options] { run(*options); });
 }
 

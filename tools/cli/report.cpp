@@ -119,12 +119,19 @@ void add_report(command_line::Command app) {
   const command_line::Command command =
       app.add_subcommand("report", "The experiments of logs as one HTML file");
   auto options = std::make_shared<Options>();
-  command.add_option("log", options->logs, "Logs as for replay").required();
-  command.add_option("--config", options->config, "BeltGrip's configuration").required();
+  command.add_option("LOG", options->logs, "Logs as for replay").type_name("").required();
+  command.add_option("--config", options->config, "BeltGrip's configuration")
+      .type_name("FILE")
+      .required();
   command.add_option("--method", options->method, "Instead of the configuration's")
+      .type_name("METHOD")
       .one_of({"robust", "paper"});
-  command.add_option("--interface", options->interface, "Frames of this interface only");
-  command.add_option("--out", options->out, "The HTML file").capture_default_str();
+  command.add_option("--interface", options->interface, "Frames of this interface only")
+      .type_name("INTERFACE");
+  command.add_option("--out", options->out, "The HTML file")
+      .type_name("FILE")
+      .capture_default_str();
+  command.example("beltgrip report drive/trace.log --config drive/beltgrip.toml --out report.html");
   command.callback([options] { run(*options); });
 }
 

@@ -221,7 +221,10 @@ void add_run_demo(command_line::Command app) {
   options->scenario.scenario = "demo";
   options->scenario.add_to(command);
   command.add_option("--method", options->method, "robust (default) or paper")
+      .type_name("METHOD")
       .one_of({"robust", "paper"});
+  command.example("beltgrip run-demo");
+  command.example("beltgrip run-demo --scenario paper-rig --belt worn");
   command.callback([options] { run(*options); });
 }
 

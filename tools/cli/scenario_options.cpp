@@ -79,13 +79,16 @@ void ScenarioOptions::add_to(command_line::Command command) {
   command
       .add_option("--scenario", scenario,
                   "A shipped scenario (" + shipped_names() + ") or a TOML file")
+      .type_name("NAME")
       .capture_default_str();
-  command.add_option("--belt", belt, "The belt that is mounted: new, worn");
+  command.add_option("--belt", belt, "The belt that is mounted: new, worn").type_name("BELT");
   command.add_option("--seed", seed, "Seed of the sensor noise").capture_default_str();
   command.add_option("--start", start_s, "Leave out the first seconds")
+      .type_name("SECONDS")
       .capture_default_str()
       .range(0.0, 1e6);
   command.add_option("--duration", duration_s, "Seconds from the start (default: to the end)")
+      .type_name("SECONDS")
       .range(1e-3, 1e6);
   command.add_option("--set", settings, "A value of the scenario, e.g. clamp.ramp_N_per_s=100")
       .type_name("KEY=VALUE")

@@ -209,16 +209,24 @@ void add_simulate(command_line::Command app) {
       "Drive a virtual vehicle, or a rig, with the daemon on the other side of its bus");
   auto options = std::make_shared<Options>();
   options->scenario.add_to(command);
-  command.add_option("--out-dir", options->out_dir,
-                     "Write trace.log, vehicle.dbc, beltgrip.toml and truth.json there");
+  command
+      .add_option("--out-dir", options->out_dir,
+                  "Write trace.log, vehicle.dbc, beltgrip.toml and truth.json there")
+      .type_name("FOLDER");
   command.add_flag("--force", options->force, "Replace files of --out-dir that exist");
-  command.add_option("--log-out", options->log_out, "Write the log alone, '-': standard output");
-  command.add_option("--json", options->json,
-                     "Results and truth as JSON lines, '-': standard output");
-  command.add_option("--bus", options->bus,
-                     "In real time on this bus, for a daemon there; prints the truth at the end");
-  command.add_option("--model", options->model,
-                     "What the machine really is: a model file, on top of the scenario");
+  command.add_option("--log-out", options->log_out, "Write the log alone, '-': standard output")
+      .type_name("FILE");
+  command
+      .add_option("--json", options->json, "Results and truth as JSON lines, '-': standard output")
+      .type_name("FILE");
+  command
+      .add_option("--bus", options->bus,
+                  "In real time on this bus, for a daemon there; prints the truth at the end")
+      .type_name("BUS");
+  command
+      .add_option("--model", options->model,
+                  "What the machine really is: a model file, on top of the scenario")
+      .type_name("FILE");
   command
       .add_option("--experiment", options->experiment,
                   "Its place among several experiments, for the wear of --model")
@@ -227,6 +235,8 @@ void add_simulate(command_line::Command app) {
   command.add_option("--speed", options->speed, "Times real time, with --bus")
       .capture_default_str()
       .range(1e-3, 1e3);
+  command.example("beltgrip simulate --scenario coast-overdrive --out-dir drive");
+  command.example("beltgrip simulate --scenario coast-overdrive --bus vcan0");
   command.callback([options] { run(*options); });
 }
 

@@ -139,9 +139,13 @@ void add_status(command_line::Command app) {
   const command_line::Command command =
       app.add_subcommand("status", "What a running beltgripd sees and measures");
   auto options = std::make_shared<Options>();
-  command.add_option("interface", options->interface, "Its interface, where several run");
-  command.add_option("--socket", options->socket, "Its socket, where it is not a service");
+  command.add_option("INTERFACE", options->interface, "Its interface, where several run")
+      .type_name("");
+  command.add_option("--socket", options->socket, "Its socket, where it is not a service")
+      .type_name("PATH");
   command.add_flag("--json", options->json, "As one JSON object");
+  command.example("beltgrip status");
+  command.example("beltgrip status can0 --json");
   command.callback([options] {
     const std::string path = socket_path(*options);
     const std::string text = ask(path);

@@ -335,6 +335,51 @@ TEST_F(Dbc, DecodeSaysWhatItCannotGive) {
   }
 }
 
+// Bytes by hand: Speed is raw (97 + 3) / 0.1 = 1000 = 0x03E8, low byte first; Gear -1 is the high
+// nibble of byte 2; 87.65 km/h are raw 22438.4, so 22438 = 0x57A6.
+TEST_F(Dbc, EncodeGivesTheFrameOfCansend) {
+  const auto encode = [this](std::vector<std::string> what) {
+    std::vector<std::string> arguments{"dbc", "encode", "--dbc", path("a.dbc")};
+    arguments.insert(arguments.end(), what.begin(), what.end());
+    return beltgrip(arguments);
+  };
+  for (const auto& [what, frame] : std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"Engine", "Speed=97", "Gear=reverse"}, "123#E803F00000000000"},
+           {{"Engine", "Gear=-1", "Late=0xFF"}, ""},
+           {{"Engine"}, "123#0000000000000000"},
+           {{"Muxed", "Page=2", "Second=7"}, "124#0207000000000000"},
+           {{"Muxed", "Float=1.5", "Page=3"}, "124#030000000000C03F"},
+           {{"Ccvs", "Vehicle=87.65"}, "18FEF1FE#00A6570000000000"},
+           {{"Muxed", "First=7", "Page=2"}, "First: not in a frame with this value of Page"},
+           {{"Engine", "Speed=7000"},
+            "Speed: found 7000, which its 16 bits cannot carry; the "
+            "nearest is 6550.5"},
+           {{"Engine", "Speed=fast"}, "Speed: found \"fast\", expected a number"},
+           {{"Engine", "Speed=nan"}, "Speed: found \"nan\", expected a number"},
+           {{"Engine", "Speed=1", "Long=0"}, "Speed: shares bits with another signal"},
+           {{"Engine", "Speed=1", "Speed=1"}, "Speed: given twice"},
+           {{"Engine", "Spede=1"}, "Spede: no signal of Engine, which has Speed, Gear, Late, Long"},
+           {{"Engine", "Speed"}, "Speed: expected SIGNAL=VALUE"},
+           {{"Motor"}, "Motor: no message of that name"}}) {
+    const RunResult result = encode(what);
+    const bool right = frame.find('#') != std::string::npos;
+    EXPECT_EQ(result.status, right ? 0 : 64) << frame << result.err;
+    EXPECT_EQ(result.out, right ? frame + "\n" : "");
+    if (!right) {
+      EXPECT_NE(result.err.find(frame), std::string::npos) << result.err;
+    }
+  }
+  // What is not given has the start value that the file states.
+  place_.write("start.dbc",
+               "BS_: BU_: A\nBO_ 293 Lamp: 1 A\n SG_ On : 0|1@1+ (1,0) [0|1] \"\" A\n"
+               " SG_ Level : 1|7@1+ (2,10) [0|0] \"%\" A\n"
+               "BA_DEF_ SG_ \"GenSigStartValue\" FLOAT 0 100;\n"
+               "BA_DEF_DEF_ \"GenSigStartValue\" 0;\n"
+               "BA_ \"GenSigStartValue\" SG_ 293 Level 5;\n");
+  const RunResult started = beltgrip({"dbc", "encode", "--dbc", path("start.dbc"), "Lamp", "On=1"});
+  EXPECT_EQ(started.out, "125#0B\n") << started.err;
+}
+
 TEST_F(Dbc, ATableTooWideIsRefused) {
   std::string wide = "BS_: BU_: A\n";
   for (int message = 0; message < 40; ++message) {
