@@ -144,8 +144,9 @@ class Encoder {
   void check(const Given& given) const {
     const can::SignalDef& signal = message_.signals[given.index];
     if (!decoded_[given.index].present) {
-      refuse(signal.name + ": not in a frame with this value of " +
-             signal.multiplexed_by->selector);
+      const std::string selector =
+          signal.multiplexed_by ? signal.multiplexed_by->selector : "its multiplexer";
+      refuse(signal.name + ": not in a frame with this value of " + selector);
     }
     if ((decoded_[given.index].raw & codec_.signal(given.index).mask()) != given.raw) {
       refuse(signal.name + ": shares bits with another signal that is given");
