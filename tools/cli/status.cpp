@@ -1,136 +1,124 @@
-// beltgrip status: what a running beltgripd says of itself, over the socket in its runtime
-// directory. Open to every user.
+// beltgrip status: what a running beltgripd says of itself, once or as it goes on. Open to every
+// user.
 #include "tools/cli/status.h"
 
-#include <sys/socket.h>
-#include <sys/time.h>
-#include <sys/un.h>
-#include <unistd.h>
+#include <poll.h>
 
-#include <algorithm>
-#include <cerrno>
+#include <array>
 #include <cstdio>
-#include <cstring>
-#include <filesystem>
+#include <ctime>
 #include <memory>
-#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
-#include <vector>
 
 #include "tools/cli/failure.h"
+#include "tools/cli/output_file.h"
+#include "tools/cli/status_client.h"
+#include "tools/cli/status_text.h"
+#include "tools/cli/stop_signals.h"
 #include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
 
 namespace {
 
-namespace fs = std::filesystem;
-constexpr const char* kRuntimeFolder = "/run/beltgrip";
-constexpr timeval kPatience{5, 0};
-constexpr std::size_t kAnswerMost = std::size_t{1} << 20;
-
 struct Options {
   std::string interface;
   std::string socket;
   bool json = false;
+  bool follow = false;
+  double interval_s = 1.0;
+  std::string prometheus;
 };
 
-std::string socket_path(const Options& options) {
-  if (!options.socket.empty()) return options.socket;
-  if (!options.interface.empty()) {
-    return std::string(kRuntimeFolder) + "/" + options.interface + "/status.sock";
-  }
-  std::vector<std::string> found;
-  std::error_code error;
-  for (const auto& each : fs::directory_iterator(kRuntimeFolder, error)) {
-    if (fs::exists(each.path() / "status.sock", error)) found.push_back(each.path().filename());
-  }
-  if (found.empty()) {
-    throw Failure{kUnavailable, std::string(kRuntimeFolder) +
-                                    ": found no running beltgripd, expected a folder for each "
-                                    "(systemctl start beltgripd@INTERFACE)"};
-  }
-  if (found.size() > 1) {
-    std::sort(found.begin(), found.end());
-    std::string which;
-    for (const std::string& each : found) which += (which.empty() ? "" : ", ") + each;
-    throw Failure{kUsage, "several run (" + which + "): say which interface"};
-  }
-  return std::string(kRuntimeFolder) + "/" + found.front() + "/status.sock";
+std::string socket_of(const Options& options) {
+  return options.socket.empty() ? status_socket(options.interface) : options.socket;
 }
 
-std::string ask(const std::string& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (path.size() >= sizeof address.sun_path) throw Failure{kUsage, path + ": too long a path"};
-  path.copy(address.sun_path, path.size());
-  const std::unique_ptr<int, void (*)(int*)> fd(
-      new int(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)), [](int* open) {
-        close(*open);
-        delete open;
-      });
-  setsockopt(*fd, SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
-  if (connect(*fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    throw Failure{kUnavailable, path + ": no beltgripd answers (" + std::strerror(errno) + ")"};
+// What `text` makes of the values; Failure 65 where they are not those of a daemon.
+template <typename Text>
+std::string in_words(const std::string& path, const Status& status, Text text) {
+  try {
+    return text(status.values);
+  } catch (const nlohmann::json::exception& error) {
+    throw Failure{kBadInput, path + ": found an answer that is not beltgripd's (" + error.what() +
+                                 "), expected its state as JSON"};
   }
+}
+
+void show(const Options& options) {
+  const std::string path = socket_of(options);
+  const Status status = ask_status(path);
+  text::print(stdout, options.json ? status.text : in_words(path, status, status_text));
+}
+
+// The file is written in any case: who reads it learns that nobody answers.
+void write_metrics(const Options& options) {
+  std::optional<Failure> unanswered;
   std::string text;
-  char buffer[4096];
-  for (ssize_t size; (size = read(*fd, buffer, sizeof buffer)) > 0;) {
-    text.append(buffer, static_cast<std::size_t>(size));
-    if (text.size() > kAnswerMost) throw Failure{kBadInput, path + ": an answer without end"};
+  try {
+    const std::string path = socket_of(options);
+    const Status status = ask_status(path);
+    text = in_words(path, status, [](const nlohmann::ordered_json& values) {
+      return status_metrics(values, values.at("interface").get<std::string>());
+    });
+  } catch (const Failure& failure) {
+    if (failure.exit_code == kUsage) throw;
+    unanswered = failure;
+    text = status_metrics(nullptr, options.interface);
   }
-  if (text.empty()) throw Failure{kUnavailable, path + ": beltgripd did not answer within 5 s"};
-  return text;
+  write_file(options.prometheus, {}, text);
+  if (unanswered) throw Failure(*unanswered);
 }
 
-void show(const nlohmann::ordered_json& status) {
-  const auto line = [](const std::string& name, const std::string& text) {
-    text::print(stdout, can::printable(name) +
-                            std::string(name.size() < 16 ? 16 - name.size() : 0, ' ') + " " +
-                            can::printable(text) + "\n");
-  };
-  const auto list = [](const nlohmann::ordered_json& names) {
-    std::string text;
-    for (const auto& each : names) text += (text.empty() ? "" : ", ") + each.get<std::string>();
-    return text.empty() ? std::string("none") : text;
-  };
-  const auto number = [](const nlohmann::ordered_json& value, const char* format) {
-    if (!value.is_number()) return std::string("-");
-    char text[64];
-    std::snprintf(text, sizeof text, format, value.get<double>());
-    return std::string(text);
-  };
-  line("interface",
-       status.at("interface").get<std::string>() + ", " + status.at("control").get<std::string>());
-  line("state", status.at("state").get<std::string>() + ", " +
-                    status.at("phase").get<std::string>() +
-                    (status.at("macro_slip_stop").get<bool>() ? ", STOP" : ""));
-  line("faults", list(status.at("faults")));
-  line("inhibits", list(status.at("inhibits")));
-  const auto& result = status.at("result");
-  if (result.is_null()) {
-    line("last result", "none yet");
-  } else {
-    line("last result", result.at("outcome").get<std::string>() + ", " +
-                            result.at("stop_reason").get<std::string>() + ", mu_max " +
-                            number(result.at("mu_max"), "%.4f") + " +- " +
-                            number(result.at("mu_max_std"), "%.4f") + ", " +
-                            number(result.at("age_s"), "%.0f s ago"));
+std::string wall_clock() {
+  const std::time_t now = std::time(nullptr);
+  std::tm local{};
+  localtime_r(&now, &local);
+  std::array<char, 32> text{};
+  std::strftime(text.data(), text.size(), "%Y-%m-%d %H:%M:%S", &local);
+  return text.data();
+}
+
+// False: asked to stop.
+bool waited(double interval_s) {
+  constexpr double kMillisecond_s = 1e-3;
+  pollfd stopped{.fd = stop_descriptor(), .events = POLLIN, .revents = 0};
+  poll(&stopped, 1, static_cast<int>(interval_s / kMillisecond_s));
+  return !stop_asked();
+}
+
+// JSON: a line at each turn. Words: a line at each change. A daemon that is not there is waited
+// for.
+void follow(const Options& options) {
+  end_in_good_order();
+  std::string before;
+  do {
+    std::string line;
+    try {
+      const std::string path = socket_of(options);
+      const Status status = ask_status(path);
+      line = options.json ? status.text : in_words(path, status, status_line) + "\n";
+    } catch (const Failure& failure) {
+      if (failure.exit_code != kUnavailable) throw;
+      if (before != failure.text) text::warn(failure.text + "; waiting");
+      before = failure.text;
+      continue;
+    }
+    if (options.json || line != before) {
+      text::print(stdout, options.json ? line : wall_clock() + "  " + line);
+      if (std::fflush(stdout) != 0) throw Failure{kCannotWrite, "standard output: cannot write"};
+    }
+    before = line;
+  } while (waited(options.interval_s));
+}
+
+void run(const Options& options) {
+  if (!options.prometheus.empty() && (options.follow || options.json)) {
+    throw Failure{kUsage, "--prometheus writes once, expected neither --follow nor --json"};
   }
-  for (const auto& [role, signal] : status.at("signals").items()) {
-    line(role, number(signal.at("value"), "%.6g") + " " + signal.at("unit").get<std::string>() +
-                   ", " + signal.at("quality").get<std::string>() + ", " +
-                   number(signal.at("age_s"), "%.3f s old"));
-  }
-  for (const auto& [name, latency] : status.at("latency").items()) {
-    line(name, "p50 " + number(latency.at("p50_us"), "%.0f us") + ", p99 " +
-                   number(latency.at("p99_us"), "%.0f us") + ", p99.9 " +
-                   number(latency.at("p999_us"), "%.0f us") + ", worst " +
-                   number(latency.at("max_us"), "%.0f us"));
-  }
-  for (const auto& [name, count] : status.at("counters").items()) {
-    line(name, std::to_string(count.get<std::uint64_t>()));
-  }
+  if (!options.prometheus.empty()) return write_metrics(options);
+  return options.follow ? follow(options) : show(options);
 }
 
 }  // namespace
@@ -143,25 +131,23 @@ void add_status(command_line::Command app) {
       .type_name("");
   command.add_option("--socket", options->socket, "Its socket, where it is not a service")
       .type_name("PATH");
-  command.add_flag("--json", options->json, "As one JSON object");
+  command.add_flag("--json", options->json, "As one JSON object, on one line");
+  command.add_flag("--follow", options->follow,
+                   "Go on until stopped: a line for each change, with --json one each second");
+  command.add_option("--interval", options->interval_s, "Seconds from one look to the next")
+      .type_name("SECONDS")
+      .capture_default_str()
+      .range(0.1, 3600.0);
+  command
+      .add_option("--prometheus", options->prometheus,
+                  "Write metrics to this file for node-exporter's textfile collector")
+      .type_name("FILE");
   command.example("beltgrip status");
-  command.example("beltgrip status can0 --json");
-  command.callback([options] {
-    const std::string path = socket_path(*options);
-    const std::string text = ask(path);
-    const auto status = nlohmann::ordered_json::parse(text, nullptr, false);
-    if (status.is_discarded()) throw Failure{kBadInput, path + ": the answer is not whole"};
-    if (options->json) {
-      text::print(stdout, text);
-    } else {
-      try {
-        show(status);
-      } catch (const nlohmann::json::exception& error) {
-        throw Failure{kBadInput, path + ": found an answer that is not beltgripd's (" +
-                                     error.what() + "), expected its state as JSON"};
-      }
-    }
-  });
+  command.example("beltgrip status can0 --follow");
+  command.example("beltgrip status can0 --follow --json | mosquitto_pub -l -t car/beltgrip");
+  command.example(
+      "beltgrip status can0 --prometheus /var/lib/prometheus/node-exporter/beltgrip.prom");
+  command.callback([options] { run(*options); });
 }
 
 }  // namespace beltgrip::cli
