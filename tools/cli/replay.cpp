@@ -17,6 +17,7 @@
 #include "tools/cli/configuration.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
+#include "tools/cli/resumed_lines.h"
 #include "tools/cli/stop_signals.h"
 #include "tools/text/terminal.h"
 
@@ -32,6 +33,7 @@ struct Options {
   bool join = false;
   unsigned jobs = 0;
   std::string json;
+  bool resume = false;
   std::string trace;
   std::string log_out;
   std::string bus;
@@ -129,17 +131,31 @@ void run(const Options& options) {
   if ((options.json == "-") + (options.trace == "-") + (options.log_out == "-") > 1) {
     throw Failure{kUsage, "replay: only one of --json, --trace, --log-out can be standard output"};
   }
+  if (options.resume && (options.json.empty() || options.join)) {
+    throw Failure{kUsage, "replay: --resume goes log by log, expected --json FILE and no --join"};
+  }
   const daemon::Config config = load_configuration(options.config, options.method);
+  std::optional<OutputFile> json, trace, log_out;
+  std::optional<ResumedLines> resumed;
+  Inputs inputs(options.logs);
+  inputs.add(config.files);
+  if (options.resume) {
+    resumed.emplace(options.json, inputs);
+  } else if (!options.json.empty()) {
+    json.emplace(options.json, inputs);
+  }
   std::vector<Task> tasks;
-  if (separate) {
-    for (const std::string& log : options.logs) tasks.push_back({{log}, {}, {}});
+  if (separate || resumed) {
+    for (const std::string& log : options.logs) {
+      if (!resumed || !resumed->has(log)) tasks.push_back({{log}, {}, {}});
+    }
   } else {
     tasks.push_back({options.logs, {}, {}});
   }
-  std::optional<OutputFile> json, trace, log_out;
-  Inputs inputs(options.logs);
-  inputs.add(config.files);
-  if (!options.json.empty()) json.emplace(options.json, inputs);
+  if (resumed && resumed->count() > 0) {
+    std::fprintf(stderr, "beltgrip: %zu of %zu logs are done\n", options.logs.size() - tasks.size(),
+                 options.logs.size());
+  }
   if (!options.trace.empty()) trace.emplace(options.trace, inputs);
   if (!options.log_out.empty()) log_out.emplace(options.log_out, inputs);
   const ReplayOutputs outputs{trace ? trace->get() : nullptr, log_out ? log_out->get() : nullptr};
@@ -163,14 +179,19 @@ void run(const Options& options) {
         }
         any = true;
         frames += task.result->frames;
-        if (json) json->write(experiment_lines(*task.result) + summary_line(*task.result));
+        const std::string lines = experiment_lines(*task.result) + summary_line(*task.result);
+        if (json) json->write(lines);
+        if (resumed && !resumed->append(lines)) {
+          text::complain(options.json + ": cannot write");
+          exit_code = kCannotWrite;
+        }
         if (text_to_stdout) {
           text::print(stdout, text(*task.result));
         } else if (task.result->experiments.empty()) {
           text::complain(task.result->log + ": " + no_experiment(*task.result));
         }
       });
-  if (!any) throw Failure{exit_code, ""};  // what earlier runs left stays
+  if (!any && !tasks.empty()) throw Failure{exit_code, ""};  // what earlier runs left stays
   if (json) json->close();
   if (trace) trace->close();
   if (log_out) log_out->close();
@@ -200,6 +221,8 @@ void add_replay(command_line::Command app) {
       .range(1, 1024);
   command.add_option("--json", options->json, "Results as JSON lines, '-': standard output")
       .type_name("FILE");
+  command.add_flag("--resume", options->resume,
+                   "Go on in the file of --json: logs that stand in it are left out");
   command.add_option("--trace", options->trace, "Every sample of the experiments as CSV")
       .type_name("FILE");
   command
@@ -213,6 +236,7 @@ void add_replay(command_line::Command app) {
       .range(1e-3, 1e3);
   command.example(
       "beltgrip replay drive/trace.log --config drive/beltgrip.toml --json results.json");
+  command.example("beltgrip replay logs/*.log.zst --config mycar.toml --json fleet.jsonl --resume");
   command.example("candump -L can0 | beltgrip replay - --config mycar.toml");
   command.callback([options] { run(*options); });
 }

@@ -242,6 +242,60 @@ TEST_F(Replay, OneMissingLogDoesNotHideTheOthers) {
   EXPECT_EQ(result.out, json_of_trace());
 }
 
+// However it ended the last time, the file comes to hold what one run would have written.
+TEST_F(Replay, ResumesWhereItEnded) {
+  for (const char* name : {"one.log", "two.log", "three.log"}) place_->write(name, trace());
+  const auto replay = [](std::vector<std::string> logs, const std::string& out,
+                         bool resume = true) {
+    for (std::string& each : logs) each = path(each);
+    logs.insert(logs.end(), {"--json", path(out)});
+    if (resume) logs.emplace_back("--resume");
+    return beltgrip(with_config(logs));
+  };
+  const std::vector<std::string> all{"one.log", "two.log", "three.log"};
+  ASSERT_EQ(replay(all, "whole.jsonl", false).status, 0);
+  const std::string whole = place_->read("whole.jsonl");
+  ASSERT_EQ(replay({"one.log", "two.log"}, "grows.jsonl").status, 0);
+  const std::string part = place_->read("grows.jsonl");
+  ASSERT_TRUE(whole.starts_with(part));
+  // Killed between two logs, within a line, after an experiment and before its summary.
+  const std::size_t line_end = whole.find('\n', part.size());
+  for (const std::size_t size : {part.size(), part.size() + 20, line_end, line_end + 1,
+                                 std::size_t{0}, std::size_t{1}, whole.size() - 1, whole.size()}) {
+    place_->write("grows.jsonl", whole.substr(0, size));
+    const RunResult result = replay(all, "grows.jsonl");
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_EQ(place_->read("grows.jsonl"), whole) << size;
+  }
+  // One that cannot be read costs a line each time, and the others stand.
+  const RunResult missing = replay({"one.log", "none.log", "two.log"}, "missing.jsonl");
+  EXPECT_EQ(missing.status, 66);
+  EXPECT_EQ(place_->read("missing.jsonl"), part);
+  const RunResult again = replay({"one.log", "none.log", "two.log"}, "missing.jsonl");
+  EXPECT_EQ(again.status, 66);
+  EXPECT_NE(again.err.find("2 of 3 logs are done"), std::string::npos) << again.err;
+  EXPECT_EQ(place_->read("missing.jsonl"), part);
+}
+
+TEST_F(Replay, ResumesOnlyInAFileOfItsOwn) {
+  for (const char* foreign : {"t_s,mu_star\n", "{\"a\":1}\n", "text without an end"}) {
+    place_->write("foreign.txt", foreign);
+    const RunResult result =
+        beltgrip(with_config({path("trace.log"), "--json", path("foreign.txt"), "--resume"}));
+    EXPECT_EQ(result.status, 65) << foreign;
+    EXPECT_NE(result.err.find("foreign.txt:1: found no result of a replay"), std::string::npos);
+    EXPECT_EQ(place_->read("foreign.txt"), foreign);
+  }
+  for (const std::vector<std::string>& more :
+       {std::vector<std::string>{}, {"--json", "-"}, {"--json", path("a.jsonl"), "--join"}}) {
+    std::vector<std::string> words{path("trace.log"), "--resume"};
+    words.insert(words.end(), more.begin(), more.end());
+    const RunResult result = beltgrip(with_config(words));
+    EXPECT_EQ(result.status, 64) << result.err;
+    EXPECT_EQ(lines(result.err), 1) << result.err;
+  }
+}
+
 TEST_F(Replay, JoinedPiecesAreTheWhole) {
   const std::string whole = trace();
   const std::size_t cut = whole.find('\n', whole.size() / 2) + 1;
