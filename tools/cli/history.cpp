@@ -1,9 +1,12 @@
 // beltgrip history: the experiments that a daemon has kept, and what they say together. Reads the
-// file and changes nothing, while the daemon runs or not.
+// file and changes nothing, while the daemon runs or not; with --from it fills one from logs.
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <ctime>
 #include <filesystem>
 #include <map>
@@ -16,6 +19,7 @@
 #include "daemon/io/history_db.h"
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"
+#include "tools/cli/history_from.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
 #include "tools/text/json_writer.h"
@@ -43,6 +47,7 @@ constexpr std::array<const char*, estimator::kNoteCount> kNoteNames{
 struct Options {
   std::string file;
   std::string config;
+  std::vector<std::string> from;
   std::string json;
   std::string csv;
 };
@@ -348,14 +353,69 @@ std::string table(const History& history) {
   return out;
 }
 
+// A folder that is removed with what is in it.
+class Scratch {
+ public:
+  Scratch() {
+    std::string name = (std::filesystem::temp_directory_path() / "beltgrip-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) {
+      throw Failure{kCannotCreate, name + ": cannot be created (" + std::strerror(errno) + ")"};
+    }
+    path_ = name;
+  }
+  ~Scratch() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+// Where --from writes: FILE is a history.db, or its folder, that need not be there.
+std::string folder_of(const std::string& file) {
+  const std::filesystem::path path(file);
+  if (path.filename() == daemon::kHistoryFile) {
+    return path.has_parent_path() ? path.parent_path().string() : ".";
+  }
+  std::error_code ignored;
+  if (std::filesystem::exists(path, ignored) && !std::filesystem::is_directory(path, ignored)) {
+    throw Failure{kUsage, file + ": --from fills a folder, or a file that is named " +
+                              std::string(daemon::kHistoryFile)};
+  }
+  return file;
+}
+
+// What logs have, and of what history: in FILE, or for this answer alone.
+History read_logs(const Options& options, int& exit_code) {
+  if (options.config.empty()) throw Failure{kUsage, "history: --from needs --config"};
+  const daemon::Config config = load_configuration(options.config, "");
+  const std::optional<Scratch> scratch =
+      options.file.empty() ? std::make_optional<Scratch>() : std::nullopt;
+  Options filled = options;
+  filled.file = scratch ? scratch->path() : folder_of(options.file);
+  for (const std::string& line : fill_history(filled.file, options.from, config)) {
+    text::complain(line);
+    exit_code = kBadInput;
+  }
+  History history = read(filled);
+  if (scratch) history.path = std::to_string(options.from.size()) + " logs";
+  return history;
+}
+
 void run(const Options& options) {
   if (options.json == "-" && options.csv == "-") {
     throw Failure{kUsage, "history: only one of --json and --csv can be standard output"};
   }
-  History history = read(options);
+  int exit_code = kDone;
+  History history = options.from.empty() ? read(options) : read_logs(options, exit_code);
   judge(history);
   // SQLite's files beside it belong to it.
   Inputs inputs{options.config, history.path, history.path + "-wal", history.path + "-shm"};
+  inputs.add(options.from);
   std::optional<OutputFile> json_file, csv_file;
   if (!options.json.empty()) json_file.emplace(options.json, inputs);
   if (!options.csv.empty()) csv_file.emplace(options.csv, inputs);
@@ -364,6 +424,7 @@ void run(const Options& options) {
   if (json_file) json_file->close();
   if (csv_file) csv_file->close();
   if (options.json != "-" && options.csv != "-") text::print(stdout, table(history));
+  if (exit_code != kDone) throw Failure{exit_code, ""};
 }
 
 }  // namespace
@@ -377,13 +438,22 @@ void add_history(command_line::Command app) {
                   "history.db or its folder (default: the configuration's state_dir, else " +
                       std::string(kDefaultFolder) + ")")
       .type_name("");
-  command.add_option("--config", options->config, "BeltGrip's configuration, for its state_dir")
+  command
+      .add_option("--config", options->config,
+                  "BeltGrip's configuration: for its state_dir, and for --from")
       .type_name("FILE");
+  command
+      .add_option("--from", options->from,
+                  "Replay these logs of one vehicle: FILE comes to hold their experiments too; "
+                  "without FILE they are only shown")
+      .type_name("LOG");
   command.add_option("--json", options->json, "As JSON lines, '-': standard output")
       .type_name("FILE");
   command.add_option("--csv", options->csv, "The experiments as CSV, '-': standard output")
       .type_name("FILE");
   command.example("beltgrip history");
+  command.example("beltgrip history --from drive/trace.log --config drive/beltgrip.toml");
+  command.example("beltgrip history fleet/car17 --from car17/*.log.zst --config mycar.toml");
   command.example("beltgrip history --config mycar.toml --csv belt.csv");
   command.callback([options] { run(*options); });
 }

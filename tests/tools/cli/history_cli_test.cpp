@@ -67,6 +67,67 @@ TEST_F(History, Table) {
   EXPECT_NE(result.out.find("1 experiments under other configurations"), std::string::npos);
 }
 
+// The same log, recorded so many seconds later.
+std::string later(const std::string& log, long seconds) {
+  std::istringstream in(log);
+  std::string out;
+  for (std::string line; std::getline(in, line);) {
+    const std::size_t point = line.find('.');
+    out += '(' + std::to_string(std::stol(line.substr(1, point - 1)) + seconds) +
+           line.substr(point) + '\n';
+  }
+  return out;
+}
+
+// Five drives with the new belt of the paper and five with the worn one, given in any order: the
+// dates of their stamps say how they follow each other. The worn belt has lost 5 % (0.105, 0.100).
+TEST_F(History, FromLogs) {
+  std::vector<std::string> logs;
+  for (int i = 0; i < 10; ++i) {
+    const std::string folder = place.path("drive" + std::to_string(i));
+    const RunResult made = beltgrip({"simulate", "--belt", i < 5 ? "new" : "worn", "--start", "80",
+                                     "--seed", std::to_string(i + 1), "--out-dir", folder});
+    ASSERT_EQ(made.status, 0) << made.err;
+    const std::string name = "drive" + std::to_string(i) + "/trace.log";
+    place.write(name, later(place.read(name), 1'700'000'000 + 86'400L * i));
+    logs.insert(logs.begin() + (i % 2 == 0 ? 0 : i / 2), place.path(name));
+  }
+  const auto history = [&](std::vector<std::string> words, const std::vector<std::string>& from) {
+    words.insert(words.begin(), "history");
+    words.insert(words.end(), {"--config", place.path("drive0/beltgrip.toml"), "--from"});
+    words.insert(words.end(), from.begin(), from.end());
+    return beltgrip(words);
+  };
+  const RunResult shown = history({}, logs);
+  EXPECT_EQ(shown.status, 0) << shown.err;
+  EXPECT_NE(shown.out.find("WEAR"), std::string::npos) << shown.out;
+  EXPECT_NE(shown.out.find("the last 5 against 5 before: -"), std::string::npos) << shown.out;
+  // Kept, also if it is said twice or in two parts, and one log cannot be used.
+  const std::string kept = place.path("fleet/car17");
+  std::vector<std::string> first(logs.begin(), logs.begin() + 4);
+  first.push_back(place.path("none.log"));
+  const RunResult part = history({kept}, first);
+  EXPECT_EQ(part.status, 65) << part.err;
+  EXPECT_EQ(lines(part.err), 1) << part.err;
+  EXPECT_EQ(history({kept}, {logs.begin() + 4, logs.end()}).status, 0);
+  EXPECT_EQ(history({kept}, logs).status, 0);
+  const auto opened = HistoryDb::open_to_read(place.path("fleet/car17/history.db"));
+  ASSERT_NE(opened.db, nullptr) << opened.text;
+  EXPECT_EQ(opened.db->read().rows.size(), 10U);
+}
+
+TEST_F(History, FromLogsNeedsAConfigurationAndAFolder) {
+  place.write("a.txt", "mine");
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"history", "--from", "a.log"},
+        {"history", place.path("a.txt"), "--from", "a.log", "--config", "c.toml"}}) {
+    const RunResult result = beltgrip(words);
+    EXPECT_NE(result.status, 0);
+    EXPECT_EQ(lines(result.err), 1) << result.err;
+  }
+  EXPECT_EQ(place.read("a.txt"), "mine");
+}
+
 TEST_F(History, JsonLines) {
   fill();
   const RunResult result = beltgrip({"history", place.path("history.db"), "--json", "-"});

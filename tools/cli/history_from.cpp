@@ -1,0 +1,95 @@
+#include "tools/cli/history_from.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+#include "daemon/core/config/load/config_fingerprint.h"
+#include "daemon/io/history_keeper.h"
+#include "tools/cli/failure.h"
+#include "tools/cli/replay_run.h"
+#include "tools/text/terminal.h"
+
+namespace beltgrip::cli {
+
+namespace {
+
+// Unix time of the year 1980: a stamp before it counts from the start of a recording.
+constexpr double kEarliestDate_s = 315'532'800.0;
+
+struct Dated {
+  double time_s = 0.0;
+  daemon::ExperimentResult result;
+};
+
+std::vector<Dated> results_of(const std::vector<std::string>& logs, const daemon::Config& config,
+                              std::vector<std::string>& unusable) {
+  std::vector<Dated> all;
+  double undated_s = 0.0;  // where the undated logs so far have come to
+  for (const std::string& log : logs) {
+    ReplayResult replayed;
+    try {
+      replayed = replay({log}, "", config, {});
+    } catch (const Failure& failure) {
+      unusable.push_back(failure.text);
+      continue;
+    }
+    for (const std::string& warning : replayed.warnings) text::warn(warning);
+    double last_s = undated_s;
+    for (const daemon::ExperimentResult& result : replayed.experiments) {
+      const double end_s = static_cast<double>(result.end) / double{daemon::kSecond};
+      const bool dated = end_s >= kEarliestDate_s;
+      all.push_back({dated ? end_s : undated_s + end_s, result});
+      if (!dated) last_s = std::max(last_s, undated_s + end_s);
+    }
+    undated_s = last_s;
+  }
+  std::stable_sort(all.begin(), all.end(), [](const Dated& left, const Dated& right) {
+    return left.time_s < right.time_s;
+  });
+  return all;
+}
+
+// Times of what the history has under this fingerprint.
+std::set<double> kept_in(const std::string& folder, const std::string& fingerprint) {
+  std::set<double> times;
+  const auto opened = daemon::HistoryDb::open_to_read(
+      (std::filesystem::path(folder) / daemon::kHistoryFile).string());
+  if (opened.db == nullptr) return times;
+  for (const daemon::HistoryRow& row : opened.db->read().rows) {
+    if (row.fingerprint == fingerprint) times.insert(row.time_s);
+  }
+  return times;
+}
+
+}  // namespace
+
+std::vector<std::string> fill_history(const std::string& folder,
+                                      const std::vector<std::string>& logs,
+                                      const daemon::Config& config) {
+  std::vector<std::string> unusable;
+  const std::vector<Dated> results = results_of(logs, config, unusable);
+  const std::string fingerprint = config_fingerprint(config);
+  const std::set<double> kept = kept_in(folder, fingerprint);
+  double now_s = 0.0;
+  daemon::HistoryKeeper keeper(
+      folder, fingerprint,
+      [](bool warning, const std::string& line) {
+        if (warning) text::warn(line);
+      },
+      [&] { return now_s; });
+  keeper.open();
+  for (const Dated& each : results) {
+    if (kept.contains(each.time_s)) continue;
+    now_s = each.time_s;
+    keeper.take(each.result);
+  }
+  const std::set<double> now_kept = kept_in(folder, fingerprint);
+  for (const Dated& each : results) {
+    if (now_kept.contains(each.time_s)) continue;
+    throw Failure{kCannotWrite, folder + ": the history could not be written"};
+  }
+  return unusable;
+}
+
+}  // namespace beltgrip::cli
