@@ -23,7 +23,9 @@ struct VariatorParameters {
   double secondary_spring_force_N = 500.0;
   double secondary_centrifugal_N_s2 = 0.0;  // F_s = A p_s + spring + this * omega_s^2
   double primary_inertia_kg_m2 = 0.0;       // T_p = T_engine - J d(omega_p)/dt, engine torque only
+  // MinClampForce = safety_factor (|T_p| + torque_reserve_Nm) cos(theta) / (2 R_p mu_max)
   double safety_factor = 1.3;
+  double torque_reserve_Nm = 0.0;
 };
 
 // 1 sigma of a constant error of a channel, in SI; 0 = exact.

@@ -45,8 +45,8 @@ double min_clamp_force_N(const VariatorParameters& variator, EndStop end_stop, d
                          double mu_max) {
   const double radius_m = end_stop == EndStop::kOverdrive ? variator.primary_radius_overdrive_m
                                                           : variator.primary_radius_low_m;
-  return variator.safety_factor * std::abs(torque_p_Nm) * std::cos(variator.half_wedge_angle_rad) /
-         (2.0 * radius_m * mu_max);
+  return variator.safety_factor * (std::abs(torque_p_Nm) + variator.torque_reserve_Nm) *
+         std::cos(variator.half_wedge_angle_rad) / (2.0 * radius_m * mu_max);
 }
 
 }  // namespace beltgrip::estimator

@@ -41,7 +41,8 @@ double traction_coefficient(const VariatorParameters& variator, const OperatingP
 double torque_carried_Nm(const VariatorParameters& variator, EndStop end_stop, double clamp_force_N,
                          double mu);
 
-// MinClampForce: what holds the torque with that maximum friction, with [variator] safety_factor.
+// MinClampForce: what holds the torque with that maximum friction, with [variator] safety_factor
+// and torque_reserve_Nm.
 // mu_max > 0.
 double min_clamp_force_N(const VariatorParameters& variator, EndStop end_stop, double torque_p_Nm,
                          double mu_max);

@@ -284,7 +284,8 @@ void Invariants::check_min_clamp(const can::CanFrame& frame, const daemon::Sampl
   const double radius_m = now.curve.end_stop == estimator::EndStop::kLow
                               ? variator.primary_radius_low_m
                               : variator.primary_radius_overdrive_m;
-  const double needed_N = variator.safety_factor * std::abs(now.curve.torque_p_Nm) *
+  const double needed_N = variator.safety_factor *
+                          (std::abs(now.curve.torque_p_Nm) + variator.torque_reserve_Nm) *
                           std::cos(variator.half_wedge_angle_rad) / (2.0 * radius_m * allowed);
   if (raw * kStep_N < std::min(needed_N, kMost_N) - 0.01) {
     broken("I15",

@@ -2,10 +2,12 @@
 #include <array>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "daemon/core/publish/names.h"
+#include "estimator/physics/least_loss.h"
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"
 #include "tools/cli/output_file.h"
@@ -30,6 +32,13 @@ std::string number(const char* pattern, auto... values) {
   return buffer;
 }
 
+// The belt's last value, and where.
+struct LastValue {
+  std::string name;  // of its experiment
+  double mu_max = 0.0, sigma_peak_percent = 0.0;
+  estimator::EndStop end_stop = estimator::EndStop::kOverdrive;
+};
+
 // The samples of each experiment, and what came of it.
 class Courses final : public daemon::SampleSink {
  public:
@@ -43,6 +52,7 @@ class Courses final : public daemon::SampleSink {
       now_.sigma_star_percent.push_back(curve.sigma_star_percent);
       now_.friction_slope_per_percent.push_back(curve.friction_slope);
       now_.phase.push_back(static_cast<std::size_t>(curve.phase));
+      end_stop_ = curve.end_stop;
     }
     if (!report.new_result) return;
     finish(report.result);
@@ -50,6 +60,7 @@ class Courses final : public daemon::SampleSink {
     now_ = {};
   }
   std::vector<report::ExperimentCourse> take() { return std::move(all_); }
+  const std::optional<LastValue>& last_value() const { return last_value_; }
 
  private:
   void finish(const daemon::ExperimentResult& result) {
@@ -58,7 +69,10 @@ class Courses final : public daemon::SampleSink {
     if (result.stopped) now_.stop_s = static_cast<double>(result.end) * 1e-9;
     const bool value = result.outcome == daemon::Outcome::kCompleted;
     const estimator::PeakEstimate& peak = result.peak;
-    if (value) now_.peak = {peak.mu_max, peak.ci95_low, peak.ci95_high};
+    if (value) {
+      now_.peak = {peak.mu_max, peak.ci95_low, peak.ci95_high};
+      last_value_ = {now_.name, peak.mu_max, peak.sigma_peak_percent, end_stop_};
+    }
     const bool bound = !value && peak.kind == estimator::PeakKind::kLowerBound;
     now_.verdict = {now_.name,
                     outcome_text(result.outcome) + ", " + reason_text(result.stop_reason),
@@ -74,7 +88,41 @@ class Courses final : public daemon::SampleSink {
   std::string log_;
   report::ExperimentCourse now_;
   std::vector<report::ExperimentCourse> all_;
+  estimator::EndStop end_stop_ = estimator::EndStop::kOverdrive;
+  std::optional<LastValue> last_value_;
 };
+
+// What torque_reserve_Nm would cost least: shown, nothing chooses it.
+void add_least_loss(report::HtmlPage& page, const daemon::Config& config, const LastValue& value) {
+  const estimator::VariatorParameters& variator = config.variator;
+  const double belt = estimator::kBeltLoss_Nm_per_N;
+  const std::array<double, 2> losses = {belt, belt + estimator::pump_loss_Nm_per_N(variator)};
+  std::array<double, losses.size()> shares{};
+  for (std::size_t i = 0; i < losses.size(); ++i) {
+    shares[i] = estimator::least_loss_share(variator, value.end_stop, value.mu_max,
+                                            value.sigma_peak_percent, losses[i]);
+  }
+  page.heading("Reserve of least loss");
+  page.paragraph(
+      "torque_reserve_Nm with which MinClampForce costs least, by the last value (" + value.name +
+      "), safety_factor " + number("%g", variator.safety_factor) +
+      ". Configured: " + number("%g", variator.torque_reserve_Nm) +
+      " Nm. A reserve must also hold what comes faster than the hydraulics; a force above the "
+      "controller's own, or below its pressure floor, saves nothing.");
+  std::vector<std::vector<std::string>> rows;
+  for (const double torque_Nm : {25.0, 50.0, 100.0, 150.0}) {
+    std::vector<std::string>& row = rows.emplace_back();
+    row.push_back(number("%.0f", torque_Nm));
+    for (const double share : shares) {
+      row.push_back(
+          number("%.1f", estimator::reserve_of_least_loss_Nm(variator, share, torque_Nm)));
+    }
+  }
+  page.table({"torque at the primary, Nm",
+              number("reserve, Nm: belt and bearings, %.2f Nm/kN", 1e3 * losses[0]),
+              number("reserve, Nm: and a pump, %.2f Nm/kN", 1e3 * losses[1])},
+             rows);
+}
 
 void run(const Options& options) {
   end_streams_when_stopped(options.logs);
@@ -83,6 +131,7 @@ void run(const Options& options) {
   inputs.add(config.files);
   inputs.demand_apart(options.out);
   std::vector<report::ExperimentCourse> experiments;
+  std::optional<LastValue> last_value;
   std::string none;
   for (const std::string& log : options.logs) {
     Courses courses(log.substr(log.rfind('/') + 1));
@@ -92,6 +141,7 @@ void run(const Options& options) {
       text::warn(warning);
     }
     if (result.experiments.empty()) none += log + ": " + no_experiment(result) + "\n";
+    if (courses.last_value()) last_value = courses.last_value();
     for (auto& each : courses.take()) experiments.push_back(std::move(each));
   }
   report::HtmlPage page("BeltGrip: experiments");
@@ -109,6 +159,7 @@ void run(const Options& options) {
     page.paragraph(assumed);
   }
   report::add_experiments(page, experiments, phases);
+  if (last_value) add_least_loss(page, config, *last_value);
   write_file(options.out, inputs, page.text());
   text::print(stdout, std::to_string(experiments.size()) + " experiments: " + options.out + "\n");
 }

@@ -39,6 +39,8 @@ TEST_F(Report, ShowsEveryExperimentOfTheLog) {
   for (const char* name : {"Quiet", "Excited", "Peak", "MacroSlip", "mu_max", "stop"}) {
     EXPECT_NE(page.find("[\"" + std::string(name) + "\","), std::string::npos) << name;
   }
+  EXPECT_EQ(count(page, "<h2>Reserve of least loss</h2>"), 1);
+  EXPECT_NE(page.find("Configured: 0 Nm."), std::string::npos);
   EXPECT_EQ(page.find("http"), page.find("https://www.chartjs.org"));  // asks no network
 }
 
@@ -49,6 +51,7 @@ TEST_F(Report, SaysWhyThereIsNoExperiment) {
   ASSERT_EQ(run.status, 0) << run.err;
   EXPECT_TRUE(run.out.starts_with("0 experiments: ")) << run.out;
   EXPECT_NE(place_.read("page.html").find("no experiment: "), std::string::npos);
+  EXPECT_EQ(place_.read("page.html").find("Reserve of least loss"), std::string::npos);
 }
 
 TEST_F(Report, BadInputIsOneLineAndItsExitCode) {

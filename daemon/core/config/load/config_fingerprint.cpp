@@ -15,10 +15,10 @@ std::string number_text(double value) {
   return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
 }
 
-// The margin of MinClampForce is not part of a measurement.
+// The margins of MinClampForce are not part of a measurement.
 bool decides(const Option& option) {
   return option.section == "variator" && option.kind == Option::Kind::kNumber &&
-         option.key != "safety_factor";
+         option.key != "safety_factor" && option.key != "torque_reserve_Nm";
 }
 
 }  // namespace

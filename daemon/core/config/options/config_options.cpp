@@ -99,6 +99,10 @@ constexpr Option kOptions[] = {
         "acceleration. Not applied to primary_torque."),
     number<&Config::variator, &VariatorParameters::safety_factor>(
         "variator", "safety_factor", "", 1.0, 10.0, "Margin of MinClampForce."),
+    number<&Config::variator, &VariatorParameters::torque_reserve_Nm>(
+        "variator", "torque_reserve_Nm", "Nm", 0.0, 500.0,
+        "Torque that MinClampForce holds beyond the present one: for what comes faster than the "
+        "hydraulics.\nbeltgrip report shows the reserve that costs least."),
 
     choice<&Config::estimator, &EstimatorSettings::method>(
         "estimator", "method", kMethods,
