@@ -11,6 +11,13 @@
 
 namespace beltgrip::sim {
 
+// Lag and dead time of cold oil over those of warm oil.
+inline double oil_slowness(const HydraulicParameters& hydraulics, double oil_degC) {
+  constexpr double kWarmOil_degC = 60.0;
+  const double cold = std::clamp((kWarmOil_degC - oil_degC) / kWarmOil_degC, 0.0, 1.5);
+  return 1.0 + (hydraulics.cold_factor - 1.0) * cold;
+}
+
 class HydraulicActuator {
  public:
   HydraulicActuator(const HydraulicParameters& parameters, double step_s)

@@ -8,16 +8,9 @@ namespace beltgrip::sim {
 
 namespace {
 
-constexpr double kWarmOil_degC = 60.0;
 constexpr double kAbsFrequency_Hz = 8.0;
 constexpr double kRolling_m_s = 3.0;
 constexpr double kSettle_s = 3.0;  // before time zero: hydraulics and controller find their state
-
-// Lag and dead time of cold oil over those of warm oil.
-double slowness(const HydraulicParameters& hydraulics, double oil_degC) {
-  const double cold = std::clamp((kWarmOil_degC - oil_degC) / kWarmOil_degC, 0.0, 1.5);
-  return 1.0 + (hydraulics.cold_factor - 1.0) * cold;
-}
 
 }  // namespace
 
@@ -91,7 +84,7 @@ void VehicleSimulation::step() {
     signals_.oil_degC +=
         step_s_ / hydraulics.oil_warming_s * (hydraulics.oil_end_degC - signals_.oil_degC);
   }
-  double slow = slowness(hydraulics, signals_.oil_degC);
+  double slow = oil_slowness(hydraulics, signals_.oil_degC);
   if (const FaultStep* fault = faults_.active(FaultKind::kHydraulicLag, t_s)) slow *= fault->size;
   const TcuOutput& tcu = tcu_.output();
   const double p_s = secondary_.step(tcu.secondary_pressure_Pa, slow);
