@@ -51,7 +51,7 @@ struct EstimatorSettings {
   // Where constants or accuracies are assumed (assumed_constants.h), what is read may be off by
   // this factor, and is weighed afterwards; else 1.
   double reading_reach = 1.0;
-  double ramp_rate_max_N_per_s = 300.0;
+  double ramp_rate_max_N_per_s = 600.0;
   // kConfidence: the 95 % interval of mu_max, as a share of it, at which the experiment ends.
   double confidence_width = 0.15;
   // method "paper" only

@@ -24,9 +24,10 @@ daemon::Config with(daemon::Config config, daemon::Control control) {
 
 constexpr std::uint32_t kDriver =
     inhibit_bit(Inhibit::kPedal) | inhibit_bit(Inhibit::kBrake) | inhibit_bit(Inhibit::kInputs);
-constexpr std::uint32_t kClearance =
-    inhibit_bit(Inhibit::kUnreachable) | inhibit_bit(Inhibit::kRamp) | inhibit_bit(Inhibit::kTime) |
-    inhibit_bit(Inhibit::kGrip) | inhibit_bit(Inhibit::kForce) | inhibit_bit(Inhibit::kQuiet);
+constexpr std::uint32_t kClearance = inhibit_bit(Inhibit::kUnreachable) |
+                                     inhibit_bit(Inhibit::kRamp) | inhibit_bit(Inhibit::kTime) |
+                                     inhibit_bit(Inhibit::kGrip) | inhibit_bit(Inhibit::kForce) |
+                                     inhibit_bit(Inhibit::kQuiet) | inhibit_bit(Inhibit::kWait);
 
 }  // namespace
 

@@ -63,7 +63,7 @@ std::string limit_text(daemon::Inhibit inhibit, const daemon::Config& config) {
     case Inhibit::kUnreachable:
       return "the force floor lies above the peak's force";
     case Inhibit::kRamp:
-      return "no ramp of force keeps the slip limits if a signal fails";
+      return "no crossing of the peak keeps the slip limits";
     case Inhibit::kTime:
       return "the ramp would last longer than the coast-down";
     case Inhibit::kForce:

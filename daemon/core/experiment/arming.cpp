@@ -15,9 +15,24 @@ constexpr Duration kSampleLeast = kMillisecond;
 constexpr double kKnownMargin = 1.05;  // the belt may have run in since its last value
 constexpr double kPeakSlipOverdrive = 0.020;
 constexpr double kPeakSlipLow = 0.035;
-constexpr double kDetection_s = 0.03;  // filters and sampler
-constexpr double kBeyondPeak_s = 1.0;  // acquisition at the start, and slip until it is seen
-constexpr double kSlipMean = 5e8;      // ns
+// A belt of which nothing is known may have as little friction. What is known may have worn.
+constexpr double kLeastFriction = 0.085;
+constexpr double kKnownLeast = 0.95;
+constexpr double kDetection_s = 0.03;   // filters and sampler
+constexpr double kBeyondPeak_s = 1.0;   // acquisition at the start, and slip until it is seen
+constexpr double kSpare_s = 0.5;        // of the coast-down, kept when a request waits
+constexpr double kPlanned_1_s = 0.025;  // slip rate, before one is found
+// Chosen: of the patience, so that what was found at its end can still be begun.
+constexpr Duration kWaits = Arming::kPatience - 500 * kMillisecond;
+constexpr double kRoomGained = 0.001;  // of slip, worth waiting for
+constexpr double kFurther = 0.95;      // of the speed: is there more room a little later?
+// A fall that was seen once may be steeper the next time.
+constexpr double kFallMargin = 1.5;
+constexpr double kFallLeast = 0.4;  // per unit of slip
+// Chosen: of the steepest fall, what an unknown belt has when a fault comes at the worst instant of
+// its crossing. With the whole of it two in three cars would never be asked.
+constexpr double kFaultShare = 0.5;
+constexpr double kSlipMean = 5e8;  // ns
 constexpr double kSecondsPerTick = 1e-9;
 constexpr double kPercent = 100.0;
 // A request begins at the own force and falls from there: what that falls by itself within the
@@ -123,49 +138,108 @@ void Arming::look(const Now& now) noexcept {
   const double grown_max_percent =
       std::max(kSlipLeast_percent, kSlipShare * (shown.peak_percent - shown.own_percent));
   if (shown.peak_percent > 0.0 && slip_percent_ - shown.own_percent > grown_max_percent) {
-    search_ = {};
+    search_ = later_ = {};
     unclear_ = inhibit_bit(Inhibit::kGrip);
+    obstacle_ = {slip_percent_ - shown.own_percent, grown_max_percent};
     return;
   }
-  const bool low = now.omega_s_rad_s / now.omega_p_rad_s < 1.0;
+  const RampPoint here = point_at(now, now.omega_p_rad_s);
+  const double slowing = slowing_rad_s2(now);
+  const double least_rad_s = settings_.primary_speed_min_rad_s;
+  const double ramp_rad_s = slowing * ramp_s(here, kPlanned_1_s);
+  const RampPoint soon = point_at(now, std::max(least_rad_s, now.omega_p_rad_s - ramp_rad_s));
+  const double spare_rad_s = slowing * (kBeyondPeak_s + kSpare_s);
+  // What a request that began now could ride the floor to.
+  const double longest_s = static_cast<double>(limits::kRequestLongest) * kSecondsPerTick;
+  const double ridden_rad_s =
+      std::max(least_rad_s + spare_rad_s, now.omega_p_rad_s - slowing * longest_s);
+  const RampPoint latest = point_at(now, std::min(ridden_rad_s, soon.omega_p_rad_s));
+  if (reachable_mu(latest) < latest.mu_expected) {
+    search_ = later_ = {};
+    unclear_ = inhibit_bit(Inhibit::kUnreachable);
+    obstacle_ = {latest.floor_N, peak_force_N(latest, latest.mu_expected)};
+    return;
+  }
+  search_ = CrossingSearch(soon, reaction(now), SlipLimits{});
+  const double later_rad_s = std::max(latest.omega_p_rad_s, kFurther * soon.omega_p_rad_s);
+  later_ = CrossingSearch(point_at(now, later_rad_s), reaction(now), SlipLimits{});
+}
+
+RampPoint Arming::point_at(const Now& now, double omega_p_rad_s) const noexcept {
+  const double ratio = now.omega_s_rad_s / now.omega_p_rad_s;
+  const bool low = ratio < 1.0;
+  const bool known = now.mu_max_known > 0.0;
   RampPoint point;
   point.torque_Nm = std::abs(now.torque_Nm);
-  point.omega_p_rad_s = now.omega_p_rad_s;
+  point.omega_p_rad_s = omega_p_rad_s;
   point.primary_radius_m =
       low ? variator_.primary_radius_low_m : variator_.primary_radius_overdrive_m;
   point.wedge_cosine = cosine_;
   point.inertia_kg_m2 = inertia_kg_m2_;
   point.own_force_N = now.clamp_force_N;
-  point.floor_N = floor_N(now.omega_s_rad_s);
-  point.mu_expected =
-      now.mu_max_known > 0.0 ? kKnownMargin * now.mu_max_known : settings_.friction_expected;
+  point.floor_N = floor_N(ratio * omega_p_rad_s);
+  point.mu_expected = known ? kKnownMargin * now.mu_max_known : settings_.friction_expected;
+  point.mu_least = known ? kKnownLeast * now.mu_max_known
+                         : std::min(kLeastFriction, settings_.friction_expected);
   point.peak_slip = low ? kPeakSlipLow : kPeakSlipOverdrive;
-  if (reachable_mu(point) < point.mu_expected) {
-    search_ = {};
-    unclear_ = inhibit_bit(Inhibit::kUnreachable);
-    return;
-  }
+  point.fall = now.shown.fall > 0.0 ? std::max(kFallLeast, kFallMargin * now.shown.fall)
+                                    : kPercent * settings_.fall_max_per_percent;
+  point.fall_at_fault = now.shown.fall > 0.0 ? point.fall : kFaultShare * point.fall;
+  return point;
+}
 
+Reaction Arming::reaction(const Now& now) const noexcept {
   Reaction reaction;
   reaction.detection_s = kDetection_s;
   reaction.stale_s = static_cast<double>(now.stale) * kSecondsPerTick;
   reaction.dead_time_s = settings_.actuator_dead_time_s;
   reaction.lag_s = settings_.actuator_lag_s;
-  search_ = RampSearch(point, reaction, SlipLimits{}, rate_max_N_per_s_);
+  return reaction;
 }
 
-std::uint32_t Arming::clearance(const Now& now) const noexcept {
-  if (ramp_.rate_N_per_s <= 0.0) return inhibit_bit(Inhibit::kRamp);
+// Fast to half the friction expected, then at the rate near the top.
+double Arming::ramp_s(const RampPoint& point, double slip_rate_1_s) const noexcept {
+  const double peak_N = peak_force_N(point, point.mu_expected);
+  const double near_N = std::clamp(2.0 * peak_N, std::min(peak_N, point.own_force_N),
+                                   std::max(peak_N, point.own_force_N));
+  const double top_N_per_s = std::min(
+      rate_max_N_per_s_,
+      ramp_at_the_top_N_per_s(point, settings_.actuator_dead_time_s + settings_.actuator_lag_s,
+                              slip_rate_1_s));
+  return std::max(0.0, point.own_force_N - near_N) / rate_max_N_per_s_ +
+         std::max(0.0, near_N - peak_N) / top_N_per_s;
+}
 
-  // How long the primary stays above its least speed, as it has slowed since the trigger held.
+// Of the primary, since the trigger held.
+double Arming::slowing_rad_s2(const Now& now) const noexcept {
   const double held_s = static_cast<double>(now.t - held_since_) * kSecondsPerTick;
-  const double slowing = (omega_p_since_ - now.omega_p_rad_s) / held_s;
+  return held_s > 0.0 ? std::max(0.0, (omega_p_since_ - now.omega_p_rad_s) / held_s) : 0.0;
+}
+
+std::uint32_t Arming::clearance(const Now& now) noexcept {
+  const Crossing& crossing = search_.crossing();
+  const RampPoint& point = search_.point();
+  const double slowing = slowing_rad_s2(now);
   const double left_s =
       slowing > 0.0 ? (now.omega_p_rad_s - settings_.primary_speed_min_rad_s) / slowing : 1e9;
+  const double planned_1_s = crossing.slip_rate_1_s > 0.0 ? crossing.slip_rate_1_s : kPlanned_1_s;
+  const double needed_s = ramp_s(point, planned_1_s) + kBeyondPeak_s;
+  const double patience_s = static_cast<double>(kPatience) * kSecondsPerTick;
+  const bool slows = slowing * patience_s > (1.0 - kFurther) * now.omega_p_rad_s;
+  const bool waits = slows && now.t - held_since_ < kSettle + kWaits &&
+                     needed_s + kSpare_s < left_s &&
+                     (later_.crossing().peak_slip_max > crossing.peak_slip_max + kRoomGained ||
+                      reachable_mu(point) < point.mu_expected);
+  if (waits) return inhibit_bit(Inhibit::kWait);
+  if (crossing.slip_rate_1_s <= 0.0) {
+    obstacle_ = {point.fall / kPercent, 0.0};
+    return inhibit_bit(Inhibit::kRamp);
+  }
+  plan_ = {crossing, point.mu_expected, point.mu_least, point.primary_radius_m};
   const double longest_s = static_cast<double>(limits::kRequestLongest) * kSecondsPerTick;
-  return ramp_.duration_s + kBeyondPeak_s > std::min(left_s, longest_s)
-             ? inhibit_bit(Inhibit::kTime)
-             : 0U;
+  if (needed_s <= std::min(left_s, longest_s)) return 0U;
+  obstacle_ = {needed_s, std::min(left_s, longest_s)};
+  return inhibit_bit(Inhibit::kTime);
 }
 
 void Arming::follow_force(const Now& now) noexcept {
@@ -231,7 +305,7 @@ void Arming::step(const Now& now) noexcept {
     next_look_ = now.t + kSettle;
     unclear_ = 0;
     looked_ = cleared_ = false;
-    search_ = {};
+    search_ = later_ = {};
     slip_percent_ = slip_samples_ = 0.0;
     force_count_ = 0;
     force_rests_ = false;
@@ -249,15 +323,14 @@ void Arming::step(const Now& now) noexcept {
   if (!settled_ || control_ != Control::kCommand) return;
   // A search takes some samples, one excursion each; what was found before holds until its end.
   if (!search_.done()) {
-    if (search_.step()) {
-      ramp_ = search_.ramp();
-      unclear_ = clearance(now);
-    }
+    search_.step();
+  } else if (!later_.done()) {
+    if (later_.step()) unclear_ = clearance(now);
   } else if (now.t >= next_look_) {
     next_look_ = now.t + kClearancePeriod;
     look(now);
   }
-  looked_ = looked_ || search_.done();
+  looked_ = looked_ || (search_.done() && later_.done());
   const std::uint32_t moving = force_rests_ ? 0U : inhibit_bit(Inhibit::kForce);
   const std::uint32_t quiet = now.watched ? 0U : inhibit_bit(Inhibit::kQuiet);
   inhibits_ = unclear_ | moving | quiet;

@@ -6,6 +6,10 @@
 // without the speed ratio or the torque moving by more than kRatioDrift and kTorqueDrift; and, with
 // control "command", either the way is clear and the controller's own force at rest, or patience
 // has run out: as the vehicle slows down, what was out of reach may come into reach.
+//
+// The way is planned to where the belt will cross its peak: as the vehicle slows down, the floor of
+// the force, the slip speed and the energy leave room for later peaks, while the shaft can run away
+// faster. A request waits while waiting gains room and the coast-down lasts long enough.
 #pragma once
 
 #include <array>
@@ -17,6 +21,7 @@
 #include "daemon/core/base/named.h"
 #include "daemon/core/config/options/config.h"
 #include "daemon/core/experiment/reachability.h"
+#include "daemon/core/experiment/request_plan.h"
 #include "daemon/core/input/stop_cause.h"
 #include "estimator/method/slip_curve_estimator.h"
 
@@ -36,13 +41,14 @@ enum class Inhibit : std::uint8_t {
   kOil,          // too cold
   kCooldown,     // time or distance since the last request
   kUnreachable,  // the force floor lies above the peak's clamping force
-  kRamp,         // no ramp whose worst-case reaction stays inside the slip limits
+  kRamp,         // no crossing whose worst-case reaction stays inside the slip limits
   kTime,         // the ramp would outlast the coast-down or the longest request
   kGrip,         // friction has fallen so far that the own force hardly holds the belt
   kForce,        // the controller's own force still rises or falls
-  kQuiet         // a speed that stood still would not show
+  kQuiet,        // a speed that stood still would not show
+  kWait          // further on the crossing has more room
 };
-inline constexpr std::size_t kInhibitCount = 17;
+inline constexpr std::size_t kInhibitCount = 18;
 inline constexpr std::array<Named<Inhibit>, kInhibitCount> kInhibits{
     {{Inhibit::kInputs, "inputs"},
      {Inhibit::kFault, "fault"},
@@ -60,7 +66,8 @@ inline constexpr std::array<Named<Inhibit>, kInhibitCount> kInhibits{
      {Inhibit::kTime, "time"},
      {Inhibit::kGrip, "grip"},
      {Inhibit::kForce, "own force"},
-     {Inhibit::kQuiet, "quiet"}}};
+     {Inhibit::kQuiet, "quiet"},
+     {Inhibit::kWait, "wait"}}};
 static_assert(in_wire_order(kInhibits));
 
 constexpr std::uint32_t inhibit_bit(Inhibit inhibit) {
@@ -84,6 +91,12 @@ struct Conditions {
 struct SlipShown {
   double own_percent = 0.0;
   double peak_percent = 0.0;  // 0: there was none
+  double fall = 0.0;          // of mu behind that peak, per unit of slip; 0: not shown
+};
+
+// Why the way is not clear: what was found, and what it would have to be.
+struct Obstacle {
+  double figure = 0.0, limit = 0.0;
 };
 
 class Arming {
@@ -128,7 +141,9 @@ class Arming {
   // What of these ends an experiment that has begun; kNone: nothing. A little more is allowed than
   // at its start.
   Stop ended_by(const Conditions& now) const noexcept;
-  const Ramp& ramp() const noexcept { return ramp_; }
+  const RequestPlan& plan() const noexcept { return plan_; }
+  // Of the most lasting of the inhibits that forbid a request.
+  const Obstacle& obstacle() const noexcept { return obstacle_; }
   // Mean since the trigger holds, of the last half second.
   double slip_percent() const noexcept { return slip_percent_; }
 
@@ -140,10 +155,15 @@ class Arming {
   static constexpr std::uint32_t kClearance =
       inhibit_bit(Inhibit::kUnreachable) | inhibit_bit(Inhibit::kRamp) |
       inhibit_bit(Inhibit::kTime) | inhibit_bit(Inhibit::kGrip) | inhibit_bit(Inhibit::kForce) |
-      inhibit_bit(Inhibit::kQuiet);
+      inhibit_bit(Inhibit::kQuiet) | inhibit_bit(Inhibit::kWait);
   std::uint32_t preconditions(const Now& now) const noexcept;
   void look(const Now& now) noexcept;
-  std::uint32_t clearance(const Now& now) const noexcept;
+  void search_on(const Now& now) noexcept;
+  std::uint32_t clearance(const Now& now) noexcept;
+  RampPoint point_at(const Now& now, double omega_p_rad_s) const noexcept;
+  Reaction reaction(const Now& now) const noexcept;
+  double ramp_s(const RampPoint& point, double slip_rate_1_s) const noexcept;
+  double slowing_rad_s2(const Now& now) const noexcept;
   bool steady(const Now& now) const noexcept;
   void follow_force(const Now& now) noexcept;
   double force_noise_N() const noexcept;
@@ -180,8 +200,10 @@ class Arming {
   double force_step_N_;       // least change that the pressure's signal can show
   MonoTime block_since_ = 0;
   double block_sum_N_ = 0.0, block_samples_ = 0.0;
-  RampSearch search_;
-  Ramp ramp_;  // found by the last search
+  CrossingSearch search_;  // if the request began now
+  CrossingSearch later_;   // if it began a little later
+  RequestPlan plan_;       // found by the last search
+  Obstacle obstacle_;
 };
 
 }  // namespace beltgrip::daemon

@@ -12,8 +12,24 @@ constexpr double kSecondsPerTick = 1e-9;
 constexpr double kPercent = 100.0;
 // What the slip since the start leaves out: slip at the start, and the deformation that is gone.
 constexpr double kSlipAtStart = 0.01;
-constexpr Duration kSlipMean = 15 * kMillisecond;
-constexpr Duration kSlipRateOver = 80 * kMillisecond;
+// And of a late peak more: at 57 % of its friction a belt has come 28 % of the way in slip.
+constexpr double kStartShare = 0.3;
+constexpr double kNearPeak = 0.85;   // of the largest friction expected
+constexpr double kBelowPeaks = 0.8;  // of the least
+// A slip rate that is no noise, and above what the ramp holds: 4.5 deviations of a window; at the
+// least what the quietest speeds need.
+constexpr double kRateDeviations = 4.5;
+constexpr double kRateLeast_1_s = 0.011;
+constexpr double kSlipGrows_1_s = 0.006;  // a belt that holds creeps slower than this
+constexpr double kDecision_s = 0.02;      // to the next frame, and the receiver's cycle
+constexpr double kLagShare = 1.3;         // of the configured: the crossing was planned for less
+constexpr double kTransport_s = 0.03;     // cycle, frame and filters, beside the actuator
+// The floor falls with the square of the secondary's speed, whose noise must not carry the request
+// below it.
+constexpr double kFloorNoise_N = 10.0;
+// A coasting car's floor falls by 50 N/s. One that falls by less brings nothing into reach.
+constexpr double kFloorPatience_s = 1.0;
+constexpr double kFloorFalls_N_per_s = 10.0;
 constexpr Duration kReleaseMinimum = 300 * kMillisecond;
 constexpr double kSlipAfter = 2e8;   // ns: averages noise, forgets macro slip before kReleaseTime
 constexpr double kSlipTold = 0.003;  // slip at the end of a request that shows whether it goes back
@@ -23,7 +39,8 @@ constexpr double kStuckForce = 1.1;     // of the last request
 constexpr double kStuckFriction = 0.8;  // of the friction expected: the belt is near its peak
 }  // namespace
 
-ClampRequest::ClampRequest(const Config& config) : settings_(config.experiment) {
+ClampRequest::ClampRequest(const Config& config)
+    : settings_(config.experiment), rate_max_N_per_s_(config.estimator.ramp_rate_max_N_per_s) {
   for (const RoleBinding& binding : config.roles) {
     if (binding.role != Role::kVehicleSpeed) continue;
     speed_step_m_s_ =
@@ -31,78 +48,136 @@ ClampRequest::ClampRequest(const Config& config) : settings_(config.experiment) 
   }
 }
 
-void ClampRequest::begin(const Now& now, double rate_N_per_s, double floor_N) noexcept {
+void ClampRequest::begin(const Now& now, const RequestPlan& plan, double floor_N) noexcept {
   standing_ = true;
   followed_ = true;
+  far_ = true;
+  rides_ = false;
   stop_ = {};
   begun_ = last_ = off_since_ = now.t;
-  rate_N_per_s_ = rate_N_per_s;
+  plan_ = plan;
+  law_ = {rate_max_N_per_s_, plan.crossing.ramp_top_N_per_s, plan.crossing.slip_rate_1_s,
+          kNearPeak * plan.mu_expected, kBelowPeaks * plan.mu_least};
+  rate_N_per_s_ = rate_max_N_per_s_;
   force_N_ = start_force_N_ = std::max(now.clamp_force_N, floor_N);
   start_torque_Nm_ = now.torque_Nm;
   start_ratio_ = now.omega_s_rad_s / now.omega_p_rad_s;
   start_engine_ = now.omega_e_rad_s / now.omega_p_rad_s;
   start_wheels_ = now.speed_m_s / now.omega_s_rad_s;
-  count_ = 0;
-  slip_ = slip_max_ = slip_rate_1_s_ = energy_J_ = 0.0;
+  slip_.begin(start_ratio_, start_torque_Nm_);
+  damage_.begin(now.t, std::abs(now.mu_star));
+  lag_.begin(now.t, answer_s());
+  asked_count_ = 1;
+  asked_[0] = {now.t, force_N_};
 }
 
-// Slip from the speeds alone, without the estimator's filters and their delay.
-void ClampRequest::follow_slip(const Now& now) noexcept {
-  const double drift = now.omega_s_rad_s / now.omega_p_rad_s / start_ratio_ - 1.0;
-  points_[count_++ % kPoints] = {now.t, -std::copysign(1.0, start_torque_Nm_) * drift};
-  double recent = 0.0, recent_n = 0.0, oldest_s = 0.0;
-  double n = 0.0, sum_t = 0.0, sum_x = 0.0, sum_tt = 0.0, sum_tx = 0.0;
-  for (std::size_t age = 0; age < std::min(count_, kPoints); ++age) {
-    const Point& point = points_[(count_ - 1 - age) % kPoints];
-    const Duration before = now.t - point.t;
-    if (before > kSlipRateOver) break;
-    const double t = -static_cast<double>(before) * kSecondsPerTick;
-    oldest_s = t;
-    n += 1.0;
-    sum_t += t;
-    sum_x += point.slip;
-    sum_tt += t * t;
-    sum_tx += t * point.slip;
-    if (before > kSlipMean) continue;
-    recent += point.slip;
-    recent_n += 1.0;
-  }
-  slip_ = recent / recent_n;
-  slip_max_ = std::max(slip_max_, slip_);
-  const bool whole = -oldest_s > 0.8 * static_cast<double>(kSlipRateOver) * kSecondsPerTick;
-  slip_rate_1_s_ = whole ? (n * sum_tx - sum_t * sum_x) / (n * sum_tt - sum_t * sum_t) : 0.0;
-  if (slip_ > limits::kSlipCounted) {
-    energy_J_ += (slip_ + kSlipAtStart) * std::abs(now.torque_Nm) * now.omega_p_rad_s *
-                 static_cast<double>(now.t - last_) * kSecondsPerTick;
-  }
+double ClampRequest::power_W(const Now& now) const noexcept {
+  return (std::max(0.0, slip_.slip()) + kSlipAtStart) * std::abs(now.torque_Nm) * now.omega_p_rad_s;
 }
 
-Stop ClampRequest::judge(const Now& now, double floor_N) const noexcept {
-  if (slip_ > limits::kRequestSlip) {
-    return {StopReason::kSlip,
-            {.what = "slip since the start",
-             .figure = kPercent * slip_,
-             .limit = kPercent * limits::kRequestSlip,
+void ClampRequest::follow_belt(const Now& now) noexcept {
+  slip_.step(now.t, now.omega_s_rad_s / now.omega_p_rad_s);
+  damage_.step({.t = now.t,
+                .slip = slip_.slip(),
+                .mu_star = std::abs(now.mu_star),
+                .power_W = power_W(now),
+                .slip_speed_m_s = slip_.slip() * now.omega_p_rad_s * plan_.primary_radius_m,
+                .grows = rides_ || slip_.rate_1_s() > kSlipGrows_1_s});
+  lag_.step(now.t, rate_N_per_s_, now.clamp_force_N - force_N_);
+}
+
+Stop ClampRequest::judge_slip(const Now&) const noexcept {
+  const double slip = slip_.slip(), rate_1_s = slip_.rate_1_s();
+  const double beyond = slip - damage_.slip_at_best();
+  const auto too_much = [](const char* what, StopReason reason, double figure, double limit,
+                           const char* unit) {
+    return Stop{
+        reason,
+        {.what = what, .figure = kPercent * figure, .limit = kPercent * limit, .unit = unit}};
+  };
+  if (slip > limits::kRequestSlip) {
+    return too_much("slip since the start", StopReason::kSlip, slip, limits::kRequestSlip, "%");
+  }
+  if (damage_.beyond() && beyond > limits::kRequestSlipBeyond) {
+    return too_much("slip since friction rose last", StopReason::kSlip, beyond,
+                    limits::kRequestSlipBeyond, "%");
+  }
+  const double held_1_s =
+      law_.slip_rate_1_s + std::max(kRateLeast_1_s, kRateDeviations * slip_.rate_deviation_1_s());
+  const double most_1_s = damage_.beyond() ? std::min(held_1_s, limits::kRequestSlipRate_1_s)
+                                           : limits::kRequestSlipRate_1_s;
+  if (slip > limits::kRequestSlipRateFrom && rate_1_s > most_1_s) {
+    return too_much("slip grows by", StopReason::kSlipRate, rate_1_s, most_1_s, "%/s");
+  }
+  return {};
+}
+
+Stop ClampRequest::judge_damage(const Now& now) const noexcept {
+  if (!damage_.beyond()) return {};
+  const auto too_much = [](const char* what, double figure, double limit, const char* unit) {
+    return Stop{StopReason::kSlipEnergy,
+                {.what = what, .figure = figure, .limit = limit, .unit = unit}};
+  };
+  const double now_W = power_W(now);
+  const double energy_J = damage_.energy_J() + (answer_s() + kDecision_s) * now_W;
+  if (energy_J > limits::kRequestEnergy_J) {
+    return too_much("slip energy beyond the peak, with what is to come", energy_J,
+                    limits::kRequestEnergy_J, "J");
+  }
+  if (now_W > limits::kRequestPower_W) {
+    return too_much("slip power beyond the peak", now_W, limits::kRequestPower_W, "W");
+  }
+  if (damage_.fast_s() > limits::kRequestFast_s) {
+    return too_much("fast slip beyond the peak, for", damage_.fast_s(), limits::kRequestFast_s,
+                    "s");
+  }
+  return {};
+}
+
+Stop ClampRequest::judge_room(const Now& now) const noexcept {
+  const double room = peak_slip_max(plan_.crossing, SlipLimits{}, std::abs(now.torque_Nm),
+                                    now.omega_p_rad_s, plan_.primary_radius_m);
+  const double slip =
+      slip_.slip() + std::max(kSlipAtStart, kStartShare * std::max(0.0, slip_.slip()));
+  if (slip > room) {
+    return {StopReason::kRoom,
+            {.what = "a peak could no longer be crossed, slip",
+             .figure = kPercent * slip,
+             .limit = kPercent * room,
              .unit = "%"}};
   }
-  if (slip_ > limits::kRequestSlipRateFrom && slip_rate_1_s_ > limits::kRequestSlipRate_1_s) {
-    return {StopReason::kSlipRate,
-            {.what = "slip grows by",
-             .figure = kPercent * slip_rate_1_s_,
-             .limit = kPercent * limits::kRequestSlipRate_1_s,
-             .unit = "%/s"}};
+  const double lag_most_s = kLagShare * (answer_s() + kTransport_s);
+  if (!damage_.beyond() && lag_.least_s() > lag_most_s) {
+    return {StopReason::kLag,
+            {.what = "clamping force answers after",
+             .figure = lag_.least_s(),
+             .limit = lag_most_s,
+             .unit = "s"}};
   }
-  if (energy_J_ > limits::kRequestEnergy_J) {
-    return {StopReason::kSlipEnergy,
-            {.what = "slip energy",
-             .figure = energy_J_,
-             .limit = limits::kRequestEnergy_J,
-             .unit = "J"}};
-  }
-  if (force_N_ <= floor_N) {
+  return {};
+}
+
+// The floor falls by itself with the speed: a request rides on it for as long as it does.
+Stop ClampRequest::judge_floor(const Now& now, double floor_N) const noexcept {
+  const double rode_s = rides_ ? static_cast<double>(now.t - rides_since_) * kSecondsPerTick : 0.0;
+  const bool stays =
+      rode_s > kFloorPatience_s && floor_first_N_ - floor_N < kFloorFalls_N_per_s * rode_s;
+  const bool over =
+      now.omega_p_rad_s < limits::kRequestSpeedShare * settings_.primary_speed_min_rad_s;
+  // Arming found no more than this in reach.
+  const bool grips = std::abs(now.mu_star) > plan_.mu_expected;
+  if (force_N_ < floor_N || stays || (rides_ && (over || grips))) {
     return {StopReason::kForceFloor,
             {.what = "request at its floor", .figure = force_N_, .limit = floor_N, .unit = "N"}};
   }
+  return {};
+}
+
+Stop ClampRequest::judge(const Now& now, double floor_N) const noexcept {
+  if (const Stop stop = judge_slip(now)) return stop;
+  if (const Stop stop = judge_damage(now)) return stop;
+  if (const Stop stop = judge_room(now)) return stop;
+  if (const Stop stop = judge_floor(now, floor_N)) return stop;
   if (now.t - begun_ >= limits::kRequestLongest) {
     return {StopReason::kTime,
             {.what = "request stood for",
@@ -175,25 +250,66 @@ std::optional<Role> ClampRequest::untrue_speed(const Now& now, double drift) con
   return std::nullopt;
 }
 
+void ClampRequest::lower(const Now& now, double floor_N) noexcept {
+  const double step_s = static_cast<double>(now.t - last_) * kSecondsPerTick;
+  far_ = far_ && peak_is_far(law_, std::abs(now.mu_star), slip_.rate_1_s());
+  const double wanted_N_per_s =
+      far_ ? law_.rate_max_N_per_s
+           : ramp_near_N_per_s(law_, std::abs(now.mu_star), slip_.rate_1_s());
+  const double before_N = force_N_;
+  const bool rode = rides_;
+  rides_ = force_N_ <= floor_N + kFloorNoise_N;
+  if (rides_ && !rode) {
+    rides_since_ = now.t;
+    floor_first_N_ = floor_N;
+  }
+  force_N_ =
+      std::max(force_N_ - wanted_N_per_s * step_s, std::min(force_N_, floor_N + kFloorNoise_N));
+  rate_N_per_s_ = step_s > 0.0 ? (before_N - force_N_) / step_s : 0.0;
+  if (now.t - asked(0).t >= kCoursePeriod) asked_[asked_count_++ % kAsked] = {now.t, force_N_};
+}
+
 void ClampRequest::step(const Now& now, double floor_N) noexcept {
   if (!standing_) return;
-  follow_slip(now);
+  follow_belt(now);
   if (!stop_) stop_ = judge(now, floor_N);
-  const double fall_N = rate_N_per_s_ * static_cast<double>(now.t - last_) * kSecondsPerTick;
+  lower(now, floor_N);
   last_ = now.t;
-  force_N_ = std::max(force_N_ - fall_N, std::min(force_N_, floor_N));
   off_N_ = std::abs(now.clamp_force_N - force_N_);
   if (off_N_ <= follow_band_N()) off_since_ = now.t;
   followed_ = now.t - off_since_ <= kFollowTime;
 }
 
+// A force that follows is behind by what the request fell within the actuator's answer.
+double ClampRequest::follow_band_N() const noexcept {
+  const std::size_t age =
+      std::min(asked_count_, static_cast<std::size_t>(kRecent / kCoursePeriod)) - 1;
+  const double over_s = static_cast<double>(last_ - asked(age).t) * kSecondsPerTick;
+  const double behind_N =
+      over_s > 0.0 ? std::min(1.0, answer_s() / over_s) * (asked(age).force_N - force_N_) : 0.0;
+  return kFollowBand * force_N_ + kFollowBand_N + behind_N;
+}
+
+double ClampRequest::rate_least_N_per_s() const noexcept {
+  double least = rate_N_per_s_;
+  for (std::size_t age = 0; age + 1 < std::min(asked_count_, kAsked); ++age) {
+    if (last_ - asked(age).t > kRecent) break;
+    const double step_s = static_cast<double>(asked(age).t - asked(age + 1).t) * kSecondsPerTick;
+    least = std::min(least, (asked(age + 1).force_N - asked(age).force_N) / step_s);
+  }
+  return least;
+}
+
 bool ClampRequest::changed_since(MonoTime t) const noexcept {
-  const double since_s = static_cast<double>(last_ - std::max(t, begun_)) * kSecondsPerTick;
-  return rate_N_per_s_ * since_s > follow_band_N();
+  double then_N = force_N_;
+  for (std::size_t age = 0; age < std::min(asked_count_, kAsked) && asked(age).t >= t; ++age) {
+    then_N = asked(age).force_N;
+  }
+  return then_N - force_N_ > follow_band_N();
 }
 
 void ClampRequest::end(MonoTime t) noexcept {
-  if (standing_) slip_after_ = slip_;
+  if (standing_) slip_after_ = slip_.slip();
   standing_ = false;
   ended_ = t;
   rest_s_ = rest_m_ = 0.0;
@@ -207,16 +323,15 @@ bool ClampRequest::released(const Now& now) const noexcept {
 }
 
 void ClampRequest::follow_release(const Now& now) noexcept {
-  const double drift = now.omega_s_rad_s / now.omega_p_rad_s / start_ratio_ - 1.0;
-  const double slip = -std::copysign(1.0, start_torque_Nm_) * drift;
+  const double slip = slip_.slip_at(now.omega_s_rad_s / now.omega_p_rad_s);
   const double share = std::min(1.0, static_cast<double>(now.t - last_) / kSlipAfter);
   slip_after_ += share * (slip - slip_after_);
   last_ = now.t;
 }
 
 std::optional<bool> ClampRequest::held_again() const noexcept {
-  if (slip_ < kSlipTold) return std::nullopt;
-  return slip_after_ < kSlipGone * slip_;
+  if (slip_.slip() < kSlipTold) return std::nullopt;
+  return slip_after_ < kSlipGone * slip_.slip();
 }
 
 bool ClampRequest::stuck(const Now& now) const noexcept {

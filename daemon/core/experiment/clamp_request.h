@@ -2,11 +2,17 @@
 // ramp, the backup stops that the estimator does not know of, whether the controller follows, and
 // the cool-down. SI. Real-time thread; no allocation.
 //
-// Backup stops while a request stands (strict):
-//   Slip         the speed ratio has moved by more than kRequestSlip since the start
-//   SlipRate     it moves faster than kRequestSlipRate_1_s, over 80 ms
-//   SlipEnergy   dissipated beyond kSlipCounted
-//   ForceFloor   the ramp has arrived at the floor
+// Stops while a request stands (strict):
+//   Slip         since the start more than kRequestSlip, or kRequestSlipBeyond more than where
+//                friction was largest
+//   SlipRate     it grows faster than the ramp holds it, beyond its noise, while friction does not
+//                rise; or faster than kRequestSlipRate_1_s
+//   SlipEnergy   beyond the peak, as slip_damage has it: energy with what is still to come, power,
+//                or time at high slip speed
+//   Room         a peak that came now could not be crossed inside the promised limits any more
+//   Lag          the force answers later than the crossing was planned for
+//   ForceFloor   the request is at its floor, which no longer falls with the speed, or has risen;
+//                or the coast-down is over, or friction larger than was expected
 //   Time         the request has stood for kRequestLongest
 //   EngineSpeed  the primary has left the band around the speed that the secondary gives it at the
 //                start's ratio, or has fallen below its least speed: macro slip pulls the engine
@@ -24,14 +30,20 @@
 #include "daemon/core/base/limits.h"
 #include "daemon/core/base/mono_time.h"
 #include "daemon/core/config/options/config.h"
-#include "daemon/core/experiment/arming.h"
+#include "daemon/core/experiment/answer_lag.h"
+#include "daemon/core/experiment/ramp_rate.h"
+#include "daemon/core/experiment/reachability.h"
+#include "daemon/core/experiment/request_plan.h"
+#include "daemon/core/experiment/slip_course.h"
+#include "daemon/core/experiment/slip_damage.h"
+#include "daemon/core/input/stop_cause.h"
 #include "estimator/method/slip_curve_estimator.h"
 
 namespace beltgrip::daemon {
 
 class ClampRequest {
  public:
-  static constexpr double kSpeedBand = 0.06;   // share of the speed
+  static constexpr double kSpeedBand = 0.08;   // share of the speed: more than slip may take
   static constexpr double kTorqueBand = 0.35;  // share of the torque
   static constexpr double kTorqueBand_Nm = 5.0;
   static constexpr double kRatioBand = 0.015;  // share of the ratio, the wrong way
@@ -53,7 +65,7 @@ class ClampRequest {
     double omega_e_rad_s = 0.0;  // engine, lock-up closed; 0: not known
     double speed_m_s = 0.0;      // of the vehicle; 0: not known
   };
-  void begin(const Now& now, double rate_N_per_s, double floor_N) noexcept;
+  void begin(const Now& now, const RequestPlan& plan, double floor_N) noexcept;
   // Every sample while it stands and the inputs are usable.
   void step(const Now& now, double floor_N) noexcept;
   // And while they are not: the force stays.
@@ -64,16 +76,18 @@ class ClampRequest {
   bool standing() const noexcept { return standing_; }
   double force_N() const noexcept { return standing_ ? force_N_ : 0.0; }
   double rate_N_per_s() const noexcept { return rate_N_per_s_; }
+  // The slowest of the last kRecent.
+  double rate_least_N_per_s() const noexcept;
   estimator::StopReason backup_stop() const noexcept { return stop_.reason; }
   const StopCause& cause() const noexcept { return stop_.cause; }
   // False: the clamping force has been off the request for kFollowTime.
   bool followed() const noexcept { return followed_; }
   double off_N() const noexcept { return off_N_; }  // at the last sample
-  double follow_band_N() const noexcept { return kFollowBand * force_N_ + kFollowBand_N; }
+  double follow_band_N() const noexcept;
   // The force asked for has changed since then by as much as counts as not followed.
   bool changed_since(MonoTime t) const noexcept;
   // The largest slip since the start, of the request that stands or was the last.
-  double slip_max() const noexcept { return slip_max_; }
+  double slip_max() const noexcept { return slip_.slip_max(); }
 
   // After the end.
   bool released(const Now& now) const noexcept;
@@ -89,9 +103,18 @@ class ClampRequest {
 
  private:
   Stop judge(const Now& now, double floor_N) const noexcept;
+  Stop judge_slip(const Now& now) const noexcept;
+  Stop judge_damage(const Now& now) const noexcept;
+  Stop judge_room(const Now& now) const noexcept;
+  Stop judge_floor(const Now& now, double floor_N) const noexcept;
   Stop judge_course(const Now& now) const noexcept;
   std::optional<Role> untrue_speed(const Now& now, double drift) const noexcept;
-  void follow_slip(const Now& now) noexcept;
+  void follow_belt(const Now& now) noexcept;
+  void lower(const Now& now, double floor_N) noexcept;
+  double answer_s() const noexcept {
+    return settings_.actuator_dead_time_s + settings_.actuator_lag_s;
+  }
+  double power_W(const Now& now) const noexcept;
 
   ExperimentSettings settings_;
   bool standing_ = false;
@@ -107,7 +130,8 @@ class ClampRequest {
   double rest_m_ = 0.0;
   double force_N_ = 0.0;
   double off_N_ = 0.0;
-  double rate_N_per_s_ = 0.0;
+  double rate_max_N_per_s_;
+  double rate_N_per_s_ = 0.0;  // of the last sample
   double start_force_N_ = 0.0;
   double start_torque_Nm_ = 0.0;
   double start_ratio_ = 0.0;
@@ -115,18 +139,28 @@ class ClampRequest {
   double start_wheels_ = 0.0;  // speed / omega_s; 0: not known
   double speed_step_m_s_ = 0.0;
 
-  // Slip since the start in the direction of the torque, the last 100 ms; newest at next_ - 1.
-  struct Point {
+  RequestPlan plan_;
+  RampLaw law_;
+  bool far_ = true;     // the peak, still
+  bool rides_ = false;  // on its floor, since then
+  MonoTime rides_since_ = 0;
+  double floor_first_N_ = 0.0;
+  SlipCourse slip_;
+  SlipDamage damage_;
+  AnswerLag lag_;
+  // The force asked for, every kCoursePeriod; newest at count - 1.
+  struct Asked {
     MonoTime t = 0;
-    double slip = 0.0;
+    double force_N = 0.0;
   };
-  static constexpr std::size_t kPoints = 128;  // 80 ms at 1000 Hz, and more
-  std::array<Point, kPoints> points_{};
-  std::size_t count_ = 0;
-  double slip_ = 0.0;  // mean of the last 15 ms
-  double slip_max_ = 0.0;
-  double slip_rate_1_s_ = 0.0;
-  double energy_J_ = 0.0;
+  static constexpr std::size_t kAsked = 64;
+  static constexpr Duration kCoursePeriod = 20 * kMillisecond;
+  static constexpr Duration kRecent = 300 * kMillisecond;
+  const Asked& asked(std::size_t age) const noexcept {
+    return asked_[(asked_count_ - 1 - age) % kAsked];
+  }
+  std::array<Asked, kAsked> asked_{};
+  std::size_t asked_count_ = 0;
   double slip_after_ = 0.0;  // mean of the last kSlipAfter
 };
 

@@ -15,9 +15,10 @@ using estimator::VariatorSample;
 
 namespace {
 
-constexpr double kAnswerLags = 3.0;       // of the actuator: then its pressure has answered
-constexpr double kSlipped_percent = 1.5;  // more than deformation and a drift of the ratio explain
-constexpr double kSlipOfAPeak = 0.007;    // since the start: less of it has passed no peak
+constexpr double kAnswerLags = 3.0;        // of the actuator: then its pressure has answered
+constexpr double kSlipped_percent = 1.5;   // more than deformation and a drift of the ratio explain
+constexpr double kFallSeen_percent = 0.4;  // of slip past the peak: noise is less of mu's fall
+constexpr double kSlipOfAPeak = 0.007;     // since the start: less of it has passed no peak
 
 bool in_experiment(State state) noexcept {
   return state == State::kRamping || state == State::kEvaluating || state == State::kReleasing;
@@ -176,7 +177,7 @@ InputMonitor::Watch ExperimentStage::watch(double torque_Nm) const noexcept {
   if (commands() && state_ == State::kRamping) {
     watch.torque_sign = std::copysign(1.0, torque_Nm);
     watch.request_begun = running_.start;
-    watch.fall_Pa_per_s = request_.rate_N_per_s() / config_.variator.secondary_piston_area_m2;
+    watch.fall_Pa_per_s = request_.rate_least_N_per_s() / config_.variator.secondary_piston_area_m2;
     watch.answer = std::llround(1e9 * (config_.experiment.actuator_dead_time_s +
                                        kAnswerLags * config_.experiment.actuator_lag_s));
   }
@@ -340,7 +341,7 @@ Action ExperimentStage::apply(const Transition& transition, const Now& now) noex
       running_.start = now.t;
       refused_ = true;
       request_.end(now.t);
-      stop(now.t, stop_of(arming_.inhibits()), now);
+      stop(now.t, stop_of(arming_.inhibits(), arming_.obstacle()), now);
       break;
     case Action::kStop:
       macro_slip_stop_ = true;
@@ -370,8 +371,7 @@ Action ExperimentStage::apply(const Transition& transition, const Now& now) noex
 void ExperimentStage::start(const Now& now) noexcept {
   const VariatorSample& sample = now.input.sample();
   if (commands()) {
-    request_.begin(request_now(now), arming_.ramp().rate_N_per_s,
-                   arming_.floor_N(sample.omega_s_rad_s));
+    request_.begin(request_now(now), arming_.plan(), arming_.floor_N(sample.omega_s_rad_s));
   }
   own_force_N_ = now.estimate.measured_force_N();
   omega_s_start_rad_s_ = sample.omega_s_rad_s;
@@ -391,6 +391,7 @@ void ExperimentStage::stop(MonoTime t, const Stop& why, const Now& now) noexcept
   running_.stop_reason = why.reason;
   running_.cause = why.cause;
   running_.sigma_stop_percent = std::abs(curve.sigma_star_percent);
+  mu_star_stop_ = std::abs(curve.mu_star);
   running_.direction = curve.direction;
   running_.end_stop = curve.end_stop;
   running_.omega_p_rad_s = sample.omega_p_rad_s;
@@ -422,7 +423,8 @@ EndedExperiment ExperimentStage::ended() const noexcept {
   ended.passed_a_peak = !commands() || !(request_.slip_max() < kSlipOfAPeak);
   ended.ended_by_slip =
       running_.stopped && (reason == StopReason::kSlope || reason == StopReason::kSlip ||
-                           reason == StopReason::kSlipRate || reason == StopReason::kSlipEnergy);
+                           reason == StopReason::kSlipRate || reason == StopReason::kSlipEnergy ||
+                           reason == StopReason::kRoom);
   ended.may_have_slipped = running_.stopped && reason == StopReason::kInputs &&
                            running_.sigma_stop_percent - sigma_first_percent_ > kSlipped_percent;
   ended.mu_star_most = mu_star_most_;
@@ -438,6 +440,13 @@ void ExperimentStage::keep_result(Outcome outcome) noexcept {
   new_result_ = true;
 }
 
+// Of mu behind the peak, per unit of slip; 0: too little of it was seen.
+double ExperimentStage::fall_seen(const estimator::PeakEstimate& peak) const noexcept {
+  const double beyond_percent = running_.sigma_stop_percent - peak.sigma_peak_percent;
+  if (running_.stop_reason != StopReason::kSlope || beyond_percent < kFallSeen_percent) return 0.0;
+  return std::max(0.0, peak.mu_max - mu_star_stop_) / beyond_percent * 100.0;
+}
+
 void ExperimentStage::conclude(const estimator::PeakEstimate& peak, double sensor_std,
                                bool slipped) noexcept {
   running_.peak = peak;
@@ -446,7 +455,8 @@ void ExperimentStage::conclude(const estimator::PeakEstimate& peak, double senso
   keep_result(is_value ? Outcome::kCompleted : Outcome::kInconclusive);
   result_.slipped = slipped;
   if (commands() && is_value) {
-    shown(running_.direction, running_.end_stop) = {slip_own_percent_, peak.sigma_peak_percent};
+    shown(running_.direction, running_.end_stop) = {slip_own_percent_, peak.sigma_peak_percent,
+                                                    fall_seen(peak)};
   }
 }
 

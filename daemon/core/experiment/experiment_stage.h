@@ -107,6 +107,7 @@ class ExperimentStage {
   void stop(MonoTime t, const Stop& why, const Now& now) noexcept;
   Stop abort_of(estimator::StopReason reason, const Now& now) const noexcept;
   void keep_result(Outcome outcome) noexcept;
+  double fall_seen(const estimator::PeakEstimate& peak) const noexcept;
   SlipShown& shown(estimator::Direction direction, estimator::EndStop end_stop) noexcept;
 
   const Config& config_;
@@ -126,6 +127,7 @@ class ExperimentStage {
   ExperimentResult result_;   // the last that came to its outcome
   double sigma_first_percent_ = 0.0;
   double mu_star_most_ = 0.0;  // in the experiment under way
+  double mu_star_stop_ = 0.0;  // when it stopped
   double omega_s_start_rad_s_ = 0.0;
   double own_force_N_ = 0.0;       // before the experiment under way
   double slip_own_percent_ = 0.0;  // of the experiment under way, before it began

@@ -1,36 +1,27 @@
 #include "daemon/core/experiment/reachability.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace beltgrip::daemon {
 
 namespace {
 
-constexpr double kFall = 0.4;         // of mu beyond the peak, per unit of slip
-constexpr double kSlopeBefore = 0.5;  // of mu just before the peak, per unit of slip
-constexpr int kRates = 16;            // tried, each kRateStep slower than the one before
-constexpr double kRateStep = 0.82;
+// Tried: below the least the energy of a slow crossing grows, above the largest the slip on its
+// way.
+constexpr std::array kSlipRates_1_s{0.03, 0.025, 0.02};
+// A steep fall is seen early, a flat top late.
+constexpr double kSlipToSeeSteep = 0.003;
+constexpr double kSlipToSeeFlat = 0.008;
+constexpr double kFlatFall = 0.05;  // of mu per unit of slip
+constexpr double kSlipSpan = 1.05;  // 1 + sigma, of the slip beyond the peak
+constexpr double kNotCaught = 1e9;
+constexpr std::size_t kCorners = 4;
 constexpr int kBisections = 16;
-constexpr int kIntegration = 20;  // points of the energy's integral in each phase
+constexpr int kIntegration = 20;  // points of the area's integral after the actuator was told
 
-// Growth of slip beyond the peak while the force falls.
-struct Growth {
-  double a = 0.0;   // 1/s
-  double b = 0.0;   // 1/s^2: w r / F
-  double v0 = 0.0;  // 1/s
-
-  double slip(double t) const noexcept {
-    const double e = std::expm1(a * t);
-    return b / (a * a) * (e - a * t) + v0 / a * e;
-  }
-  double area(double t) const noexcept {  // integral of slip
-    const double e = std::expm1(a * t);
-    return b / (a * a) * ((e - a * t) / a - 0.5 * a * t * t) + v0 / a * (e / a - t);
-  }
-};
-
-// And after the actuator has been told.
+// After the actuator has been told.
 struct Recovery {
   double a = 0.0, w = 0.0;
   double x1 = 0.0, y1 = 0.0, g = 0.0, lag_s = 0.0;
@@ -54,6 +45,14 @@ double last_positive(Function f, double low, double high) noexcept {
   return high;
 }
 
+Excursion larger(const Excursion& a, const Excursion& b) noexcept {
+  return {std::max(a.slip, b.slip), std::max(a.time_s, b.time_s), std::max(a.area_s, b.area_s)};
+}
+
+double runaway_1_s(const RampPoint& point) noexcept {
+  return point.torque_Nm * kSlipSpan / (point.inertia_kg_m2 * point.omega_p_rad_s);
+}
+
 }  // namespace
 
 double peak_force_N(const RampPoint& point, double mu) noexcept {
@@ -64,89 +63,80 @@ double reachable_mu(const RampPoint& point) noexcept {
   return point.torque_Nm * point.wedge_cosine / (2.0 * point.primary_radius_m * point.floor_N);
 }
 
-Excursion excursion(const RampPoint& point, const Reaction& reaction, double rate_N_per_s,
-                    double reaction_s) noexcept {
-  const double force_N = peak_force_N(point, point.mu_expected);
-  const double w = point.torque_Nm * 1.21 / (point.inertia_kg_m2 * point.omega_p_rad_s);
-  Growth growth;
-  growth.a = w * kFall / point.mu_expected;
-  growth.b = w * rate_N_per_s / force_N;
-  growth.v0 = point.mu_expected * rate_N_per_s / (force_N * kSlopeBefore);
+double ramp_at_the_top_N_per_s(const RampPoint& point, double answer_s,
+                               double slip_rate_1_s) noexcept {
+  return slip_rate_1_s * peak_force_N(point, point.mu_expected) / (runaway_1_s(point) * answer_s);
+}
 
-  double far_s = 0.01;
-  while (growth.slip(far_s) < kSlipToSee) far_s *= 2.0;
-  const double seen_s =
-      last_positive([&](double t) { return kSlipToSee - growth.slip(t); }, 0.0, far_s);
-  const double stop_s = seen_s + reaction.detection_s;
-  const double told_s = stop_s + reaction_s + reaction.dead_time_s;
-
-  Excursion out;
-  out.slip_at_stop = point.peak_slip + growth.slip(stop_s);
+Excursion excursion(const RampPoint& point, const Reaction& reaction, double slip_rate_1_s,
+                    double fall, double slip_to_see, double reaction_s) noexcept {
+  const double w = runaway_1_s(point);
   Recovery recovery;
-  recovery.a = growth.a;
+  recovery.a = w * fall / point.mu_least;
   recovery.w = w;
   recovery.lag_s = std::max(reaction.lag_s, 1e-3);
-  recovery.x1 = growth.slip(told_s);
-  recovery.y1 = rate_N_per_s * told_s / force_N;
-  recovery.g = std::max(0.0, point.own_force_N / force_N - (1.0 - recovery.y1));
-  double energy = point.peak_slip * told_s + growth.area(told_s);
+  recovery.y1 = slip_rate_1_s / w;
+  const double a = recovery.a;
+  const double seen_s = std::log1p(a * slip_to_see / slip_rate_1_s) / a;
+  const double told_s = seen_s + reaction.detection_s + reaction_s + reaction.dead_time_s;
+  recovery.x1 = slip_rate_1_s / a * std::expm1(a * told_s);
+  const double force_N = peak_force_N(point, point.mu_least);
+  recovery.g = std::max(0.0, point.own_force_N / force_N - 1.0 + recovery.y1);
   // Where the own force does not catch the belt any more, slip grows without bound.
   const double horizon_s = 8.0 * recovery.lag_s + 1.0;
-  if (recovery.slope(horizon_s) > 0.0) {
-    out.slip_max = out.slip_speed_max_m_s = out.energy_J = 1e9;
-    return out;
-  }
+  if (recovery.slope(horizon_s) > 0.0) return {kNotCaught, kNotCaught, kNotCaught};
   const double top_s = last_positive([&](double t) { return recovery.slope(t); }, 0.0, horizon_s);
-  const double highest = std::max(recovery.x1, recovery.slip(top_s));
+  Excursion out;
+  out.slip = std::max(recovery.x1, recovery.slip(top_s));
   // Back below the peak's slip.
   const double end_s = last_positive([&](double t) { return recovery.slip(t); }, top_s, horizon_s);
+  out.time_s = told_s + end_s;
+  out.area_s = (recovery.x1 - slip_rate_1_s * told_s) / a;
   for (int i = 0; i < kIntegration; ++i) {
     const double t = end_s * (i + 0.5) / kIntegration;
-    energy += end_s / kIntegration * (point.peak_slip + std::max(0.0, recovery.slip(t)));
+    out.area_s += end_s / kIntegration * std::max(0.0, recovery.slip(t));
   }
-  out.slip_max = point.peak_slip + highest;
-  out.slip_speed_max_m_s = out.slip_max * point.omega_p_rad_s * point.primary_radius_m;
-  out.energy_J = energy * point.torque_Nm * point.omega_p_rad_s;
   return out;
 }
 
-RampSearch::RampSearch(const RampPoint& point, const Reaction& reaction, const SlipLimits& limits,
-                       double rate_max_N_per_s) noexcept
-    : point_(point),
-      reaction_(reaction),
-      limits_(limits),
-      rate_N_per_s_(rate_max_N_per_s),
-      done_(false) {}
-
-bool RampSearch::step() noexcept {
-  if (done_) return true;
-  if (!nominal_holds_) {
-    const Excursion nominal = excursion(point_, reaction_, rate_N_per_s_, reaction_.cycle_s);
-    nominal_holds_ = nominal.slip_at_stop <= limits_.slip_nominal &&
-                     nominal.slip_max <= limits_.slip_max &&
-                     nominal.energy_J <= limits_.energy_nominal_J;
-    if (!nominal_holds_) next_rate();
-    return done_;
-  }
-  const double worst_s = std::max(reaction_.stale_s, reaction_.timeout_s) + reaction_.cycle_s;
-  const Excursion worst = excursion(point_, reaction_, rate_N_per_s_, worst_s);
-  const bool holds = worst.slip_max <= limits_.slip_max &&
-                     worst.slip_speed_max_m_s <= limits_.slip_speed_max_m_s &&
-                     worst.energy_J <= limits_.energy_max_J;
-  if (!holds) {
-    next_rate();
-    return done_;
-  }
-  const double fall_N =
-      std::max(0.0, point_.own_force_N - peak_force_N(point_, point_.mu_expected));
-  ramp_ = {rate_N_per_s_, fall_N / rate_N_per_s_};
-  return done_ = true;
+double peak_slip_max(const Crossing& crossing, const SlipLimits& limits, double torque_Nm,
+                     double omega_p_rad_s, double primary_radius_m) noexcept {
+  const double slip =
+      std::min(limits.slip_max, limits.slip_speed_max_m_s / (omega_p_rad_s * primary_radius_m));
+  // What a whole turn of slip would dissipate.
+  const double turns_s = limits.energy_max_J / std::max(1.0, torque_Nm * omega_p_rad_s);
+  const Excursion& cost = crossing.dearest;
+  return std::min(slip - cost.slip, (turns_s - cost.area_s) / cost.time_s);
 }
 
-void RampSearch::next_rate() noexcept {
-  nominal_holds_ = false;
-  rate_N_per_s_ *= kRateStep;
-  done_ = ++tried_ == kRates;
+CrossingSearch::CrossingSearch(const RampPoint& point, const Reaction& reaction,
+                               const SlipLimits& limits) noexcept
+    : point_(point), reaction_(reaction), limits_(limits), done_(false) {}
+
+bool CrossingSearch::step() noexcept {
+  if (done_) return true;
+  // Steep and flat, nominal and worst, one rate after the other.
+  const double rate_1_s = kSlipRates_1_s[tried_ / kCorners];
+  const std::size_t corner = tried_ % kCorners;
+  const bool steep = corner % 2 == 0, nominal = corner < 2;
+  const double silence_s = nominal ? 0.0 : std::max(reaction_.stale_s, reaction_.timeout_s);
+  const double steepest = nominal ? point_.fall : point_.fall_at_fault;
+  const Excursion cost =
+      excursion(point_, reaction_, rate_1_s, steep ? steepest : kFlatFall,
+                steep ? kSlipToSeeSteep : kSlipToSeeFlat, silence_s + reaction_.cycle_s);
+  if (corner == 0) tries_ = {};
+  tries_.dearest = larger(tries_.dearest, cost);
+  done_ = ++tried_ == kCorners * kSlipRates_1_s.size();
+  if (corner + 1 < kCorners) return done_;
+  tries_.slip_rate_1_s = rate_1_s;
+  tries_.peak_slip_max = peak_slip_max(tries_, limits_, point_.torque_Nm, point_.omega_p_rad_s,
+                                       point_.primary_radius_m);
+  tries_.ramp_top_N_per_s =
+      ramp_at_the_top_N_per_s(point_, reaction_.dead_time_s + reaction_.lag_s, rate_1_s);
+  if (tries_.peak_slip_max > std::max(point_.peak_slip, crossing_.peak_slip_max)) {
+    crossing_ = tries_;
+  }
+  return done_;
 }
 
 }  // namespace beltgrip::daemon

@@ -1,28 +1,29 @@
-// Before an experiment: can the peak of friction be reached at all, and is there a ramp whose
-// worst-case reaction stays inside the slip limits? Pure functions of plain values, SI, slip as a
-// fraction. No clock, no allocation; bounded work.
+// Before an experiment: can the peak of friction be reached at all, and is there a slip rate at
+// which the belt can cross it and be caught again inside the slip limits? Pure functions of plain
+// values, SI, slip as a fraction. No clock, no allocation; bounded work.
 //
 // Beyond the peak (slip sigma_pk, clamp force F_pk) the belt torque falls short of the shaft's by
 // the share y of missing force and by the fall of friction; the shaft with inertia J takes it up:
 //   x = sigma - sigma_pk,  dx/dt = a x + w y,   w = T (1 + sigma_max)^2 / (J omega),
 //                                               a = w fall / mu
-//   while the force falls at r:  y = r t / F_pk      ->  x in closed form, from dx/dt(0) = v0
+//   at the top dx/dt = v, the slip rate that the ramp holds: y = v / w, which is the force that is
+//   still on its way; it stays, for above v the ramp holds   ->  x in closed form
 //   after dead time, with lag tau towards the controller's own force:
-//                                y = y1 - g (1 - exp(-t / tau)),  g = (F_own - F_1) / F_pk
-// v0 = mu r / (F_pk k0): quasi-static, with k0 the slope of the curve just before its peak. The
-// constants are the worst that is plausible: a fall of 4e-3 and a slope of 5e-3 per percent. Slip
-// energy counts from the peak on: below it, slip is what every such belt does all day.
+//                                y = y1 - g (1 - exp(-t / tau)),  g = F_own / F_pk - 1 + y1
+// Friction may fall as steeply as the point says, and is then seen early; or hardly at all, and is
+// seen late: a crossing has to hold for both. Slip energy counts from the peak on: below it, slip
+// is what every such belt does all day.
 #pragma once
+
+#include <cstddef>
 
 namespace beltgrip::daemon {
 
 // What an experiment may do at most (promise G1).
 struct SlipLimits {
-  double slip_nominal = 0.05;  // at the stop
-  double slip_max = 0.10;      // ever
+  double slip_max = 0.10;  // ever
   double slip_speed_max_m_s = 0.8;
-  double energy_nominal_J = 50.0;  // dissipated beyond the peak
-  double energy_max_J = 100.0;
+  double energy_max_J = 90.0;  // dissipated beyond the peak; 100 less what a model may be off
 };
 
 // How long it takes from a fault, or the stop decision, to force.
@@ -35,7 +36,7 @@ struct Reaction {
   double lag_s = 0.0;
 };
 
-// The operating point before the ramp. Magnitudes.
+// The operating point at which the belt is to cross its peak. Magnitudes.
 struct RampPoint {
   double torque_Nm = 0.0;  // on the belt
   double omega_p_rad_s = 0.0;
@@ -44,56 +45,67 @@ struct RampPoint {
   double inertia_kg_m2 = 0.0;  // of the side that can run away
   double own_force_N = 0.0;    // before the request
   double floor_N = 0.0;        // the clamp goes no lower
-  double mu_expected = 0.0;    // of the peak
+  double mu_expected = 0.0;    // of the peak, at the most
+  double mu_least = 0.0;       // of the peak, at the least: the own force then holds it least
   double peak_slip = 0.0;      // where it is expected at the latest
+  // Of mu beyond the peak, at the steepest, per unit of slip: where nothing goes wrong, and with
+  // the worst single fault beside it.
+  double fall = 0.0;
+  double fall_at_fault = 0.0;
 };
 
 // mu* at the force floor: the largest that can be reached.
 double reachable_mu(const RampPoint& point) noexcept;
 // Clamp force at which a belt with that friction just carries the torque.
 double peak_force_N(const RampPoint& point, double mu) noexcept;
+// The fastest ramp whose force on its way, at the top, makes slip grow by no more than that.
+double ramp_at_the_top_N_per_s(const RampPoint& point, double answer_s,
+                               double slip_rate_1_s) noexcept;
 
 struct Excursion {
-  double slip_at_stop = 0.0;  // when the estimator decides
-  double slip_max = 0.0;
-  double slip_speed_max_m_s = 0.0;
-  double energy_J = 0.0;
+  double slip = 0.0;    // the largest beyond the peak
+  double time_s = 0.0;  // spent beyond the peak
+  double area_s = 0.0;  // integral of the slip beyond the peak over that time
 };
-// What becomes of the slip when the force falls at this rate beyond the peak, the estimator needs
-// detection_s after kSlipToSee beyond the peak, and reaction_s passes before the actuator is told.
-Excursion excursion(const RampPoint& point, const Reaction& reaction, double rate_N_per_s,
-                    double reaction_s) noexcept;
+// What becomes of the slip when the belt passes its peak at this slip rate, friction falls by
+// `fall` behind it, the estimator needs detection_s after slip_to_see beyond the peak, and
+// reaction_s passes before the actuator is told. Not caught: all 1e9.
+Excursion excursion(const RampPoint& point, const Reaction& reaction, double slip_rate_1_s,
+                    double fall, double slip_to_see, double reaction_s) noexcept;
 
-inline constexpr double kSlipToSee = 0.010;  // beyond the peak, before the slope is certain
-
-struct Ramp {
-  double rate_N_per_s = 0.0;  // 0: none is safe
-  double duration_s = 0.0;    // down to the peak of a belt of mu_expected
+// How the belt is to be brought over its peak.
+struct Crossing {
+  double slip_rate_1_s = 0.0;     // 0: none is safe
+  double ramp_top_N_per_s = 0.0;  // near the peak
+  // What it costs at most, beyond a peak of any slip: a point in time has room for a crossing while
+  // slip + this slip, and (slip * this time + this area) T omega, are inside the limits.
+  Excursion dearest;
+  double peak_slip_max = 0.0;  // the latest peak with room, at its point
 };
-// The fastest rate up to rate_max_N_per_s that keeps the limits, both with a nominal stop and with
-// the worst single fault, while the force goes on falling: an input that falls silent until it
-// counts as lost, or our own silence until the receiver's time-out.
-class RampSearch {
+// The latest peak that this crossing has room for, where the shaft has this speed.
+double peak_slip_max(const Crossing& crossing, const SlipLimits& limits, double torque_Nm,
+                     double omega_p_rad_s, double primary_radius_m) noexcept;
+
+// The slip rate with most room, both with a nominal stop and with the worst single fault: an input
+// that falls silent until it counts as lost, or our own silence until the receiver's time-out.
+class CrossingSearch {
  public:
-  RampSearch() noexcept = default;  // done, nothing found
-  RampSearch(const RampPoint& point, const Reaction& reaction, const SlipLimits& limits,
-             double rate_max_N_per_s) noexcept;
-  // One excursion, about 8,000 instructions; true when the ramp stands.
+  CrossingSearch() noexcept = default;  // done, nothing found
+  CrossingSearch(const RampPoint& point, const Reaction& reaction,
+                 const SlipLimits& limits) noexcept;
+  // One excursion, about 8,000 instructions; true when the crossing stands.
   bool step() noexcept;
   bool done() const noexcept { return done_; }
-  const Ramp& ramp() const noexcept { return ramp_; }
+  const RampPoint& point() const noexcept { return point_; }
+  const Crossing& crossing() const noexcept { return crossing_; }
 
  private:
-  void next_rate() noexcept;
-
   RampPoint point_;
   Reaction reaction_;
   SlipLimits limits_;
-  double rate_N_per_s_ = 0.0;
-  int tried_ = 0;
-  bool nominal_holds_ = false;  // with the present rate
+  std::size_t tried_ = 0;
   bool done_ = true;
-  Ramp ramp_;
+  Crossing tries_, crossing_;
 };
 
 }  // namespace beltgrip::daemon

@@ -1,7 +1,5 @@
 #include "daemon/core/experiment/stop_of.h"
 
-#include "daemon/core/experiment/arming.h"
-
 namespace beltgrip::daemon {
 
 using estimator::StopReason;
@@ -20,8 +18,14 @@ Stop stop_of(SafetyVerdict verdict, double figure, double limit) noexcept {
       return {StopReason::kSlip, percent("slip since the start")};
     case SafetyVerdict::kSlipSpeed:
       return {StopReason::kSlip, in("slip speed", "m/s")};
-    case SafetyVerdict::kEnergy:
-      return {StopReason::kSlipEnergy, in("slip energy", "J")};
+    case SafetyVerdict::kSlipRate:
+      return {StopReason::kSlipRate,
+              {.what = "slip grows by",
+               .figure = kPercent * figure,
+               .limit = kPercent * limit,
+               .unit = "%/s"}};
+    case SafetyVerdict::kPower:
+      return {StopReason::kSlipEnergy, in("slip power for 0.6 s", "W")};
     case SafetyVerdict::kSpeed: {
       StopCause cause = in("falls to", "rad/s");
       cause.role = Role::kPrimarySpeed;
@@ -51,26 +55,34 @@ Stop stop_of(SafetyVerdict verdict, double figure, double limit) noexcept {
   }
 }
 
-Stop stop_of(std::uint32_t inhibits) noexcept {
-  if ((inhibits & inhibit_bit(Inhibit::kUnreachable)) != 0) {
-    return {StopReason::kForceFloor, {.what = "the force floor lies above the peak's force"}};
+Stop stop_of(std::uint32_t inhibits, const Obstacle& obstacle) noexcept {
+  const auto has = [inhibits](Inhibit which) { return (inhibits & inhibit_bit(which)) != 0; };
+  const auto numbered = [&obstacle](const char* what, const char* unit) {
+    return StopCause{
+        .what = what, .figure = obstacle.figure, .limit = obstacle.limit, .unit = unit};
+  };
+  if (has(Inhibit::kUnreachable)) {
+    return {StopReason::kForceFloor, numbered("the force floor lies above the peak's force", "N")};
   }
-  if ((inhibits & inhibit_bit(Inhibit::kGrip)) != 0) {
+  if (has(Inhibit::kGrip)) {
     return {StopReason::kSlip,
-            {.what = "friction has fallen: the own force hardly holds the belt"}};
+            numbered("friction has fallen: slip under the own force has grown by", "%")};
   }
-  if ((inhibits & inhibit_bit(Inhibit::kQuiet)) != 0) {
+  if (has(Inhibit::kQuiet)) {
     return {StopReason::kInputs,
             {.what = "moves too seldom to show that it stands still, and so does engine_speed",
              .role = Role::kPrimarySpeed}};
   }
-  if ((inhibits & inhibit_bit(Inhibit::kForce)) != 0) {
+  if (has(Inhibit::kForce)) {
     return {StopReason::kTime, {.what = "the controller's own force did not come to rest"}};
   }
-  if ((inhibits & inhibit_bit(Inhibit::kRamp)) != 0) {
-    return {StopReason::kTime, {.what = "no ramp keeps the slip limits in the worst case"}};
+  if (has(Inhibit::kRamp)) {
+    return {StopReason::kRoom,
+            {.what = "no crossing keeps the slip limits at a fall behind the peak of",
+             .figure = obstacle.figure,
+             .unit = "per percent of slip"}};
   }
-  return {StopReason::kTime, {.what = "the ramp would last longer than the coast-down"}};
+  return {StopReason::kTime, numbered("the ramp would last for", "s")};
 }
 
 Stop stop_of(const estimator::CurveEstimate& curve) noexcept {

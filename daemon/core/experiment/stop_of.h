@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "daemon/core/experiment/arming.h"
 #include "daemon/core/guard/safety_monitor.h"
 #include "daemon/core/input/stop_cause.h"
 #include "estimator/method/slip_curve_estimator.h"
@@ -13,7 +14,7 @@ namespace beltgrip::daemon {
 // an input's fault.
 Stop stop_of(SafetyVerdict verdict, double figure, double limit) noexcept;
 // Why an experiment was refused, by its inhibit_bit()s: what will not pass by itself first.
-Stop stop_of(std::uint32_t inhibits) noexcept;
+Stop stop_of(std::uint32_t inhibits, const Obstacle& obstacle) noexcept;
 // What the estimator saw when it stopped.
 Stop stop_of(const estimator::CurveEstimate& curve) noexcept;
 

@@ -11,7 +11,8 @@ constexpr Duration kDebounce = 10 * kMillisecond;
 constexpr Duration kEngineDebounce = 25 * kMillisecond;
 // A single sample's noise is as large as what is looked for.
 constexpr Duration kNearReference = 80 * kMillisecond;
-constexpr double kNearMean = 4e7;    // ns
+constexpr double kNearMean = 4e7;  // ns
+constexpr double kRateMean_s = 0.04;
 constexpr double kRounding_N = 1.0;  // requests are whole newtons on the wire
 constexpr double kSecondsPerTick = 1e-9;
 }  // namespace
@@ -57,9 +58,9 @@ SafetyVerdict SafetyMonitor::judge(MonoTime t, const SafetySignals& signals,
     begun_ = t;
     reference_ratio_ = signals.omega_s_rad_s / signals.omega_p_rad_s;
     first_request_N_ = last_request_N_ = request_N;
-    energy_J_ = near_sum_ = near_mean_ = 0.0;
+    near_sum_ = near_mean_ = slip_mean_ = slip_rate_1_s_ = 0.0;
     near_count_ = 0.0;
-    beyond_since_ = engine_beyond_since_ = kNever;
+    beyond_since_ = engine_beyond_since_ = power_since_ = kNever;
     reference_engine_ = signals.omega_e_rad_s / signals.omega_p_rad_s;
     return SafetyVerdict::kAllowed;
   }
@@ -108,12 +109,25 @@ SafetyVerdict SafetyMonitor::judge_motion(MonoTime t, const SafetySignals& signa
       return beyond(SafetyVerdict::kEngine, engine, limits_.engine_drift);
     }
   }
-  if (drift > limits_.slip_counted) {
-    energy_J_ += drift * std::abs(signals.torque_Nm) * signals.omega_p_rad_s *
-                 static_cast<double>(t - last_) * kSecondsPerTick;
+  if (slips_away(t, drift)) {
+    return beyond(SafetyVerdict::kSlipRate, slip_rate_1_s_, limits_.slip_rate_max_1_s);
   }
-  if (energy_J_ <= limits_.energy_max_J) return SafetyVerdict::kAllowed;
-  return beyond(SafetyVerdict::kEnergy, energy_J_, limits_.energy_max_J);
+  const double power_W = drift * std::abs(signals.torque_Nm) * signals.omega_p_rad_s;
+  if (power_W <= limits_.power_max_W) power_since_ = kNever;
+  if (power_W > limits_.power_max_W && power_since_ == kNever) power_since_ = t;
+  if (power_since_ == kNever || t - power_since_ < limits_.power_for) {
+    return SafetyVerdict::kAllowed;
+  }
+  return beyond(SafetyVerdict::kPower, power_W, limits_.power_max_W);
+}
+
+// The rate of a lag that follows the drift, through another.
+bool SafetyMonitor::slips_away(MonoTime t, double drift) noexcept {
+  const double share =
+      std::min(1.0, static_cast<double>(t - last_) * kSecondsPerTick / kRateMean_s);
+  slip_rate_1_s_ += share * ((drift - slip_mean_) / kRateMean_s - slip_rate_1_s_);
+  slip_mean_ += share * (drift - slip_mean_);
+  return drift > limits_.slip_rate_from && slip_rate_1_s_ > limits_.slip_rate_max_1_s;
 }
 
 SafetyVerdict SafetyMonitor::judge_request(MonoTime t, double request_N, double floor_N) noexcept {

@@ -13,7 +13,9 @@
 //   slip speed <= slip_speed_max
 //   engine speed over primary speed within engine_drift of what it was, but for less than 25 ms:
 //   macro slip shows in both, speeds of the pulleys that are old or wrong do not
-//   energy, |T| omega_p |drift| while the drift is beyond slip_counted, <= energy_max
+//   |drift| grows no faster than slip_rate_max, smoothed over 40 ms, beyond slip_rate_from
+//   power, |T| omega_p |drift|, <= power_max but for less than power_for: it cannot know where the
+//     peak of friction lies, and so not what slip beyond it costs
 //   the force asked for is >= floor, never rises, and falls no faster than rate_max
 //   it has stood no longer than duration_max, and begins no sooner than pause_min after the last
 // The first violation withdraws the permission until the request has ended; the pause then begins.
@@ -33,9 +35,11 @@ struct SafetyLimits {
   double slip_near = 0.0048;
   double slip_nearest = 0.0015;  // at the first force; in between along a line
   double force_near = 0.84;
-  double slip_counted = limits::kSlipCounted;
   double slip_speed_max_m_s = limits::kMonitorSlipSpeed_m_s;
-  double energy_max_J = limits::kMonitorEnergy_J;
+  double slip_rate_max_1_s = limits::kMonitorSlipRate_1_s;
+  double slip_rate_from = 0.02;
+  double power_max_W = limits::kMonitorPower_W;
+  Duration power_for = limits::kMonitorPowerFor;
   double engine_drift = 0.025;
   double speed_min_rad_s = 85.0;
   double rate_max_N_per_s = 300.0;
@@ -62,7 +66,8 @@ enum class SafetyVerdict : std::uint8_t {
   kSecondary,
   kSlip,
   kSlipSpeed,
-  kEnergy,
+  kSlipRate,
+  kPower,
   kEngine,
   kFloor,
   kRise,
@@ -89,6 +94,7 @@ class SafetyMonitor {
   }
   SafetyVerdict judge(MonoTime t, const SafetySignals& signals, double request_N) noexcept;
   SafetyVerdict judge_motion(MonoTime t, const SafetySignals& signals, double request_N) noexcept;
+  bool slips_away(MonoTime t, double drift) noexcept;
   bool slips_near_own_force(MonoTime t, double ratio, double request_N) noexcept;
   SafetyVerdict judge_request(MonoTime t, double request_N, double floor_N) noexcept;
   void end(MonoTime t) noexcept;
@@ -103,9 +109,10 @@ class SafetyMonitor {
   double reference_ratio_ = 0.0;
   double first_request_N_ = 0.0;
   double last_request_N_ = 0.0;
-  double energy_J_ = 0.0;
   static constexpr MonoTime kNever = std::numeric_limits<MonoTime>::max();
   MonoTime beyond_since_ = kNever;  // slip_debounced
+  MonoTime power_since_ = kNever;
+  double slip_mean_ = 0.0, slip_rate_1_s_ = 0.0;
   double near_count_ = 0.0;
   double near_sum_ = 0.0;          // of the first speed ratios
   double near_mean_ = 0.0;         // drift from their mean

@@ -111,6 +111,8 @@ struct ExperimentSettings {
   double primary_speed_min_rad_s = 105.0;
   double oil_temperature_min_degC = 40.0;
   double friction_expected = 0.11;  // mu_max that must be in reach
+  // The steepest fall of mu behind the peak that the first request of a belt must survive.
+  double fall_max_per_percent = 8e-3;
   double secondary_pressure_floor_Pa = 100e3;
   double actuator_dead_time_s = 0.06;
   double actuator_lag_s = 0.15;

@@ -163,8 +163,12 @@ constexpr Option kOptions[] = {
         "that is narrow enough."),
     number<&Config::estimator, &EstimatorSettings::ramp_rate_max_N_per_s>(
         "experiment", "ramp_rate_max_N_per_s", "N/s", 1.0, 10e3,
-        "The fastest ramp of the clamping force that is used or to be expected. The rate used is\n"
-        "the fastest up to this whose worst-case reaction stays inside the slip limits."),
+        "The fastest ramp of the clamping force that is used or to be expected: far from the peak\n"
+        "it is used, near the peak the ramp holds the rate of slip."),
+    number<&Config::experiment, &ExperimentSettings::fall_max_per_percent>(
+        "experiment", "fall_max_per_percent", "", 1e-4, 0.05,
+        "The steepest fall of friction behind its peak, of mu for each percent of slip, that the\n"
+        "first request of a belt must survive; later ones go by the fall that was seen."),
     number<&Config::experiment, &ExperimentSettings::torque_min_Nm>(
         "experiment", "torque_min_Nm", "Nm", 3.0, 50.0,
         "Least magnitude of the torque on the belt, triggers \"coast_down\" and \"steady\"."),

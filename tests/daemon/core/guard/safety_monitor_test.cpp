@@ -41,6 +41,13 @@ class Monitor : public testing::Test {
     }
   }
 
+  // Slip that grows to this drift at 5 % a second.
+  void slide(double to, double sign = 1.0) {
+    for (double drift = 0.0; drift < to; drift += 0.05 * 5e-3) {
+      ASSERT_EQ(sample(2500.0, sign * drift), SafetyVerdict::kAllowed) << drift;
+    }
+  }
+
   SafetyLimits limits_;
   SafetyMonitor monitor_{limits_};
   SafetySignals signals_{true, 140.0, 300.0, -30.0, 0.0784};
@@ -80,21 +87,23 @@ TEST_F(Monitor, SpeedAtItsMinimum) {
 
 TEST_F(Monitor, SlipAtOnceAndDebouncedInEitherDirection) {
   for (const double sign : {1.0, -1.0}) {
-    signals_.omega_p_rad_s = 100.0;  // slip speed stays inside
+    signals_.omega_p_rad_s = 95.0;  // slip speed stays inside
     SetUp();
     begin_and_lower();
-    EXPECT_EQ(sample(2500.0, sign * 0.0799), SafetyVerdict::kAllowed);
-    EXPECT_EQ(sample(2500.0, sign * 0.0801), SafetyVerdict::kSlip);
+    slide(0.074, sign);
+    EXPECT_EQ(sample(2500.0, sign * 0.0899), SafetyVerdict::kAllowed);
+    EXPECT_EQ(sample(2500.0, sign * 0.0901), SafetyVerdict::kSlip);
     SetUp();
     begin_and_lower();
+    slide(0.074, sign);
     for (int i = 0; i < 2; ++i) {
-      EXPECT_EQ(sample(2500.0, sign * 0.056), SafetyVerdict::kAllowed);
+      EXPECT_EQ(sample(2500.0, sign * 0.076), SafetyVerdict::kAllowed);
     }
-    EXPECT_EQ(sample(2500.0, sign * 0.054), SafetyVerdict::kAllowed);  // counts anew
+    EXPECT_EQ(sample(2500.0, sign * 0.074), SafetyVerdict::kAllowed);  // counts anew
     for (int i = 0; i < 2; ++i) {
-      EXPECT_EQ(sample(2500.0, sign * 0.056), SafetyVerdict::kAllowed);
+      EXPECT_EQ(sample(2500.0, sign * 0.076), SafetyVerdict::kAllowed);
     }
-    EXPECT_EQ(sample(2500.0, sign * 0.056), SafetyVerdict::kSlip);
+    EXPECT_EQ(sample(2500.0, sign * 0.076), SafetyVerdict::kSlip);
   }
 }
 
@@ -171,14 +180,30 @@ TEST_F(Monitor, EngineSpeedThatLeavesThePrimarys) {
   for (int i = 0; i < 20; ++i) EXPECT_EQ(sample(3000.0), SafetyVerdict::kAllowed);
 }
 
-TEST_F(Monitor, EnergyCountsBeyondTwoPercentOnly) {
+// 30 Nm * 140 rad/s * 6 % are 252 W.
+TEST_F(Monitor, PowerForLongerThanItMay) {
   begin_and_lower();
-  for (int i = 0; i < 2000; ++i) ASSERT_EQ(sample(2500.0, 0.0199), SafetyVerdict::kAllowed);
-  // 30 Nm * 140 rad/s * 4 % * 5 ms = 0.84 J a sample.
-  int samples = 0;
-  while (sample(2500.0, 0.04) == SafetyVerdict::kAllowed) ++samples;
-  EXPECT_EQ(samples, static_cast<int>(80.0 / 0.84));
-  EXPECT_EQ(sample(2500.0), SafetyVerdict::kEnergy);
+  slide(0.059);
+  for (int i = 0; i < 2000; ++i) ASSERT_EQ(sample(2500.0, 0.0595), SafetyVerdict::kAllowed);
+  for (int i = 0; i < 120; ++i) ASSERT_EQ(sample(2500.0, 0.06), SafetyVerdict::kAllowed) << i;
+  EXPECT_EQ(sample(2500.0, 0.0595), SafetyVerdict::kAllowed);  // counts anew
+  for (int i = 0; i < 120; ++i) ASSERT_EQ(sample(2500.0, 0.06), SafetyVerdict::kAllowed) << i;
+  EXPECT_EQ(sample(2500.0, 0.06), SafetyVerdict::kPower);
+}
+
+TEST_F(Monitor, SlipThatGrowsTooFast) {
+  const auto largest = [this](double rate_1_s) {
+    SetUp();
+    begin_and_lower();
+    SafetyVerdict last = SafetyVerdict::kAllowed;
+    for (double drift = 0.0; drift < 0.06 && last == SafetyVerdict::kAllowed;
+         drift += rate_1_s * 5e-3) {
+      last = sample(2500.0, drift);
+    }
+    return last;
+  };
+  EXPECT_EQ(largest(0.14), SafetyVerdict::kAllowed);
+  EXPECT_EQ(largest(0.17), SafetyVerdict::kSlipRate);
 }
 
 TEST_F(Monitor, FloorMovesWithTheSpeed) {

@@ -727,7 +727,8 @@ TEST_F(ConfigTest, DefaultsOfTheInterface) {
   EXPECT_EQ(config.estimator.excitation_threshold, 0.05);
   EXPECT_EQ(config.estimator.stop_slope, -1e-3);
   EXPECT_EQ(config.estimator.peak_slope, 1e-3);
-  EXPECT_EQ(config.estimator.ramp_rate_max_N_per_s, 300.0);
+  EXPECT_EQ(config.estimator.ramp_rate_max_N_per_s, 600.0);
+  EXPECT_EQ(config.experiment.fall_max_per_percent, 8e-3);
   EXPECT_EQ(config.estimator.method, estimator::Method::kRobust);
   EXPECT_EQ(config.trigger, Trigger::kCoastDown);
   EXPECT_EQ(config.control, Control::kObserve);

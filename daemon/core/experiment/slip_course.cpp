@@ -1,0 +1,73 @@
+#include "daemon/core/experiment/slip_course.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace beltgrip::daemon {
+
+namespace {
+constexpr double kSecondsPerTick = 1e-9;
+constexpr Duration kSlipMean = 15 * kMillisecond;
+constexpr double kWhole = 0.8;          // of kRateOver: a rate is known
+constexpr double kSquares = 100.0;      // half a second at 200 Hz
+constexpr double kSquaresLeast = 20.0;  // before these a deviation is not known
+}  // namespace
+
+void SlipCourse::begin(double ratio, double torque_Nm) noexcept {
+  start_ratio_ = ratio;
+  direction_ = -std::copysign(1.0, torque_Nm);
+  count_ = 0;
+  slip_ = slip_max_ = rate_1_s_ = square_ = squares_ = 0.0;
+}
+
+double SlipCourse::slip_at(double ratio) const noexcept {
+  return direction_ * (ratio / start_ratio_ - 1.0);
+}
+
+void SlipCourse::step(MonoTime t, double ratio) noexcept {
+  Point& newest = points_[count_++ % kPoints];
+  newest = {t, slip_at(ratio), 0.0};
+  double recent = 0.0, recent_n = 0.0, oldest_s = 0.0;
+  double n = 0.0, sum_t = 0.0, sum_x = 0.0, sum_tt = 0.0, sum_tx = 0.0;
+  for (std::size_t age = 0; age < std::min(count_, kPoints); ++age) {
+    const Duration before = t - point(age).t;
+    if (before > kRateOver) break;
+    const double at_s = -static_cast<double>(before) * kSecondsPerTick;
+    const double slip = point(age).slip;
+    oldest_s = at_s;
+    n += 1.0;
+    sum_t += at_s;
+    sum_x += slip;
+    sum_tt += at_s * at_s;
+    sum_tx += at_s * slip;
+    if (before > kSlipMean) continue;
+    recent += slip;
+    recent_n += 1.0;
+  }
+  slip_ = recent / recent_n;
+  slip_max_ = std::max(slip_max_, slip_);
+  const bool whole = -oldest_s > kWhole * static_cast<double>(kRateOver) * kSecondsPerTick;
+  rate_1_s_ = whole ? (n * sum_tx - sum_t * sum_x) / (n * sum_tt - sum_t * sum_t) : 0.0;
+  newest.rate_1_s = rate_1_s_;
+  if (whole) count_noise(t);
+}
+
+// The rate of the window before: noise apart, slip hardly changes its rate from one to the next.
+void SlipCourse::count_noise(MonoTime t) noexcept {
+  for (std::size_t age = 1; age < std::min(count_, kPoints); ++age) {
+    if (t - point(age).t <= kRateOver) continue;
+    if (point(age).rate_1_s == 0.0) return;
+    const double change = rate_1_s_ - point(age).rate_1_s;
+    squares_ = std::min(squares_ + 1.0, kSquares);
+    square_ += (change * change - square_) / squares_;
+    return;
+  }
+}
+
+double SlipCourse::rate_deviation_1_s() const noexcept {
+  if (squares_ < kSquaresLeast) return std::numeric_limits<double>::infinity();
+  return std::sqrt(0.5 * square_);
+}
+
+}  // namespace beltgrip::daemon
