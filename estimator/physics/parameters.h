@@ -54,6 +54,8 @@ struct EstimatorSettings {
   double ramp_rate_max_N_per_s = 600.0;
   // kConfidence: the 95 % interval of mu_max, as a share of it, at which the experiment ends.
   double confidence_width = 0.15;
+  // method "robust": share of mu_max that half of its 95 % interval by noise may be for a value.
+  double value_width = 0.05;
   // method "paper" only
   double lowpass_hz = 5.0;
   double window_s = 1.0;               // T

@@ -163,8 +163,18 @@ bool PeakFit::step() noexcept {
       return false;
     case Stage::kResult:
       finish();
-      go_to(result_.valid ? Stage::kHealthSums : Stage::kIdle);
-      return stage_ == Stage::kIdle;
+      go_to(result_.valid ? Stage::kEndSlope : Stage::kIdle);
+      if (stage_ == Stage::kIdle) return true;
+      next_ = first_;
+      end_slope_.begin(slip_high_, record_->torque().slow_variance(), record_->torque_line(),
+                       record_->force_line());
+      return false;
+    case Stage::kEndSlope:
+      find_end_slope();
+      return false;
+    case Stage::kEndSpread:
+      find_end_spread();
+      return false;
     case Stage::kHealthSums:
       sum_for_health();
       go_to(Stage::kChords);
@@ -293,6 +303,7 @@ void PeakFit::add_point(std::size_t begin, std::size_t end) noexcept {
     const double speed_1 = speed_at_edge(end, t_1, weight_1);
     const double span_s = std::max(1e-3, t_1 - t_0);
     torque -= inertia_ * (speed_1 - speed_0) / span_s;
+    point.inertia_per_s = inertia_ / span_s;
     point.speed_variance_begin = record_->omega_noise() / weight_0;
     point.speed_variance_end = record_->omega_noise() / weight_1;
     variance += square(inertia_ / span_s) * (point.speed_variance_begin + point.speed_variance_end);
@@ -668,6 +679,43 @@ bool PeakFit::came_after() const noexcept {
   }
   return before.time_s > 0.0 && beyond.time_s > 0.0 && beyond.mean() > before.mean() &&
          last.mean() > result_.slip;
+}
+
+EndPoint PeakFit::end_point(const Point& point) const noexcept {
+  const double mu_per_Nm = c_ / point.force_N;
+  const double speed_gain = mu_per_Nm * point.inertia_per_s;
+  const double speeds =
+      square(speed_gain) * (point.speed_variance_begin + point.speed_variance_end);
+  return {.t_s = point.t_s,
+          .slip_percent = point.slip,
+          .mu = point.mu,
+          .weight = 1.0 / point.variance,
+          .own_variance = std::max(0.0, point.variance - speeds) + point.force_variance,
+          .mu_per_Nm = mu_per_Nm,
+          .slow_share = 1.0 - point.held_share,
+          .speed_gain = speed_gain,
+          .begin_speed_variance = point.speed_variance_begin,
+          .end_speed_variance = point.speed_variance_end};
+}
+
+void PeakFit::find_end_slope() noexcept {
+  const std::size_t end = std::min(point_count_, next_ + kPointsPerStep);
+  for (; next_ < end; ++next_) end_slope_.collect(end_point(points_[next_]));
+  if (next_ < point_count_) return;
+  end_slope_.solve();
+  go_to(Stage::kEndSpread);
+  next_ = first_;
+}
+
+void PeakFit::find_end_spread() noexcept {
+  const std::size_t end = std::min(point_count_, next_ + kPointsPerStep);
+  for (; next_ < end; ++next_) end_slope_.spread(end_point(points_[next_]));
+  if (next_ < point_count_) return;
+  result_.end_slope_valid = end_slope_.valid();
+  result_.end_slope = end_slope_.slope();
+  result_.end_slope_variance = end_slope_.variance();
+  result_.end_slip = slip_high_;
+  go_to(Stage::kHealthSums);
 }
 
 // Where the clamp force has come to a stand, the load alone moves slip and mu* to and fro, by less

@@ -19,6 +19,7 @@
 
 #include "estimator/record/experiment_record.h"
 #include "estimator/robust/curve_health.h"
+#include "estimator/robust/end_slope.h"
 
 namespace beltgrip::estimator {
 
@@ -43,6 +44,10 @@ struct PeakFitResult {
   double reached = 0.0;
   double reached_deviation = 0.0;
   double reached_slip = 0.0;
+  // Of the curve at the end of the data, 1/percent, for what it may still rise.
+  bool end_slope_valid = false;
+  double end_slope = 0.0, end_slope_variance = 0.0;
+  double end_slip = 0.0;
   // Do the points lie on one curve? In deviations (curve_health.h).
   double below_chord = 0.0;
   ResidualTests residuals;
@@ -66,6 +71,7 @@ class PeakFit {
     double held_share;
     double torque_Nm;             // that the belt carries
     double torque_variance;       // of it, without
+    double inertia_per_s;         // J over the time between its ends
     double speed_variance_begin;  // that of the speeds at its ends, which the neighbour shares
     double speed_variance_end;
   };
@@ -84,6 +90,8 @@ class PeakFit {
     kForms,
     kAverage,
     kResult,
+    kEndSlope,
+    kEndSpread,
     kHealthSums,
     kChords,
     kResiduals
@@ -129,6 +137,9 @@ class PeakFit {
   void solve(double corner, bool has_corner) noexcept;
   void average() noexcept;
   void finish() noexcept;
+  EndPoint end_point(const Point& point) const noexcept;
+  void find_end_slope() noexcept;
+  void find_end_spread() noexcept;
   double tested_until_s() const noexcept;
   void sum_for_health() noexcept;
   void test_best_form() noexcept;
@@ -164,6 +175,7 @@ class PeakFit {
   Average average_;
   std::vector<Form> forms_;
   std::size_t form_count_ = 0;
+  EndSlope end_slope_;
   std::vector<CurveSums> health_sums_;
   std::size_t health_count_ = 0;
   Rise best_rise_;

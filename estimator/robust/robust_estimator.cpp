@@ -14,8 +14,10 @@
 #include "estimator/robust/force_step.h"
 #include "estimator/robust/peak_fit.h"
 #include "estimator/robust/peak_forecast.h"
+#include "estimator/robust/thresholds.h"
 #include "estimator/signal/excitation.h"
 #include "estimator/signal/signal_chain.h"
+#include "estimator/signal/slow_noise.h"
 #include "estimator/statistics/interval.h"
 
 namespace beltgrip::estimator {
@@ -23,12 +25,8 @@ namespace {
 
 constexpr double kPublished_hz = 8.0;  // low-pass of the published mu* and slip only
 constexpr double kExcitationWindow_s = 1.0;
-// Probability that the data contain the peak: with a stop by the slope, and with any other end.
-// Peaks lie at 1 to 4 percent of slip: beyond the usual, a curve that is level within its noise
-// rather rises on, by a factor e of the odds for each percent.
-constexpr double kInsideAfterStop = 0.5;
+// Probability that the data contain the peak, with another end than a stop by the slope.
 constexpr double kInsideWithoutStop = 0.9;
-constexpr double kUsualPeak_percent = 2.5;
 constexpr double kFallDeviations = 3.0;  // by which mu* must then have fallen
 constexpr double kFormDeviation = 5e-4;  // of mu: what the forms of the fit leave
 constexpr int kNarrowInARow = 4;
@@ -38,19 +36,12 @@ constexpr double kLowered = 0.99;  // the clamp force
 // A jump of the reading by more is looked at: of a speed and of the torque, relative; of noise.
 constexpr double kGlitchSlip = 0.005, kGlitchTorque = 0.2, kGlitchDeviations = 5.0;
 constexpr double kNoiseKnown_s = 1.0;
-constexpr double kWidestStd = 0.3;         // of mu: wider is no value
 constexpr double kFittedDeviations = 2.6;  // by which the fit's top is lowered for a bound
 constexpr double kChordDeviations = 5.5;   // beyond these the points lie on no one curve
 constexpr double kInnovation = 5.0;
 constexpr double kRuns = 4.5;
 constexpr double kSlipOfATop_percent = 1.5;  // less of it is that of a belt that grips
 constexpr double kBoundDeviations = 2.33;    // 99 %, one-sided
-
-double inside_needed(double slip_percent) {
-  constexpr double kOdds = kInsideAfterStop / (1.0 - kInsideAfterStop);
-  const double odds = kOdds * std::exp(std::max(0.0, slip_percent - kUsualPeak_percent));
-  return odds / (1.0 + odds);
-}
 
 class RobustEstimator final : public SlipCurveEstimator {
  public:
@@ -60,6 +51,7 @@ class RobustEstimator final : public SlipCurveEstimator {
         accuracies_(accuracies),
         sample_rate_hz_(settings.sample_rate_hz),
         reading_reach_(settings.reading_reach),
+        value_width_(settings.value_width),
         confidence_width_(settings.stop_rule == StopRule::kConfidence ? settings.confidence_width
                                                                       : 0.0),
         inertia_kg_m2_(settings.torque_is_engine ? variator.primary_inertia_kg_m2 : 0.0),
@@ -259,6 +251,19 @@ class RobustEstimator final : public SlipCurveEstimator {
            omega_s_.verdict() == ReadingVerdict::kFrozen;
   }
 
+  // What the curve may still rise by beyond the data, in terms of its slope at their end.
+  static double further_rise(const PeakFitResult& fit) noexcept {
+    if (fit.inside >= kTurnedDown) return 0.0;
+    if (!fit.end_slope_valid) return kUnknownRise * fit.mu;
+    const double slope = fit.end_slope + kRiseDeviations * std::sqrt(fit.end_slope_variance);
+    return kRiseShare * std::max(0.0, slope) * fit.end_slip;
+  }
+
+  // A value is an interval that is narrow enough, whether friction turned down or lies level.
+  bool is_value(double mu, double noise_low, double noise_high) const noexcept {
+    return 0.5 * (noise_high - noise_low) <= value_width_ * mu;
+  }
+
   // What the curve so far says of its top, with the sensors' constant errors; enough for a stop?
   void expect() noexcept {
     const Forecast& forecast = peak_forecast_.forecast();
@@ -278,7 +283,9 @@ class RobustEstimator final : public SlipCurveEstimator {
     out_.mu_max_low = mu - std::hypot(mu - forecast.low, common);
     out_.mu_max_high = mu + std::hypot(forecast.high - mu, common);
     // A single narrow interval may be a matter of luck.
-    narrow_ = out_.mu_max_high - out_.mu_max_low < confidence_width_ * mu ? narrow_ + 1 : 0;
+    const bool narrow = out_.mu_max_high - out_.mu_max_low < confidence_width_ * mu &&
+                        is_value(mu, expected_noise_low_, expected_noise_high_);
+    narrow_ = narrow ? narrow_ + 1 : 0;
     if (out_.stop == StopReason::kNone && narrow_ >= kNarrowInARow) {
       out_.stop = StopReason::kConfidence;
     }
@@ -329,6 +336,16 @@ class RobustEstimator final : public SlipCurveEstimator {
     return relative + kFormDeviation * kFormDeviation;
   }
 
+  // Variance of mu by the torque's slow error, which the readings near the top share: white noise
+  // tells over how long a time the fit takes its mean there.
+  double slow_variance(const PeakFitResult& fit) const noexcept {
+    const double per_Nm = traction_ / record_.force_line().at(fit.t_s);  // of mu
+    const double white = record_.torque_noise() * per_Nm * per_Nm;
+    const double mean_s =
+        fit.variance > 0.0 ? std::min(fit.duration_s, white / fit.variance) : fit.duration_s;
+    return record_.torque().slow_variance() * per_Nm * per_Nm * slow_variance_of_mean(mean_s);
+  }
+
   // And of those errors.
   double sensor_variance(double mu, double F) const noexcept {
     const double sensors =
@@ -346,11 +363,9 @@ class RobustEstimator final : public SlipCurveEstimator {
     const PeakFitResult& fit = fit_.result();
     peak_ = {};
     // Torque that fades is no friction that falls.
-    const bool seen = out_.stop == StopReason::kSlope
-                          ? fit.inside >= inside_needed(fit.slip)
-                          : out_.stop != StopReason::kTorque && fit.inside >= kInsideWithoutStop &&
-                                fit.passed &&
-                                fit.fall > kFallDeviations * std::sqrt(fit.fall_variance);
+    const bool seen = out_.stop == StopReason::kSlope ||
+                      (out_.stop != StopReason::kTorque && fit.inside >= kInsideWithoutStop &&
+                       fit.passed && fit.fall > kFallDeviations * std::sqrt(fit.fall_variance));
     peak_.samples = std::lround(fit.duration_s * sample_rate_hz_);
     peak_.contradictory = contradictory(fit);
     if (peak_.contradictory) {
@@ -364,17 +379,19 @@ class RobustEstimator final : public SlipCurveEstimator {
     }
     const double F = record_.force_line().at(fit.t_s);
     const double square = fit.mu * fit.mu;
-    const double noise_variance = fit.variance + square * alike_variance(fit.t_s, fit.held_share);
-    const double std = std::sqrt(noise_variance + square * sensor_variance(fit.mu, F));
-    if (fit.valid && seen && std < kWidestStd * reading_reach_ * fit.mu) {
+    const double noise_variance =
+        fit.variance + square * alike_variance(fit.t_s, fit.held_share) + slow_variance(fit);
+    const double noise = kNormal95 * std::max(std::sqrt(noise_variance), kSmallestStd);
+    const double low = fit.mu - noise, high = fit.mu + std::hypot(noise, further_rise(fit));
+    if (fit.valid && seen && is_value(fit.mu, low, high)) {
+      const double sensors = kNormal95 * fit.mu * std::sqrt(sensor_variance(fit.mu, F));
       peak_.kind = PeakKind::kValue;
       peak_.mu_max = fit.mu;
-      peak_.mu_max_std = std::max(std, kSmallestStd);
-      peak_.ci95_low = fit.mu - kNormal95 * peak_.mu_max_std;
-      peak_.ci95_high = fit.mu + kNormal95 * peak_.mu_max_std;
-      const double noise = std::max(std::sqrt(noise_variance), kSmallestStd);
-      peak_.noise_low = fit.mu - kNormal95 * noise;
-      peak_.noise_high = fit.mu + kNormal95 * noise;
+      peak_.noise_low = low;
+      peak_.noise_high = high;
+      peak_.ci95_low = fit.mu - std::hypot(fit.mu - low, sensors);
+      peak_.ci95_high = fit.mu + std::hypot(high - fit.mu, sensors);
+      peak_.mu_max_std = (peak_.ci95_high - peak_.ci95_low) / (2.0 * kNormal95);
       peak_.clamp_force_N = F;
       peak_.omega_s_rad_s = omega_s_at(fit.t_s);
       peak_.sigma_peak_percent = fit.slip;
@@ -417,6 +434,7 @@ class RobustEstimator final : public SlipCurveEstimator {
   SensorAccuracies accuracies_;
   double sample_rate_hz_;
   double reading_reach_;
+  double value_width_;
   double confidence_width_;  // 0: never
   double inertia_kg_m2_;
   SignalChain chain_;

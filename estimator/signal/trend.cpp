@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/signal/slow_noise.h"
+
 namespace beltgrip::estimator {
 namespace {
 
@@ -15,7 +17,10 @@ constexpr double kEnough = 6.0;             // squares before a scale is believe
 constexpr double kLargestSquare = 9.0;      // of their mean
 constexpr int kCuts = 6;
 constexpr double kSettled = 0.99;
-constexpr int kLowestBin = -30;  // of the squares, by powers of two
+constexpr int kLowestBin = -30;             // of the squares, by powers of two
+constexpr double kWhite_s = 0.2;            // longer means scatter by the slow error too
+constexpr std::size_t kFirstSlowScale = 3;  // of 0.4 s
+constexpr double kMedianOfSquare = 0.455;   // of a normal variable with variance 1
 constexpr double kUnbounded = 1e100;
 
 }  // namespace
@@ -97,6 +102,17 @@ void Trend::Scale::take(double square) noexcept {
   }
 }
 
+// The load that is taken up makes some squares large; half of them know nothing of it.
+double Trend::Scale::median_square() const noexcept {
+  double so_far = 0.0;
+  for (int k = first_bin; k <= last_bin; ++k) {
+    const Bin& each = bins[static_cast<std::size_t>(k)];
+    so_far += each.count;
+    if (so_far >= 0.5 * squares_count && each.count > 0.0) return each.sum / each.count;
+  }
+  return 0.0;
+}
+
 double Trend::density(double over_s) const noexcept {
   double largest = 0.0;
   for (int i = 0; i < kScales; ++i) {
@@ -106,6 +122,18 @@ double Trend::density(double over_s) const noexcept {
     largest = std::max(largest, scale.mean_square * length_s);
   }
   return largest;
+}
+
+double Trend::slow_variance() const noexcept {
+  std::array<Scatter, kScales> scatter;
+  std::size_t count = 0;
+  for (std::size_t i = kFirstSlowScale; i < kScales; ++i) {
+    if (scales_[i].squares_count < kEnough) break;
+    const double length_s = cell_s_ * static_cast<double>(std::size_t{1} << i);
+    scatter[count++] = {length_s, scales_[i].median_square() / kMedianOfSquare,
+                        scales_[i].squares_count};
+  }
+  return estimator::slow_variance({scatter.data(), count}, density(kWhite_s));
 }
 
 double Trend::squares(double over_s) const noexcept {

@@ -46,6 +46,8 @@ class Trend {
   double density(double over_s) const noexcept;
   // How many differences of means over this time have been seen.
   double squares(double over_s) const noexcept;
+  // Variance of the error that readings close in time share (slow_noise.h).
+  double slow_variance() const noexcept;
   double cell_s() const noexcept { return cell_s_; }
   // The longest line that ends now. Not valid before a few cells have come.
   Line line() const noexcept;
@@ -68,6 +70,7 @@ class Trend {
     std::array<Bin, 64> bins{};  // squares by their power of two
     int first_bin = 0, last_bin = 0;
     void take(double square) noexcept;
+    double median_square() const noexcept;
   };
   static constexpr int kScales = 9;  // up to 256 cells
   void add(double t_s, double value, double slip_percent) noexcept;

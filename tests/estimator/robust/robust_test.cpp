@@ -184,6 +184,44 @@ TEST(Robust, ARisingCurveGivesALowerBound) {
   }
 }
 
+double plateau(double slip) { return 0.105 * (1.0 - std::exp(-3.0 * slip)); }
+
+TEST(Robust, APlateauIsAValue) {
+  // Level within 0.1 % from 2.3 % of slip on: nothing turns down, and nothing is left to come.
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Outcome out = run({.friction = plateau, .seed = seed});
+    EXPECT_EQ(out.stop, StopReason::kSlope) << seed;
+    ASSERT_EQ(out.peak.kind, PeakKind::kValue) << seed;
+    EXPECT_NEAR(out.peak.mu_max, 0.105, 0.01 * 0.105) << seed;
+    EXPECT_LT(out.peak.noise_low, 0.105) << seed;
+    EXPECT_GT(out.peak.noise_high, 0.105) << seed;
+  }
+}
+
+TEST(Robust, AnIntervalThatIsTooWideIsALowerBound) {
+  const Rig rig = {.friction = test::round_peak(0.105, 2.5), .noise = 3.0};
+  const Outcome value = run(rig);
+  ASSERT_EQ(value.peak.kind, PeakKind::kValue);
+  const double half = 0.5 * (value.peak.noise_high - value.peak.noise_low) / value.peak.mu_max;
+  EstimatorSettings settings = rig_settings(rig);
+  ASSERT_LT(half, settings.value_width);
+  settings.value_width = 0.9 * half;
+  const Outcome bound = run(*make_slip_curve_estimator(settings, {}, {}), rig_trace(rig));
+  ASSERT_EQ(bound.peak.kind, PeakKind::kLowerBound);
+  EXPECT_LT(bound.peak.mu_max, 0.105);
+}
+
+TEST(Robust, WhereFrictionRisesOnTheUpperEndOfTheIntervalIsOpen) {
+  // Three quarters of the rise come with the first percent, the rest evenly up to 10 %.
+  const auto rising = [](double slip) { return 0.09 * std::tanh(1.5 * slip) + 0.0012 * slip; };
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Outcome out = run({.friction = rising, .seed = seed});
+    ASSERT_EQ(out.peak.kind, PeakKind::kValue) << seed;
+    EXPECT_GT(out.peak.noise_high - out.peak.mu_max, 2.0 * (out.peak.mu_max - out.peak.noise_low))
+        << seed;
+  }
+}
+
 TEST(Robust, TheDeformationBranchIsNotThePeak) {
   // 3 % of the ratio at the begin: sigma* falls by one percent while mu* rises, until the belt's
   // own slip takes over. The ramp ends before the peak.
@@ -269,6 +307,7 @@ TEST(Robust, StopsWithConfidenceBeforeThePeak) {
     EstimatorSettings settings = rig_settings(rig);
     settings.stop_rule = StopRule::kConfidence;
     settings.confidence_width = 0.15;
+    settings.value_width = 0.075;
     const auto estimator = make_slip_curve_estimator(settings, {}, {});
     const Outcome out = run(*estimator, rig_trace(rig));
     EXPECT_EQ(out.stop, StopReason::kConfidence) << seed;

@@ -137,6 +137,10 @@ constexpr Option kOptions[] = {
     number<&Config::estimator, &EstimatorSettings::peak_slope>(
         "estimator", "peak_slope", "1/percent", 0.0, 1.0,
         "c_m, slope magnitude that counts as the peak, method \"paper\"."),
+    number<&Config::estimator, &EstimatorSettings::value_width>(
+        "estimator", "value_width", "", 0.005, 0.5,
+        "Share of mu_max that half of its 95 % interval by noise may be for a value; wider, the\n"
+        "result is a lower bound. Method \"robust\"."),
 
     choice<&Config::trigger>(
         "experiment", "trigger", kTriggers,
@@ -160,7 +164,8 @@ constexpr Option kOptions[] = {
     number<&Config::estimator, &EstimatorSettings::confidence_width>(
         "experiment", "confidence_width", "", 0.005, 1.0,
         "With stop = \"confidence\": width of the 95 % interval of mu_max, as a share of mu_max,\n"
-        "that is narrow enough."),
+        "that is narrow enough; half of its part by noise is within estimator.value_width as "
+        "well."),
     number<&Config::estimator, &EstimatorSettings::ramp_rate_max_N_per_s>(
         "experiment", "ramp_rate_max_N_per_s", "N/s", 1.0, 10e3,
         "The fastest ramp of the clamping force that is used or to be expected: far from the peak\n"

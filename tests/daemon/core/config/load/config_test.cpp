@@ -727,6 +727,7 @@ TEST_F(ConfigTest, DefaultsOfTheInterface) {
   EXPECT_EQ(config.estimator.excitation_threshold, 0.05);
   EXPECT_EQ(config.estimator.stop_slope, -1e-3);
   EXPECT_EQ(config.estimator.peak_slope, 1e-3);
+  EXPECT_EQ(config.estimator.value_width, 0.05);
   EXPECT_EQ(config.estimator.ramp_rate_max_N_per_s, 600.0);
   EXPECT_EQ(config.experiment.fall_max_per_percent, 8e-3);
   EXPECT_EQ(config.estimator.method, estimator::Method::kRobust);
