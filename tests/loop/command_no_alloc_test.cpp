@@ -61,7 +61,7 @@ TEST(CommandNoAlloc, WhateverEndsIt) {
         sim::FaultKind::kTcuIgnores, sim::FaultKind::kFrameSilent, sim::FaultKind::kFrameTruncated,
         sim::FaultKind::kBusOff, sim::FaultKind::kForeignFrames, sim::FaultKind::kEchoLost}) {
     sim::VehicleScenario scenario = sim::shipped_vehicle_scenario("coast-overdrive").scenario;
-    scenario.duration_s = 14.0;
+    scenario.duration_s = 20.0;  // the request waits until 13 s
     scenario.faults.push_back({kind, "", 3.0, true, 3.0, 1.0});
     const std::set<State> states = expect_no_allocation(scenario);
     EXPECT_TRUE(states.contains(State::kReleasing)) << static_cast<int>(kind);

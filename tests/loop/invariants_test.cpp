@@ -115,7 +115,7 @@ TEST(Invariants, EachIsFoundAlone) {
       {"I1", [](Player::Sample& s) { s.report.state = State::kIdle; }},
       {"I1", [](Player::Sample& s) { s.frames[0].data[2] = 0; }},
       {"I2", [](Player::Sample& s) { s.report.request_force_N += 1.0; }},
-      {"I2", [](Player::Sample& s) { s.report.request_force_N -= 2.0; }},
+      {"I2", [](Player::Sample& s) { s.report.request_force_N -= 4.0; }},
       {"I2", [](Player::Sample& s) { s.report.request_force_N = 400.0; }},
       {"I3", [](Player::Sample& s) { s.report.faults = fault_bit(Fault::kInputStale); }},
       {"I3", [](Player::Sample& s) { s.report.faults = fault_bit(Fault::kForeignSender); }},

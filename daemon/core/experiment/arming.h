@@ -85,9 +85,9 @@ struct Conditions {
 };
 
 // Slip of the last experiment with a value since the start of the daemon, under the controller's
-// own force and at the peak. The law of that force knows nothing of friction: where the belt slips
-// more under it than it did, friction has fallen. A request ends in that force, which then must
-// still hold the belt.
+// own force and at the peak; before the first value, of the first that was let go for its slip. The
+// law of that force knows nothing of friction: where the belt slips more under it than it did,
+// friction has fallen. A request ends in that force, which then must still hold the belt.
 struct SlipShown {
   double own_percent = 0.0;
   double peak_percent = 0.0;  // 0: there was none

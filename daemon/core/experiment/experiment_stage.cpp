@@ -413,6 +413,13 @@ Stop ExperimentStage::abort_of(StopReason reason, const Now& now) const noexcept
 
 // --- its result ---------------------------------------------------------------------------------
 
+bool ExperimentStage::stopped_by_slip() const noexcept {
+  const StopReason reason = running_.stop_reason;
+  return running_.stopped && (reason == StopReason::kSlope || reason == StopReason::kSlip ||
+                              reason == StopReason::kSlipRate ||
+                              reason == StopReason::kSlipEnergy || reason == StopReason::kRoom);
+}
+
 EndedExperiment ExperimentStage::ended() const noexcept {
   const StopReason reason = running_.stop_reason;
   EndedExperiment ended;
@@ -421,10 +428,7 @@ EndedExperiment ExperimentStage::ended() const noexcept {
   ended.duration = running_.end - running_.start;
   ended.ramped = !refused_;
   ended.passed_a_peak = !commands() || !(request_.slip_max() < kSlipOfAPeak);
-  ended.ended_by_slip =
-      running_.stopped && (reason == StopReason::kSlope || reason == StopReason::kSlip ||
-                           reason == StopReason::kSlipRate || reason == StopReason::kSlipEnergy ||
-                           reason == StopReason::kRoom);
+  ended.ended_by_slip = stopped_by_slip();
   ended.may_have_slipped = running_.stopped && reason == StopReason::kInputs &&
                            running_.sigma_stop_percent - sigma_first_percent_ > kSlipped_percent;
   ended.mu_star_most = mu_star_most_;
@@ -454,9 +458,13 @@ void ExperimentStage::conclude(const estimator::PeakEstimate& peak, double senso
   const bool is_value = peak.kind == PeakKind::kValue;
   keep_result(is_value ? Outcome::kCompleted : Outcome::kInconclusive);
   result_.slipped = slipped;
-  if (commands() && is_value) {
-    shown(running_.direction, running_.end_stop) = {slip_own_percent_, peak.sigma_peak_percent,
-                                                    fall_seen(peak)};
+  if (!commands()) return;
+  SlipShown& shown_here = shown(running_.direction, running_.end_stop);
+  // Without a value, what was let go for its slip came at least that far up.
+  const bool first_seen =
+      shown_here.peak_percent <= 0.0 && stopped_by_slip() && peak.kind != PeakKind::kNone;
+  if (is_value || first_seen) {
+    shown_here = {slip_own_percent_, peak.sigma_peak_percent, fall_seen(peak)};
   }
 }
 

@@ -82,6 +82,7 @@ class ExperimentStage {
   const ExperimentResult& result() const noexcept { return result_; }
   bool new_result() const noexcept { return new_result_; }  // with this sample
   std::uint32_t inhibits() const noexcept { return by_conditions() ? arming_.inhibits() : 0U; }
+  bool stopped_by_slip() const noexcept;
   EndedExperiment ended() const noexcept;
 
   void go_on_from(const ExperimentStage& before, bool keeps_results) noexcept;
