@@ -12,7 +12,9 @@ class AnswerLag {
   void begin(MonoTime t, double configured_s) noexcept;
   // The request's rate of fall, and how far the reading lies above it.
   void step(MonoTime t, double rate_N_per_s, double behind_N) noexcept;
-  // Surely at least that; 0: nothing is known yet.
+  // At least that; 0: nothing is known yet. While the answer to a step of the rate is under way it
+  // may be more than the truth, for the rate is put late by a lag alone: of the configured actuator
+  // up to 1.25 times where a third of its answer is dead time, 1.5 times where all of it is.
   double least_s() const noexcept;
 
  private:

@@ -11,7 +11,7 @@ constexpr double kSecondsPerTick = 1e-9;
 // Chosen: of a torque with 0.7 % of noise 0.15 % are left, and the mean is 70 ms late.
 constexpr double kMean = 3.5e7;     // ns, each of two lags
 constexpr double kRises = 1.0015;   // of the best before: more than the mean's noise
-constexpr double kForgets = 0.006;  // so much more friction, and nothing counts any more
+constexpr double kForgets = 0.006;  // a single rise by so much forgets all, a smaller one its share
 }  // namespace
 
 void SlipDamage::begin(MonoTime t, double mu_star) noexcept {

@@ -1,7 +1,7 @@
 // What slip beyond the peak of friction does to the belt. Where the peak lies is not known before:
-// slip counts as beyond it while friction is not above its best before, and all that was counted is
-// forgotten when it rises again. Slip before the peak is what every such belt does all day. SI;
-// slip as a fraction. Real-time thread.
+// slip counts as beyond it while friction is not above its best before, and what was counted is
+// forgotten as it rises again: a quarter by every 0.15 %. Slip before the peak is what every such
+// belt does all day. SI; slip as a fraction. Real-time thread.
 #pragma once
 
 #include "daemon/core/base/mono_time.h"
@@ -21,8 +21,9 @@ class SlipDamage {
   void begin(MonoTime t, double mu_star) noexcept;
   void step(const Now& now) noexcept;
 
-  // Since friction rose last.
-  bool beyond() const noexcept { return beyond_s_ > 0.0; }  // its peak, as it seems
+  // Since friction rose last: its peak, as it seems.
+  bool beyond() const noexcept { return beyond_s_ > 0.0; }
+  // And what is not forgotten of before.
   double energy_J() const noexcept { return energy_J_; }
   double fast_s() const noexcept { return fast_s_; }  // faster than kRequestFast_m_s
   double slip_at_best() const noexcept { return slip_at_best_; }
