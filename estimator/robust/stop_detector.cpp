@@ -99,28 +99,29 @@ StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
   // Slip around the window's begin and over its last quarter.
   const std::size_t quarter = std::max<std::size_t>(1, cells / 4);
   const double per_quarter = 1.0 / static_cast<double>(quarter);
-  double s_1 = 0.0, s_2 = 0.0, force_before = 0.0, force_after = 0.0;
+  double s_1 = 0.0, s_2 = 0.0;
   for (std::size_t i = 0; i < quarter; ++i) {
-    const Cell& begin = history.cell(level, cells - quarter / 2 + i);
-    s_1 += begin.slip_percent * per_quarter;
-    force_before += begin.clamp_force_N * per_quarter;
+    s_1 += history.cell(level, cells - quarter / 2 + i).slip_percent * per_quarter;
     s_2 += history.cell(level, i).slip_percent * per_quarter;
-    force_after += record.clamp_force_N(history.cell(level, i)) * per_quarter;
   }
   out.gained = s_2 - s_1;
-  const double gained_variance = 2.0 * record.slip_noise() * per_quarter / cell_s;
+  if (out.gained < limits_.smallest_gain_percent) return out;  // most windows: no more is needed
+  double force_before = 0.0, force_after = 0.0;
+  for (std::size_t i = 0; i < quarter; ++i) {
+    force_before += history.cell(level, cells - quarter / 2 + i).clamp_force_N * per_quarter;
+    force_after += record.clamp_force_N(history.cell(level, i)) * per_quarter;
+  }
   const double deformation =
       limits_.deformation_percent_per_N * std::abs(force_before - force_after);
+  if (out.gained < limits_.smallest_gain_percent + deformation) return out;
   // In a Gaussian's far tail: twice the logarithm of how much less often the window is a new one.
   // While the noise itself is known from few data, Student's tail is as much longer (Wallace).
+  const double gained_variance = 2.0 * record.slip_noise() * per_quarter / cell_s;
   const double freedom = std::max(1.0, record.slip_noise_freedom());
   const double normal_squared =
       square(limits_.gain_deviations) - 2.0 * std::log(W / kShortestWindow_s);
   const double gain_deviations_squared = freedom * std::expm1(normal_squared / freedom);
-  if (out.gained < limits_.smallest_gain_percent + deformation ||
-      square(out.gained) < gain_deviations_squared * gained_variance) {
-    return out;
-  }
+  if (square(out.gained) < gain_deviations_squared * gained_variance) return out;
 
   // What was before: torque and its turn over as long a time as the window, speed's slope.
   const Cell& begin = history.cell(level, cells);

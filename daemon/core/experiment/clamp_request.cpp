@@ -68,7 +68,7 @@ void ClampRequest::begin(const Now& now, const RequestPlan& plan, double floor_N
   damage_.begin(now.t, std::abs(now.mu_star));
   lag_.begin(now.t, answer_s());
   asked_count_ = 1;
-  asked_[0] = {now.t, force_N_};
+  asked_[0] = {now.t, force_N_, 0.0};
 }
 
 double ClampRequest::power_W(const Now& now) const noexcept {
@@ -266,7 +266,11 @@ void ClampRequest::lower(const Now& now, double floor_N) noexcept {
   force_N_ =
       std::max(force_N_ - wanted_N_per_s * step_s, std::min(force_N_, floor_N + kFloorNoise_N));
   rate_N_per_s_ = step_s > 0.0 ? (before_N - force_N_) / step_s : 0.0;
-  if (now.t - asked(0).t >= kCoursePeriod) asked_[asked_count_++ % kAsked] = {now.t, force_N_};
+  const Asked& before = asked(0);
+  if (now.t - before.t < kCoursePeriod) return;
+  const double over_s = static_cast<double>(now.t - before.t) * kSecondsPerTick;
+  asked_[asked_count_ % kAsked] = {now.t, force_N_, (before.force_N - force_N_) / over_s};
+  ++asked_count_;
 }
 
 void ClampRequest::step(const Now& now, double floor_N) noexcept {
@@ -293,9 +297,9 @@ double ClampRequest::follow_band_N() const noexcept {
 double ClampRequest::rate_least_N_per_s() const noexcept {
   double least = rate_N_per_s_;
   for (std::size_t age = 0; age + 1 < std::min(asked_count_, kAsked); ++age) {
-    if (last_ - asked(age).t > kRecent) break;
-    const double step_s = static_cast<double>(asked(age).t - asked(age + 1).t) * kSecondsPerTick;
-    least = std::min(least, (asked(age + 1).force_N - asked(age).force_N) / step_s);
+    const Asked& each = asked(age);
+    if (last_ - each.t > kRecent) break;
+    least = std::min(least, each.rate_N_per_s);
   }
   return least;
 }

@@ -152,6 +152,7 @@ class ClampRequest {
   struct Asked {
     MonoTime t = 0;
     double force_N = 0.0;
+    double rate_N_per_s = 0.0;  // of its fall since the one before
   };
   static constexpr std::size_t kAsked = 64;
   static constexpr Duration kCoursePeriod = 20 * kMillisecond;

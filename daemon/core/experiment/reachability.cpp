@@ -19,20 +19,34 @@ constexpr double kSlipSpan = 1.05;  // 1 + sigma, of the slip beyond the peak
 constexpr double kNotCaught = 1e9;
 constexpr std::size_t kCorners = 4;
 constexpr int kBisections = 16;
-constexpr int kIntegration = 20;  // points of the area's integral after the actuator was told
 
-// After the actuator has been told.
-struct Recovery {
-  double a = 0.0, w = 0.0;
-  double x1 = 0.0, y1 = 0.0, g = 0.0, lag_s = 0.0;
-
-  double shortfall(double t) const noexcept { return y1 + g * std::expm1(-t / lag_s); }
-  double slip(double t) const noexcept {
-    const double rate = a + 1.0 / lag_s;
-    return std::exp(a * t) *
-           (x1 - w * (y1 - g) * std::expm1(-a * t) / a - w * g * std::expm1(-rate * t) / rate);
+// After the actuator has been told. With E = exp(a t) - 1 and L = exp(-t / lag) - 1
+//   x = x1 + c E - d L
+// Each stands once, for E may be infinite; and few of them, for they are what a search costs.
+class Recovery {
+ public:
+  Recovery(double a, double w, double x1, double y1, double g, double lag_s) noexcept
+      : a_(a), w_(w), x1_(x1), y1_(y1), g_(g), lag_s_(lag_s) {
+    d_ = w * g / (a + 1.0 / lag_s);
+    c_ = x1 + w * (y1 - g) / a + d_;
   }
-  double slope(double t) const noexcept { return a * slip(t) + w * shortfall(t); }
+  double slip(double t) const noexcept {
+    return x1_ + c_ * std::expm1(a_ * t) - d_ * std::expm1(-t / lag_s_);
+  }
+  double slope(double t) const noexcept {
+    const double answered = std::expm1(-t / lag_s_);
+    const double slip = x1_ + c_ * std::expm1(a_ * t) - d_ * answered;
+    return a_ * slip + w_ * (y1_ + g_ * answered);
+  }
+  // The integral of the slip up to t.
+  double area_s(double t) const noexcept {
+    return x1_ * t + c_ * (std::expm1(a_ * t) / a_ - t) +
+           d_ * (lag_s_ * std::expm1(-t / lag_s_) + t);
+  }
+
+ private:
+  double a_, w_, x1_, y1_, g_, lag_s_;
+  double c_ = 0.0, d_ = 0.0;
 };
 
 // The last t in [low, high] at which the falling function f is still positive.
@@ -71,31 +85,25 @@ double ramp_at_the_top_N_per_s(const RampPoint& point, double answer_s,
 Excursion excursion(const RampPoint& point, const Reaction& reaction, double slip_rate_1_s,
                     double fall, double slip_to_see, double reaction_s) noexcept {
   const double w = runaway_1_s(point);
-  Recovery recovery;
-  recovery.a = w * fall / point.mu_least;
-  recovery.w = w;
-  recovery.lag_s = std::max(reaction.lag_s, 1e-3);
-  recovery.y1 = slip_rate_1_s / w;
-  const double a = recovery.a;
+  const double a = w * fall / point.mu_least;
+  const double lag_s = std::max(reaction.lag_s, 1e-3);
+  const double y1 = slip_rate_1_s / w;
   const double seen_s = std::log1p(a * slip_to_see / slip_rate_1_s) / a;
   const double told_s = seen_s + reaction.detection_s + reaction_s + reaction.dead_time_s;
-  recovery.x1 = slip_rate_1_s / a * std::expm1(a * told_s);
+  const double x1 = slip_rate_1_s / a * std::expm1(a * told_s);
   const double force_N = peak_force_N(point, point.mu_least);
-  recovery.g = std::max(0.0, point.own_force_N / force_N - 1.0 + recovery.y1);
+  const double g = std::max(0.0, point.own_force_N / force_N - 1.0 + y1);
+  const Recovery recovery(a, w, x1, y1, g, lag_s);
   // Where the own force does not catch the belt any more, slip grows without bound.
-  const double horizon_s = 8.0 * recovery.lag_s + 1.0;
+  const double horizon_s = 8.0 * lag_s + 1.0;
   if (recovery.slope(horizon_s) > 0.0) return {kNotCaught, kNotCaught, kNotCaught};
   const double top_s = last_positive([&](double t) { return recovery.slope(t); }, 0.0, horizon_s);
   Excursion out;
-  out.slip = std::max(recovery.x1, recovery.slip(top_s));
+  out.slip = std::max(x1, recovery.slip(top_s));
   // Back below the peak's slip.
   const double end_s = last_positive([&](double t) { return recovery.slip(t); }, top_s, horizon_s);
   out.time_s = told_s + end_s;
-  out.area_s = (recovery.x1 - slip_rate_1_s * told_s) / a;
-  for (int i = 0; i < kIntegration; ++i) {
-    const double t = end_s * (i + 0.5) / kIntegration;
-    out.area_s += end_s / kIntegration * std::max(0.0, recovery.slip(t));
-  }
+  out.area_s = (x1 - slip_rate_1_s * told_s) / a + recovery.area_s(end_s);
   return out;
 }
 

@@ -93,7 +93,7 @@ class CrossingSearch {
   CrossingSearch() noexcept = default;  // done, nothing found
   CrossingSearch(const RampPoint& point, const Reaction& reaction,
                  const SlipLimits& limits) noexcept;
-  // One excursion, about 8,000 instructions; true when the crossing stands.
+  // One excursion, about 5,000 instructions; true when the crossing stands.
   bool step() noexcept;
   bool done() const noexcept { return done_; }
   const RampPoint& point() const noexcept { return point_; }

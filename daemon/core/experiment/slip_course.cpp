@@ -30,11 +30,14 @@ void SlipCourse::step(MonoTime t, double ratio) noexcept {
   newest = {t, slip_at(ratio), 0.0};
   double recent = 0.0, recent_n = 0.0, oldest_s = 0.0;
   double n = 0.0, sum_t = 0.0, sum_x = 0.0, sum_tt = 0.0, sum_tx = 0.0;
-  for (std::size_t age = 0; age < std::min(count_, kPoints); ++age) {
-    const Duration before = t - point(age).t;
+  const std::size_t points = std::min(count_, kPoints);
+  std::size_t age = 0;
+  for (; age < points; ++age) {
+    const Point& each = point(age);
+    const Duration before = t - each.t;
     if (before > kRateOver) break;
     const double at_s = -static_cast<double>(before) * kSecondsPerTick;
-    const double slip = point(age).slip;
+    const double slip = each.slip;
     oldest_s = at_s;
     n += 1.0;
     sum_t += at_s;
@@ -50,19 +53,15 @@ void SlipCourse::step(MonoTime t, double ratio) noexcept {
   const bool whole = -oldest_s > kWhole * static_cast<double>(kRateOver) * kSecondsPerTick;
   rate_1_s_ = whole ? (n * sum_tx - sum_t * sum_x) / (n * sum_tt - sum_t * sum_t) : 0.0;
   newest.rate_1_s = rate_1_s_;
-  if (whole) count_noise(t);
+  // The rate of the window before: noise apart, slip hardly changes its rate from one to the next.
+  if (whole && age < points) count_noise(point(age).rate_1_s);
 }
 
-// The rate of the window before: noise apart, slip hardly changes its rate from one to the next.
-void SlipCourse::count_noise(MonoTime t) noexcept {
-  for (std::size_t age = 1; age < std::min(count_, kPoints); ++age) {
-    if (t - point(age).t <= kRateOver) continue;
-    if (point(age).rate_1_s == 0.0) return;
-    const double change = rate_1_s_ - point(age).rate_1_s;
-    squares_ = std::min(squares_ + 1.0, kSquares);
-    square_ += (change * change - square_) / squares_;
-    return;
-  }
+void SlipCourse::count_noise(double rate_before_1_s) noexcept {
+  if (rate_before_1_s == 0.0) return;
+  const double change = rate_1_s_ - rate_before_1_s;
+  squares_ = std::min(squares_ + 1.0, kSquares);
+  square_ += (change * change - square_) / squares_;
 }
 
 double SlipCourse::rate_deviation_1_s() const noexcept {

@@ -36,7 +36,7 @@ class SlipCourse {
   const Point& point(std::size_t age) const noexcept {
     return points_[(count_ - 1 - age) % kPoints];
   }
-  void count_noise(MonoTime t) noexcept;
+  void count_noise(double rate_before_1_s) noexcept;
 
   std::array<Point, kPoints> points_{};  // newest at count_ - 1
   std::size_t count_ = 0;
