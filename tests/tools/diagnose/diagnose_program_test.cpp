@@ -283,8 +283,10 @@ TEST_F(Diagnose, SaysTheSameForAnyNumberOfJobs) {
 }
 
 // The last experiment comes through a pipe, so that the signal falls between start and analysis.
+// Two experiments: what a stopped run still does, with sanitizers too, stays within the five
+// seconds.
 TEST_F(Diagnose, AnInterruptedRunLeavesAValidPartialReport) {
-  const auto tables = record(rig(4, {{"torque_loss", {{"per_kN_Nm", 0.9}}, ""}})).csv;
+  const auto tables = record(rig(2, {{"torque_loss", {{"per_kN_Nm", 0.9}}, ""}})).csv;
   auto arguments = write(std::vector<std::string>(tables.begin(), tables.end() - 1));
   const std::string pipe = place_.path("last.csv");
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
@@ -315,7 +317,7 @@ TEST_F(Diagnose, AnInterruptedRunLeavesAValidPartialReport) {
   const json result = json::parse(place_.read("out.json"));
   EXPECT_FALSE(result.at("complete").get<bool>());
   EXPECT_TRUE(result.at("verdict").is_null());
-  EXPECT_EQ(result.at("experiments"), 4);
+  EXPECT_EQ(result.at("experiments"), 2);
   EXPECT_EQ(result.at("findings").size(), 0U);
   EXPECT_NE(place_.read("out.html").find("</html>"), std::string::npos);
   EXPECT_NE(place_.read("out.html").find("stopped before the end"), std::string::npos);
