@@ -357,6 +357,7 @@ std::string table(const History& history) {
 class Scratch {
  public:
   Scratch() {
+    // mkdtemp puts six characters of its own in the place of the X.
     std::string name = (std::filesystem::temp_directory_path() / "beltgrip-XXXXXX").string();
     if (mkdtemp(name.data()) == nullptr) {
       throw Failure{kCannotCreate, name + ": cannot be created (" + std::strerror(errno) + ")"};
