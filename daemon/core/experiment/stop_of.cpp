@@ -45,6 +45,8 @@ Stop stop_of(SafetyVerdict verdict, double figure, double limit) noexcept {
       return {StopReason::kTime, {.what = "the request stands for too long"}};
     case SafetyVerdict::kFloor:
       return {StopReason::kForceFloor, in("request below its floor", "N")};
+    case SafetyVerdict::kStart:
+      return {StopReason::kInputs, in("a request begins below the force that acts", "N")};
     case SafetyVerdict::kPause:
       return {StopReason::kInputs, {.what = "a request too soon after the last"}};
     case SafetyVerdict::kRise:

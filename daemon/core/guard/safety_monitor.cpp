@@ -13,6 +13,8 @@ constexpr Duration kEngineDebounce = 25 * kMillisecond;
 constexpr Duration kNearReference = 80 * kMillisecond;
 constexpr double kNearMean = 4e7;  // ns
 constexpr double kRateMean_s = 0.04;
+// Chosen, ns: ten frames of the pressure; the own force moves by 15 N within it before a request.
+constexpr double kActingMean = 1e8;
 constexpr double kRounding_N = 1.0;  // requests are whole newtons on the wire
 constexpr double kSecondsPerTick = 1e-9;
 }  // namespace
@@ -25,6 +27,7 @@ void SafetyMonitor::end(MonoTime t) noexcept {
 
 SafetyVerdict SafetyMonitor::check(MonoTime t, const SafetySignals& signals,
                                    double request_N) noexcept {
+  see_acting_force(t, signals);
   if (!(request_N > 0.0)) {  // none, or not a number
     if (standing_) end(t);
     withdrawn_ = SafetyVerdict::kAllowed;
@@ -35,6 +38,17 @@ SafetyVerdict SafetyMonitor::check(MonoTime t, const SafetySignals& signals,
   if (withdrawn_ != SafetyVerdict::kAllowed && standing_) end(t);
   last_ = t;
   return withdrawn_;
+}
+
+void SafetyMonitor::see_acting_force(MonoTime t, const SafetySignals& signals) noexcept {
+  if (!signals.fresh || !(signals.clamp_force_N > 0.0)) {  // or not a number
+    acting_N_ = 0.0;
+    return;
+  }
+  const double latest =
+      acting_N_ > 0.0 ? std::min(1.0, static_cast<double>(t - acting_seen_) / kActingMean) : 1.0;
+  acting_N_ += latest * (signals.clamp_force_N - acting_N_);
+  acting_seen_ = t;
 }
 
 SafetyVerdict SafetyMonitor::judge(MonoTime t, const SafetySignals& signals,
@@ -54,6 +68,10 @@ SafetyVerdict SafetyMonitor::judge(MonoTime t, const SafetySignals& signals,
   if (!standing_) {
     if (asked_before_ && t - ended_ < limits_.pause_min) return SafetyVerdict::kPause;
     if (request_N < floor_N) return beyond(SafetyVerdict::kFloor, request_N, floor_N);
+    const double least_N = limits_.start_share * acting_N_;
+    if (!(acting_N_ > 0.0) || request_N < least_N) {
+      return beyond(SafetyVerdict::kStart, request_N, least_N);
+    }
     standing_ = true;
     begun_ = t;
     reference_ratio_ = signals.omega_s_rad_s / signals.omega_p_rad_s;

@@ -17,6 +17,7 @@
 //   power, |T| omega_p |drift|, <= power_max but for less than power_for: it cannot know where the
 //     peak of friction lies, and so not what slip beyond it costs
 //   the force asked for is >= floor, never rises, and falls no faster than rate_max
+//   it begins at start_share of the force that acts, or above; smoothed over 100 ms
 //   it has stood no longer than duration_max, and begins no sooner than pause_min after the last
 // The first violation withdraws the permission until the request has ended; the pause then begins.
 #pragma once
@@ -46,6 +47,7 @@ struct SafetyLimits {
   double spring_force_N = 0.0;  // floor = spring + centrifugal * omega_s^2 + floor_force
   double centrifugal_N_s2 = 0.0;
   double floor_force_N = 0.0;
+  double start_share = limits::kMonitorStartShare;
   Duration duration_max = limits::kMonitorLongest;
   Duration pause_min = 10 * kSecond;
 };
@@ -57,6 +59,7 @@ struct SafetySignals {
   double torque_Nm = 0.0;
   double primary_radius_m = 0.0;
   double omega_e_rad_s = 0.0;  // engine, from another node; 0: not known
+  double clamp_force_N = 0.0;  // that acts, from the pressure of this sample
 };
 
 enum class SafetyVerdict : std::uint8_t {
@@ -70,6 +73,7 @@ enum class SafetyVerdict : std::uint8_t {
   kPower,
   kEngine,
   kFloor,
+  kStart,
   kRise,
   kRate,
   kDuration,
@@ -82,7 +86,8 @@ class SafetyMonitor {
 
   // One sample: the force that would be asked for (0: none). Anything but kAllowed: it must not be.
   SafetyVerdict check(MonoTime t, const SafetySignals& signals, double request_N) noexcept;
-  // Of the last verdict with a limit (kSlip to kEngine, kFloor): what was found, and the limit.
+  // Of the last verdict with a limit (kSlip to kEngine, kFloor, kStart): what was found, and the
+  // limit.
   double figure() const noexcept { return figure_; }
   double limit() const noexcept { return limit_; }
 
@@ -97,6 +102,7 @@ class SafetyMonitor {
   bool slips_away(MonoTime t, double drift) noexcept;
   bool slips_near_own_force(MonoTime t, double ratio, double request_N) noexcept;
   SafetyVerdict judge_request(MonoTime t, double request_N, double floor_N) noexcept;
+  void see_acting_force(MonoTime t, const SafetySignals& signals) noexcept;
   void end(MonoTime t) noexcept;
 
   SafetyLimits limits_;
@@ -113,6 +119,8 @@ class SafetyMonitor {
   MonoTime beyond_since_ = kNever;  // slip_debounced
   MonoTime power_since_ = kNever;
   double slip_mean_ = 0.0, slip_rate_1_s_ = 0.0;
+  double acting_N_ = 0.0;  // smoothed; 0: not known
+  MonoTime acting_seen_ = 0;
   double near_count_ = 0.0;
   double near_sum_ = 0.0;          // of the first speed ratios
   double near_mean_ = 0.0;         // drift from their mean

@@ -9,6 +9,7 @@ namespace beltgrip::daemon {
 namespace {
 
 constexpr std::uint8_t kLength = 8;
+constexpr double kActingShare = 0.05;  // of the newest; chosen: 100 ms at 200 samples a second
 constexpr std::array<std::uint16_t, 4> kDataIds{0x6A0, 0x6A1, 0x6A2, 0x6A3};
 enum : std::size_t { kEstimate, kSlip, kClamp, kStatus };
 
@@ -60,6 +61,19 @@ std::size_t TxGate::message_of(const can::CanFrame& frame) const noexcept {
   return kMessages;
 }
 
+bool TxGate::begins_at_acting(double force_N) const noexcept {
+  return clamp_.start_share == 0.0 ||
+         (acting_N_ > 0.0 && force_N >= clamp_.start_share * acting_N_);
+}
+
+void TxGate::see_acting_force(double force_N) noexcept {
+  if (!(force_N > 0.0)) {  // or not a number
+    acting_N_ = 0.0;
+  } else {
+    acting_N_ += (acting_N_ > 0.0 ? kActingShare : 1.0) * (force_N - acting_N_);
+  }
+}
+
 // A request that breaks a limit is over: it takes inactive frames before another may begin.
 bool TxGate::request_allowed(const can::CanFrame& frame) noexcept {
   const double force_N = frame.data[3] + 256.0 * frame.data[4];
@@ -71,7 +85,7 @@ bool TxGate::request_allowed(const can::CanFrame& frame) noexcept {
   const bool first = active_frames_ == 0;
   const bool allowed =
       force_N >= clamp_.floor_N && active_frames_ < clamp_.frames_max &&
-      (first ? inactive_frames_ >= clamp_.inactive_before
+      (first ? inactive_frames_ >= clamp_.inactive_before && begins_at_acting(force_N)
              : force_N <= last_force_N_ && force_N >= last_force_N_ - clamp_.fall_max_N);
   inactive_frames_ = 0;
   if (!allowed) {

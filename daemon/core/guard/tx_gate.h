@@ -1,12 +1,14 @@
 // The one exit: reads the bytes about to leave and lets pass only what is allowed. Default deny.
-// Knows nothing of the publisher, the experiment or the estimator: it judges the frame alone.
+// Knows nothing of the publisher, the experiment or the estimator: it judges the frame, and beside
+// it knows the force that acts.
 // Real-time thread.
 //
 // Passes on bus 0: one of the four identifiers, standard, data, classic, 8 bytes, right CRC for its
 // data id, a legal counter that follows the one before (any after a refusal), codes inside their
 // tables, MuMaxValid only with a value; a clamp frame only with control "command", and a request
-// only inside ClampLimits: after enough inactive frames, never below the floor, never rising, never
-// falling by more than a step from frame to frame, no longer than a number of frames.
+// only inside ClampLimits: after enough inactive frames, from the force that acts, never below the
+// floor, never rising, never falling by more than a step from frame to frame, no longer than a
+// number of frames.
 //
 // Passes on any bus, where polling is allowed: ReadDataByIdentifier of one of the listed
 // identifiers to its ECU, as one single frame of 8 bytes, no more often than its period (early by
@@ -32,6 +34,7 @@ struct ClampLimits {
   std::uint32_t frames_max = 0;
   std::uint32_t inactive_before =
       limits::kInactiveFrames;  // frames between two requests, and before the first
+  double start_share = limits::kGateStartShare;  // of the force that acts, smoothed over 20 samples
 };
 
 // Of the requests for diagnostics. By default none is allowed.
@@ -51,6 +54,8 @@ class TxGate {
  public:
   TxGate(const FrameIdentifiers& identifiers, Control control, const ClampLimits& clamp = {},
          const PollLimits& poll = {}) noexcept;
+  // Once a sample, before its frames; 0: not known, and no request may begin.
+  void see_acting_force(double force_N) noexcept;
   // Counts what it refuses.
   bool permits(const can::CanFrame& frame, std::uint8_t bus = 0, MonoTime t = 0) noexcept;
   std::uint64_t refused() const noexcept { return refused_; }
@@ -60,6 +65,7 @@ class TxGate {
   static constexpr std::uint8_t kAnyCounter = 0xFF;
 
   std::size_t message_of(const can::CanFrame& frame) const noexcept;  // kMessages: none
+  bool begins_at_acting(double force_N) const noexcept;
   bool request_allowed(const can::CanFrame& frame) noexcept;
   bool own_allowed(std::size_t message, const can::CanFrame& frame) noexcept;
   bool poll_allowed(const can::CanFrame& frame, std::uint8_t bus, MonoTime t) noexcept;
@@ -77,6 +83,7 @@ class TxGate {
   std::uint32_t active_frames_ = 0;    // of the request that stands
   std::uint32_t inactive_frames_ = 0;  // in a row, since the last request
   double last_force_N_ = 0.0;
+  double acting_N_ = 0.0;  // smoothed; 0: not known
   std::uint64_t refused_ = 0;
 };
 

@@ -1,6 +1,7 @@
 #include "daemon/core/loop/pipeline.h"
 
 #include "daemon/core/loop/pipeline_parts.h"
+#include "estimator/physics/clamp_force.h"
 
 namespace beltgrip::daemon {
 
@@ -66,7 +67,17 @@ void Pipeline::Parts::take_action(Action action) noexcept {
   if (action == Action::kStart || action == Action::kRefuse) evaluation.begin();
 }
 
+// From this sample's signals alone; 0: not known.
+double Pipeline::Parts::acting_force_N() const noexcept {
+  const estimator::VariatorSample& sample = input.sample();
+  if (!sample.usable) return 0.0;
+  return estimator::secondary_clamp_force_N(config.variator, sample.secondary_pressure_Pa,
+                                            sample.omega_s_rad_s);
+}
+
+// Its verdict holds for what leaves, whatever the experiment makes of it.
 void Pipeline::Parts::judge_safety(const ExperimentStage::Now& now) noexcept {
+  permitted = false;
   if (!experiment.commands()) return;
   const InputMonitor& channels = input.channels();
   const estimator::VariatorSample& sample = input.sample();
@@ -79,8 +90,10 @@ void Pipeline::Parts::judge_safety(const ExperimentStage::Now& now) noexcept {
                                  ? config.variator.primary_radius_overdrive_m
                                  : config.variator.primary_radius_low_m;
   signals.omega_e_rad_s = channels.value_if_known(Role::kEngineSpeed);
+  signals.clamp_force_N = acting_force_N();
   const SafetyVerdict verdict = safety.check(now.t, signals, experiment.request_force_N());
-  if (verdict != SafetyVerdict::kAllowed) {
+  permitted = verdict == SafetyVerdict::kAllowed;
+  if (!permitted) {
     experiment.take(verdict, safety.figure(), safety.limit(), now);
   }
 }
@@ -132,7 +145,7 @@ const SampleReport& Pipeline::on_sample(MonoTime t, Outbox& outbox) noexcept {
 
   const Publication publication = parts.publication();
   parts.input.poll(t, parts.output.collect(t, publication));
-  parts.output.pass(t, outbox, parts.faults);
+  parts.output.pass(t, parts.acting_force_N(), outbox, parts.faults);
   parts.count_frames();
   parts.t = t;
   return parts.make_report(publication, sample.usable);
@@ -149,7 +162,7 @@ const SampleReport& Pipeline::on_end(MonoTime t, StopReason reason, Outbox& outb
   parts.experiment.go_idle(t);
   const Publication publication = parts.publication();
   parts.output.collect_all(t, publication);
-  parts.output.pass(t, outbox, parts.faults);
+  parts.output.pass(t, parts.acting_force_N(), outbox, parts.faults);
   parts.count_frames();
   parts.t = t;
   return parts.make_report(publication, false);
@@ -161,7 +174,7 @@ Publication Pipeline::Parts::publication() const noexcept {
   const estimator::CurveEstimate& curve = estimate.curve();
   const KnownFriction::Newest& newest = known.newest();
   const ExperimentResult& result = experiment.result();
-  const double request_force_N = experiment.request_force_N();
+  const double request_force_N = permitted_force_N();
   Publication now;
   now.command = experiment.commands();
   now.clamp = {request_force_N > 0.0, request_force_N};
@@ -202,7 +215,7 @@ const SampleReport& Pipeline::Parts::make_report(const Publication& published,
   report.foreign_identifier = output.foreign_identifier();
   report.frozen = input.channels().frozen();
   report.inhibits = experiment.inhibits();
-  report.request_force_N = experiment.request_force_N();
+  report.request_force_N = permitted_force_N();
   report.ramp_N_per_s = experiment.ramp_N_per_s();
   return report;
 }

@@ -18,7 +18,11 @@ struct Pipeline::Parts {
   void go_on_from(const Parts& before, bool keeps_results) noexcept;
   ExperimentStage::Now now(MonoTime t) noexcept;
   void take_action(Action action) noexcept;
+  double acting_force_N() const noexcept;
   void judge_safety(const ExperimentStage::Now& now) noexcept;
+  double permitted_force_N() const noexcept {
+    return permitted ? experiment.request_force_N() : 0.0;
+  }
   bool evaluate() noexcept;
   void publish_result(const estimator::PeakEstimate& peak) noexcept;
   Publication publication() const noexcept;
@@ -37,6 +41,7 @@ struct Pipeline::Parts {
   PipelineCounters counters;
   MonoTime t = 0;                 // of the last sample
   bool estimate_changed = false;  // with this sample
+  bool permitted = false;         // by the safety monitor: to ask for force with this sample
   SampleReport report;            // of the last sample; written by make_report() alone
 };
 

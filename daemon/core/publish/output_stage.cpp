@@ -13,7 +13,10 @@ constexpr Duration kConfirmationRetry = kSecond;  // then the frame is taken for
 
 ClampLimits clamp_limits(const Config& config) {
   constexpr double kRounding_N = 1.0;
-  return {config.variator.secondary_spring_force_N,
+  const double floor_N =
+      config.variator.secondary_spring_force_N +
+      config.variator.secondary_piston_area_m2 * config.experiment.secondary_pressure_floor_Pa;
+  return {floor_N - kRounding_N,
           config.estimator.ramp_rate_max_N_per_s * limits::kGateFramePeriod_s + kRounding_N,
           limits::kGateFrames};
 }
@@ -68,7 +71,9 @@ void OutputStage::ask_again(MonoTime t, const FaultSet& faults) noexcept {
   if (!faults.has(Fault::kForeignSender)) publisher_.repeat_inactive();
 }
 
-void OutputStage::pass(MonoTime t, Outbox& outbox, FaultSet& faults) noexcept {
+void OutputStage::pass(MonoTime t, double acting_force_N, Outbox& outbox,
+                       FaultSet& faults) noexcept {
+  gate_.see_acting_force(acting_force_N);
   for (std::size_t i = 0; i < wanted_.size; ++i) {
     if (!gate_.permits(wanted_.frames[i], wanted_.bus[i], t)) {
       faults.latch(Fault::kFrameRefused);

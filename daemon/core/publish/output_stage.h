@@ -36,8 +36,8 @@ class OutputStage {
     wanted_.size = 0;
     publisher_.collect_all(t, publication, wanted_);
   }
-  // Hands on what the gate permits of it.
-  void pass(MonoTime t, Outbox& outbox, FaultSet& faults) noexcept;
+  // Hands on what the gate permits of it. acting_force_N: of the clamp, from signals; 0: not known.
+  void pass(MonoTime t, double acting_force_N, Outbox& outbox, FaultSet& faults) noexcept;
 
   // Nobody has confirmed what was asked: it may not be on the bus at all.
   bool unconfirmed(MonoTime t) const noexcept;

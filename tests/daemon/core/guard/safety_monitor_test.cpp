@@ -50,7 +50,7 @@ class Monitor : public testing::Test {
 
   SafetyLimits limits_;
   SafetyMonitor monitor_{limits_};
-  SafetySignals signals_{true, 140.0, 300.0, -30.0, 0.0784};
+  SafetySignals signals_{true, 140.0, 300.0, -30.0, 0.0784, 0.0, 3000.0};
   MonoTime t_ = 0;
 };
 
@@ -66,7 +66,7 @@ TEST_F(Monitor, InputsMustBeFreshAndNumbers) {
        {&SafetySignals::omega_p_rad_s, &SafetySignals::omega_s_rad_s, &SafetySignals::torque_Nm}) {
     for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity()}) {
       SetUp();
-      signals_ = {true, 140.0, 300.0, -30.0, 0.0784};
+      signals_ = {true, 140.0, 300.0, -30.0, 0.0784, 0.0, 3000.0};
       EXPECT_EQ(begin(), SafetyVerdict::kAllowed);
       signals_.*field = bad;
       EXPECT_EQ(sample(3000.0), SafetyVerdict::kInputs);
@@ -206,10 +206,131 @@ TEST_F(Monitor, SlipThatGrowsTooFast) {
   EXPECT_EQ(largest(0.17), SafetyVerdict::kSlipRate);
 }
 
+// Its limit is 87 % of it, smoothed over 100 ms, also before the request.
+TEST_F(Monitor, ARequestBeginsAtTheForceThatActs) {
+  EXPECT_EQ(begin(2610.0), SafetyVerdict::kAllowed);
+  SetUp();
+  EXPECT_EQ(begin(2609.9), SafetyVerdict::kStart);
+  EXPECT_EQ(monitor_.figure(), 2609.9);
+  EXPECT_NEAR(monitor_.limit(), 2610.0, 1e-9);
+  for (const double unknown : {0.0, -1.0, std::nan("")}) {
+    SetUp();
+    signals_.clamp_force_N = unknown;
+    EXPECT_EQ(begin(3000.0), SafetyVerdict::kStart) << unknown;
+  }
+  SetUp();
+  signals_.clamp_force_N = 3000.0;
+  for (int i = 0; i < 100; ++i) sample(0.0);
+  signals_.clamp_force_N = 4000.0;                   // one reading moves it by 50 N
+  EXPECT_EQ(sample(2653.0), SafetyVerdict::kStart);  // 0.87 * 3050
+  SetUp();
+  signals_.clamp_force_N = 3000.0;
+  for (int i = 0; i < 100; ++i) sample(0.0);
+  signals_.clamp_force_N = 4000.0;
+  EXPECT_EQ(sample(2654.0), SafetyVerdict::kAllowed);
+  SetUp();
+  for (int i = 0; i < 100; ++i) sample(0.0);
+  EXPECT_EQ(sample(3450.0), SafetyVerdict::kStart);
+  // A force that was not known for a while is not the one of before.
+  SetUp();
+  signals_.clamp_force_N = 8000.0;
+  for (int i = 0; i < 100; ++i) sample(0.0);
+  signals_.fresh = false;
+  sample(0.0);
+  signals_.fresh = true;
+  signals_.clamp_force_N = 3000.0;
+  EXPECT_EQ(sample(3000.0), SafetyVerdict::kAllowed);
+}
+
+// Near the first force slip counts from the mean of the first 80 ms, and is smoothed over 40 ms.
+TEST_F(Monitor, SlipNearTheFirstForceCountsFromTheMeanOfItsBegin) {
+  begin();
+  // 0 for 60 ms, 1.2 % until 80 ms: the mean is 0.3 %, and 0.4 % is 0.1 % from it.
+  for (int i = 1; i <= 12; ++i) ASSERT_EQ(sample(3000.0), SafetyVerdict::kAllowed);
+  for (int i = 1; i <= 4; ++i) ASSERT_EQ(sample(3000.0, 0.012), SafetyVerdict::kAllowed);
+  for (int i = 1; i <= 100; ++i) ASSERT_EQ(sample(3000.0, 0.004), SafetyVerdict::kAllowed) << i;
+
+  SetUp();
+  begin();
+  for (int i = 1; i <= 16; ++i) ASSERT_EQ(sample(3000.0), SafetyVerdict::kAllowed);
+  int samples = 1;
+  while (sample(3000.0, 0.002) == SafetyVerdict::kAllowed && samples < 100) ++samples;
+  EXPECT_EQ(samples, 11);  // 1 - (7/8)^11 of 0.2 % is the first beyond 0.15 %
+  EXPECT_NEAR(monitor_.limit(), 0.0015, 1e-9);
+  EXPECT_GT(monitor_.figure(), 0.0015);
+  EXPECT_LT(monitor_.figure(), 0.0016);
+}
+
+// Both shafts slow down: no slip.
+TEST_F(Monitor, ACarThatSlowsDownIsNoSlip) {
+  begin();
+  for (int i = 0; i < 400; ++i) {
+    signals_.omega_p_rad_s *= 0.9999;
+    signals_.omega_s_rad_s *= 0.9999;
+    ASSERT_EQ(sample(3000.0), SafetyVerdict::kAllowed) << i;
+  }
+}
+
+TEST_F(Monitor, ASecondRequestKnowsNothingOfTheFirst) {
+  signals_.omega_e_rad_s = 140.0;
+  begin_and_lower();
+  slide(0.03);
+  sample(0.0);
+  // At another speed ratio, with another engine speed.
+  signals_.omega_s_rad_s = 285.0;
+  signals_.omega_e_rad_s = 150.0;
+  EXPECT_EQ(begin(), SafetyVerdict::kAllowed);
+  for (int i = 0; i < 400; ++i) ASSERT_EQ(sample(3000.0), SafetyVerdict::kAllowed) << i;
+}
+
+TEST_F(Monitor, AnEngineThatIsNotKnownSaysNothing) {
+  begin();
+  signals_.omega_e_rad_s = 140.0;  // not known at the start
+  for (int i = 0; i < 20; ++i) ASSERT_EQ(sample(3000.0), SafetyVerdict::kAllowed);
+  SetUp();
+  begin();
+  signals_.omega_e_rad_s = 0.0;  // and not known any more
+  for (int i = 0; i < 20; ++i) ASSERT_EQ(sample(3000.0), SafetyVerdict::kAllowed);
+}
+
+TEST_F(Monitor, TheDebounceIsTenMilliseconds) {
+  signals_.omega_p_rad_s = 95.0;
+  SetUp();
+  begin_and_lower();
+  slide(0.074);
+  const auto at = [this](Duration since) {
+    SafetySignals now = signals_;
+    now.omega_s_rad_s *= 1.076;
+    return monitor_.check(t_ + since, now, 2500.0);
+  };
+  EXPECT_EQ(at(kMillisecond), SafetyVerdict::kAllowed);
+  EXPECT_EQ(at(11 * kMillisecond - 1), SafetyVerdict::kAllowed);
+  EXPECT_EQ(at(11 * kMillisecond), SafetyVerdict::kSlip);
+}
+
+// The pause counts from where the permission was withdrawn, to the tick.
+TEST_F(Monitor, ThePauseBeginsWhereTheRequestHadToEnd) {
+  begin();
+  signals_.fresh = false;
+  EXPECT_EQ(sample(3000.0), SafetyVerdict::kInputs);
+  signals_.fresh = true;
+  const MonoTime withdrawn = t_;
+  for (int i = 0; i < 100; ++i) sample(2990.0);
+  sample(0.0);
+  EXPECT_EQ(monitor_.check(withdrawn + limits_.pause_min - 1, signals_, 3000.0),
+            SafetyVerdict::kPause);
+  EXPECT_EQ(monitor_.check(withdrawn + limits_.pause_min - 1, signals_, 0.0),
+            SafetyVerdict::kAllowed);
+  EXPECT_EQ(monitor_.check(withdrawn + limits_.pause_min, signals_, 3000.0),
+            SafetyVerdict::kAllowed);
+}
+
 TEST_F(Monitor, FloorMovesWithTheSpeed) {
+  signals_.clamp_force_N = 1600.0;
   EXPECT_EQ(begin(1599.0), SafetyVerdict::kFloor);
   SetUp();
   EXPECT_EQ(begin(1600.0), SafetyVerdict::kAllowed);
+  EXPECT_EQ(sample(1600.0), SafetyVerdict::kAllowed);
   EXPECT_EQ(sample(1599.9), SafetyVerdict::kFloor);
 }
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <vector>
 
 namespace beltgrip::daemon {
@@ -35,7 +36,7 @@ can::CanFrame frame_of(std::uint32_t id, std::uint16_t data_id, std::uint8_t cou
 }
 
 // A request of any force may stand at once.
-constexpr ClampLimits kAnyRequest{0.0, 65535.0, 1U << 30, 0};
+constexpr ClampLimits kAnyRequest{0.0, 65535.0, 1U << 30, 0, 0.0};
 
 bool permits(const can::CanFrame& frame, Control control = Control::kObserve) {
   TxGate gate(FrameIdentifiers{}, control, kAnyRequest);
@@ -102,6 +103,11 @@ TEST(TxGate, CounterMustFollow) {
   }
 }
 
+TEST(TxGate, NoCounterIsFifteen) {
+  TxGate gate(FrameIdentifiers{}, Control::kObserve);
+  EXPECT_FALSE(gate.permits(frame_of(0x6A3, 0x6A3, 15)));
+}
+
 TEST(TxGate, RefusalDoesNotSilenceForEver) {
   TxGate gate(FrameIdentifiers{}, Control::kObserve);
   ASSERT_TRUE(gate.permits(frame_of(0x6A3, 0x6A3, 0)));
@@ -164,9 +170,12 @@ class Requests {
     counter_ = static_cast<std::uint8_t>((counter_ + 1) % 15);
     return gate_.permits(frame);
   }
-  void prepare() {
+  void prepare(double acting_N = 3000.0) {
+    gate_.see_acting_force(acting_N);
     for (int i = 0; i < 5; ++i) EXPECT_TRUE(ask(0));
   }
+
+  TxGate& gate() { return gate_; }
 
  private:
   TxGate gate_;
@@ -180,7 +189,7 @@ TEST(TxGate, NoRequestWithoutLimits) {
 }
 
 TEST(TxGate, EachLimitOfARequestAlone) {
-  const ClampLimits limits{1000.0, 4.0, 20};
+  const ClampLimits limits{1000.0, 4.0, 20, limits::kInactiveFrames, 0.2};
   const auto prepared = [&limits] {
     Requests requests(limits);
     requests.prepare();
@@ -195,9 +204,9 @@ TEST(TxGate, EachLimitOfARequestAlone) {
   EXPECT_TRUE(falls.ask(3000));
   EXPECT_TRUE(falls.ask(2996));
   EXPECT_FALSE(falls.ask(2991));
-  EXPECT_FALSE(falls.ask(2991));  // over: inactive frames before the next
+  EXPECT_FALSE(falls.ask(2996));  // over: inactive frames before the next
   falls.prepare();
-  EXPECT_TRUE(falls.ask(2000));
+  EXPECT_TRUE(falls.ask(2900));
 
   Requests rises = prepared();
   EXPECT_TRUE(rises.ask(3000));
@@ -217,6 +226,38 @@ TEST(TxGate, EachLimitOfARequestAlone) {
   EXPECT_TRUE(pause.ask(3000));
   for (int i = 0; i < 4; ++i) EXPECT_TRUE(pause.ask(0));
   EXPECT_FALSE(pause.ask(3000));
+}
+
+// At 80 % of the force that acts, smoothed; and never where that is not known.
+TEST(TxGate, ARequestBeginsAtTheForceThatActs) {
+  const ClampLimits limits{1000.0, 4.0, 20};
+  Requests at(limits);
+  at.prepare(3000.0);
+  EXPECT_TRUE(at.ask(2400));
+  EXPECT_TRUE(at.ask(2396));  // and may fall from there
+
+  Requests below(limits);
+  below.prepare(3000.0);
+  EXPECT_FALSE(below.ask(2399));
+
+  for (const double unknown : {0.0, -1.0, std::nan("")}) {
+    Requests blind(limits);
+    blind.prepare(3000.0);
+    blind.gate().see_acting_force(unknown);
+    EXPECT_FALSE(blind.ask(3000)) << unknown;
+  }
+  Requests noisy(limits);
+  noisy.prepare(3000.0);
+  noisy.gate().see_acting_force(6000.0);  // one reading moves it by 150 N
+  EXPECT_FALSE(noisy.ask(2519));
+  noisy.prepare(0.0);
+  noisy.prepare(3000.0);
+  noisy.gate().see_acting_force(6000.0);
+  EXPECT_TRUE(noisy.ask(2520));
+  Requests risen(limits);
+  risen.prepare(3000.0);
+  for (int i = 0; i < 100; ++i) risen.gate().see_acting_force(6000.0);
+  EXPECT_FALSE(risen.ask(4700));
 }
 
 TEST(TxGate, ConfiguredIdentifiersKeepTheirDataIds) {
@@ -289,6 +330,16 @@ TEST(TxGatePoll, OnlyReadingAndOnlyTheListedIdentifier) {
     odd.length = length;
     EXPECT_FALSE(gate.permits(odd, 0, t += kSecond));
   }
+  odd.length = 8;
+  for (bool can::CanFrame::*kind :
+       {&can::CanFrame::remote, &can::CanFrame::error, &can::CanFrame::fd}) {
+    odd.*kind = true;
+    EXPECT_FALSE(gate.permits(odd, 0, t += kSecond));
+    odd.*kind = false;
+  }
+  EXPECT_TRUE(gate.permits(odd, 0, t += kSecond));
+  // What stands behind the end of the list is not listed.
+  EXPECT_FALSE(gate.permits(request_of(0, {0x03, 0x22, 0, 0}), 0, t += kSecond));
 }
 
 TEST(TxGatePoll, NoneWithoutAllowance) {
@@ -304,6 +355,11 @@ TEST(TxGatePoll, NoMoreOftenThanItsPeriod) {
   for (MonoTime t = 0; t < 10 * kSecond; t += kMillisecond) passed += gate.permits(request, 0, t);
   EXPECT_GE(passed, 200);
   EXPECT_LE(passed, 202);
+  // Early by half a period, and not a tick more.
+  TxGate early({}, Control::kObserve, {}, two_identifiers());
+  EXPECT_TRUE(early.permits(request, 0, kSecond));
+  EXPECT_FALSE(early.permits(request, 0, kSecond + 25 * kMillisecond - 1));
+  EXPECT_TRUE(early.permits(request, 0, kSecond + 25 * kMillisecond));
   // One that was late lets the next come on the grid, not earlier.
   EXPECT_TRUE(gate.permits(request, 0, 20 * kSecond + 20 * kMillisecond));
   EXPECT_FALSE(gate.permits(request, 0, 20 * kSecond + 40 * kMillisecond));
