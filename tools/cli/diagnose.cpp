@@ -25,7 +25,7 @@ namespace beltgrip::cli {
 namespace {
 
 struct Options {
-  std::string config, model, json, report, model_out;
+  std::string config, model, json, report, model_out, next_out;
   std::vector<std::string> logs, held_out;
   int jobs = 1;
   bool force = false;
@@ -126,6 +126,7 @@ void run(const Options& options) {
   const auto json = output(options.json);
   const auto model_out = output(options.model_out, unless_forced(options.force));
   const auto report = output(options.report);
+  const auto next_out = output(options.next_out);
   for (const std::string& path : options.logs) request.experiments.push_back(read(path, config));
   for (const std::string& path : options.held_out) request.held_out.push_back(read(path, config));
   request.with_plots = report != nullptr;
@@ -133,6 +134,7 @@ void run(const Options& options) {
   request.stop = [] { return stop_asked(); };
   if (isatty(STDERR_FILENO) != 0) request.progress = show_progress;
   diagnose::Answer answer = diagnose::diagnose(std::move(request));
+  if (!answer.impossible.empty()) throw Failure{kBadInput, answer.impossible};
   if (answer.diagnosis.complete && !answer.diagnosis.findings.empty()) {
     std::vector<std::string> all = options.logs;
     all.insert(all.end(), options.held_out.begin(), options.held_out.end());
@@ -151,6 +153,11 @@ void run(const Options& options) {
   if (model_out) {
     model_out->write(diagnose::model_text(answer.extended));
     model_out->close();
+  }
+  if (next_out) {
+    const auto& next = answer.diagnosis.next_experiment;
+    next_out->write(next ? next->scenario : "# no experiment is left to ask for\n");
+    next_out->close();
   }
 }
 
@@ -175,6 +182,8 @@ void add_diagnose(command_line::Command app) {
   command.add_option("--report", options->report, "result with plots as one HTML file")
       .type_name("FILE");
   command.add_option("--model-out", options->model_out, "writes the extended model")
+      .type_name("FILE");
+  command.add_option("--next-out", options->next_out, "writes the next experiment, a scenario")
       .type_name("FILE");
   command.add_flag("--force", options->force, "replace the file of --model-out where it exists");
   command.add_option("--jobs", options->jobs, "threads; the same answer for any number")

@@ -8,6 +8,7 @@
 #include "tools/cli/failure.h"
 #include "tools/cli/replay_run.h"
 #include "tools/text/json_writer.h"
+#include "tools/text/seconds.h"
 #include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
@@ -41,7 +42,7 @@ std::string truth_json(const Truth& truth) {
       .field("belt", truth.belt)
       .field("seed", truth.seed)
       .key("first_frame_s")
-      .raw(seconds_text(truth.first_frame_ns))
+      .raw(text::seconds_text(truth.first_frame_ns))
       .field("mu_max", truth.mu_max)
       .key("experiments")
       .begin_array();
@@ -92,7 +93,7 @@ Truth read_truth(const std::string& path) {
   return truth;
 }
 
-void Verdict::on_frame(std::int64_t t_ns, const OwnFrameView& view) {
+void Verdict::on_frame(std::int64_t t_ns, const monitor::OwnFrameView& view) {
   if (!view.good()) return;
   if (view.message->name == "BeltGripSlip") {
     const bool stop = view.value("MacroSlipStop") > 0.5;

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "tools/cli/own_frame_view.h"
+#include "tools/monitor/own_frame_view.h"
 #include "tools/sim/rig_scenario.h"
 #include "tools/sim/rig_simulation.h"
 
@@ -30,7 +30,7 @@ Truth read_truth(const std::string& path);
 // Collects from published frames, whose times are those of the log.
 class Verdict {
  public:
-  void on_frame(std::int64_t t_ns, const OwnFrameView& view);
+  void on_frame(std::int64_t t_ns, const monitor::OwnFrameView& view);
   void print(std::FILE* out, const Truth& truth) const;
 
  private:

@@ -172,7 +172,7 @@ History Experiment::run() {
   const double peak_slip = (plan.low ? m_.peak_slip_low : m_.peak_slip_overdrive) *
                            (1.0 + fault_("friction_shape.peak_slip_relative"));
   const double fall = std::max(0.0, m_.fall_per_unit + fault_("friction_shape.fall_per_unit"));
-  level_ = m_.scatter_friction * random_.normal();
+  level_ = std::hypot(m_.scatter_friction, fault_("x_friction_between.size")) * random_.normal();
   seat_ = m_.scatter_ratio * random_.normal();
   zero_Nm_ = m_.scatter_torque_Nm * random_.normal();
   hidden_phase_ = random_.uniform(0.0, 6.28);
@@ -256,6 +256,9 @@ History Experiment::run() {
       play_N = std::clamp(play_N, force - friction_N, force + friction_N);
       force = play_N;
     }
+    force *= 1.0 +
+             fault_("x_force_ripple.size") *
+                 std::sin(2.0 * std::numbers::pi * fault_("x_force_ripple.hz") * t + hidden_phase_);
     force = std::max(force, 100.0);
     pressure_p_Pa_ = (plan.low ? 0.6e6 : 1.6e6) + 0.35e6 * std::sin(0.35 * t + sweep_phase);
     if (const double rate = fault_("ratio_creep.rate"); rate > 0.0 && !first) {
@@ -348,7 +351,8 @@ History Experiment::run() {
     h.pressure.push(
         pressure_wanted);  // without a command in the table, lag and delay come after it
     h.command.push(pressure_wanted);
-    h.torque_p.push(torque_p + zero_Nm_);
+    h.torque_p.push((torque_p + zero_Nm_) *
+                    (1.0 + fault_("x_gain_temperature.size") * (temperature_C_ - 80.0) / 50.0));
     h.torque_s.push(load_s);
     h.temperature.push(temperature_C_);
     h.pressure_p.push(pressure_p_Pa_);

@@ -92,6 +92,8 @@ struct Plantable {
   bool positive;  // only one sign exists
 };
 const std::vector<Plantable>& plantables();
+// Drawn by the blind test; x_gain_temperature, x_friction_between and x_force_ripple are planted by
+// name alone.
 const std::vector<std::string>& outside_causes();
 Planted draw_effect(Random& random, const Plantable& what, double size);
 Planted draw_outside(Random& random, const std::string& cause, double size);

@@ -32,10 +32,22 @@ struct Finding {
   std::string equation, acts_on;
 };
 
+// What is left unexplained looks like: a function of something recorded; a line in the spectrum; a
+// difference between experiments that follows nothing recorded; a slow course within them.
+enum class MisfitKind { kFunction, kLine, kBetweenRuns, kSlow };
+
 struct Unexplained {
   std::string acts_on;
   std::vector<std::string> depends_on;
   double share = 0.0;
+  MisfitKind kind = MisfitKind::kFunction;
+  std::optional<double> frequency_Hz;  // of a line
+};
+
+// An experiment to do: in words, and as a scenario that the simulation runs.
+struct Recipe {
+  std::string text;
+  std::string scenario;  // TOML
 };
 
 struct NotIdentifiable {
@@ -79,15 +91,21 @@ enum class Verdict { kNone, kNothingWrong, kExplained, kUnexplained };
 struct Diagnosis {
   Verdict verdict = Verdict::kNone;
   std::map<std::string, BaselineSignal> baseline;
+  // The tests of what the model and all findings leave: value and the limit above which it fails.
+  struct Left {
+    double value = 0.0, limit = 0.0;
+  };
+  std::map<std::string, Left> left;
   std::map<std::string, SimulatedSignal> simulation;
   std::vector<Finding> findings;
   std::optional<Unexplained> unexplained;
   std::vector<NotIdentifiable> not_identifiable;
   std::map<std::string, BeforeAfter> held_out;
   std::optional<MuMaxError> mu_max;
-  std::vector<Rerun> reruns;    // with findings only
-  std::string next_experiment;  // empty: none
+  std::vector<Rerun> reruns;  // with findings only
+  std::optional<Recipe> next_experiment;
   std::vector<std::string> notes;
+  bool scatter_from_replicates = false;     // else from what rigs usually scatter by
   std::map<std::string, Interval> machine;  // constants of the nominal machine, as fitted
   int experiments = 0;
   int samples = 0;

@@ -58,6 +58,8 @@ double range_of(std::vector<double> values) {
   return values[(values.size() - 1) * 19 / 20] - values[(values.size() - 1) / 20];
 }
 
+constexpr double kSteady_rad_s2 = 5.0;  // chosen: an inertia of 0.5 kg m2 takes a few Nm
+
 // What both shafts' torques of one experiment say of each other.
 struct TorquePair {
   double same = 0.0, opposite = 0.0;  // products of both, by their signs
@@ -73,11 +75,14 @@ TorquePair torque_pair(const ExperimentData& run) {
   std::vector<double> in, at_primary;
   for (int k = 0; k < run.size(); ++k) {
     if (!run.valid[static_cast<std::size_t>(k)]) continue;
-    const double product = run.torque.value[k] * run.torque_s.value[k];
-    (product < 0.0 ? out.opposite : out.same) += std::abs(product);
-    out.power_in_W += std::abs(run.torque.value[k]) * run.omega_p.value[k];
-    out.power_out_W += std::abs(run.torque_s.value[k]) * run.omega_s.value[k];
-    out.omega_p_sum_rad_s += run.omega_p.value[k];
+    // A shaft that is sped up or slowed down takes torque of its own, of either sign.
+    if (std::abs(run.omega_p.slow_slope[k]) < kSteady_rad_s2) {
+      const double product = run.torque.value[k] * run.torque_s.value[k];
+      (product < 0.0 ? out.opposite : out.same) += std::abs(product);
+      out.power_in_W += std::abs(run.torque.value[k]) * run.omega_p.value[k];
+      out.power_out_W += std::abs(run.torque_s.value[k]) * run.omega_s.value[k];
+      out.omega_p_sum_rad_s += run.omega_p.value[k];
+    }
     in.push_back(run.torque.value[k]);
     at_primary.push_back(run.torque_s.value[k] * run.omega_s.value[k] / run.omega_p.value[k]);
   }
@@ -226,6 +231,20 @@ void check_friction(const std::vector<ExperimentData>& runs,
                          " bar, which no belt drive has: unit or scale of the pressure or the "
                          "torque, or secondary_piston_area_m2 of [variator]?");
   doubts.impossible = Unexplained{"friction", {"secondary_pressure", "torque"}, 1.0};
+}
+
+bool is_coarse(const SignalTable& table) {
+  constexpr double kMostlyHeld = 0.6;  // chosen: at a step of three sigmas of the noise
+  constexpr std::size_t kSamplesMin = 100;
+  const auto steps = [&](Role role) {
+    const std::vector<double>& value = table[role].value;
+    if (value.size() < kSamplesMin) return false;
+    std::size_t held = 0;
+    for (std::size_t i = 1; i < value.size(); ++i) held += value[i] == value[i - 1];
+    return static_cast<double>(held) > kMostlyHeld * static_cast<double>(value.size());
+  };
+  return steps(Role::kSecondaryPressure) || steps(Role::kPrimaryTorque) ||
+         steps(Role::kEngineTorque);
 }
 
 void check_fitted_friction(const std::map<std::string, Interval>& machine, Doubts& doubts) {

@@ -33,4 +33,7 @@ void check_friction(const std::vector<ExperimentData>& runs,
 // By the fit of the machine's constants.
 void check_fitted_friction(const std::map<std::string, Interval>& machine, Doubts& doubts);
 
+// Pressure or torque move in steps well beyond their noise: means do not smooth that.
+bool is_coarse(const SignalTable& table);
+
 }  // namespace beltgrip::diagnose

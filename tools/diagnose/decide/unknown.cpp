@@ -6,6 +6,8 @@
 #include <functional>
 #include <optional>
 
+#include "tools/diagnose/infer/index_variables.h"
+
 namespace beltgrip::diagnose {
 namespace {
 
@@ -14,57 +16,30 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Exogenous variables only: an index that contains the residual's own noise would explain it.
-struct Variable {
-  const char* name;
-  ArrayXd (*value)(const ExperimentData&, int experiment);
-};
-
-const std::vector<Variable>& variables() {
-  static const std::vector<Variable> kAll{
-      {"oil_temperature",
-       [](const ExperimentData& r, int) -> ArrayXd {
-         return r.temperature.present ? r.temperature.value : ArrayXd();
-       }},
-      {"primary_speed", [](const ExperimentData& r, int) -> ArrayXd { return r.omega_p.slow; }},
-      {"secondary_pressure",
-       [](const ExperimentData& r, int) -> ArrayXd { return r.pressure.slow; }},
-      {"primary_pressure",
-       [](const ExperimentData& r, int) -> ArrayXd {
-         return r.pressure_p.present ? r.pressure_p.slow : ArrayXd();
-       }},
-      {"torque", [](const ExperimentData& r, int) -> ArrayXd { return r.torque.slow; }},
-      {"acceleration",
-       [](const ExperimentData& r, int) -> ArrayXd { return r.omega_p.slow_slope; }},
-      {"pressure_rate",
-       [](const ExperimentData& r, int) -> ArrayXd { return r.pressure.slow_slope; }},
-      {"time", [](const ExperimentData& r, int) -> ArrayXd { return r.t_s; }},
-      {"experiment",
-       [](const ExperimentData& r, int e) -> ArrayXd {
-         return ArrayXd::Constant(r.size(), static_cast<double>(e));
-       }},
-  };
-  return kAll;
-}
-
-constexpr std::array<const char*, 3> kActsOn{"friction", "ratio", "torque"};
+constexpr std::array<const char*, 5> kActsOn{"friction", "ratio", "torque", "torque_gain",
+                                             "clamp_force"};
+constexpr std::size_t kPerVariable = 3 * kActsOn.size();
 // Size of one unit of a column, and the size that begins to matter: less is the difference between
 // one friction law and another.
-constexpr std::array<double, 3> kUnit{0.05, 2e-3, 2.0};  // share, share, Nm
+constexpr std::array<double, 5> kUnit{0.05, 2e-3, 2.0, 0.05, 200.0};  // share, share, Nm, share, N
 constexpr double kAnyConstant = 1e-3;  // precision: of a constant that is not known at all
 constexpr double kVaried = 0.05;       // of its middle; less may be the channel's own noise
 constexpr double kOwnShareMin = 0.01;
 constexpr double kLooked = 8.0;  // below this a group is no candidate
-constexpr std::array<double, 3> kMatters{5e-3, 2e-4, 0.2};
+constexpr std::array<double, 5> kMatters{5e-3, 2e-4, 0.2, 5e-3, 20.0};
 
 // The curve's own abscissa is torque over capacity: against torque only friction is looked at.
-bool sensible(const std::string& variable, std::size_t injection) {
-  return variable != "torque" || injection == 0;
+// A gain and a force are told from friction by the torque behind the belt alone, and along what
+// does not move within a ramp.
+bool sensible(const Campaign& campaign, const std::string& variable, std::size_t injection) {
+  if (injection < 3) return variable != "torque" || injection == 0;
+  return campaign.has_balance &&
+         (variable == "oil_temperature" || variable == "primary_speed" || variable == "time");
 }
 
 // The variable scaled to [-1, 1] between its 1 % and 99 % points over all valid samples; false if
 // it does not vary.
-bool scaled_variable(const Campaign& campaign, const Variable& variable,
+bool scaled_variable(const Campaign& campaign, const IndexVariable& variable,
                      std::vector<ArrayXd>& out) {
   std::vector<double> all;
   out.clear();
@@ -93,8 +68,8 @@ std::vector<UnknownGroup> score_groups(const Engine& engine) {
   const auto n = static_cast<Index>(parameters.size());
   std::vector<UnknownGroup> out;
   std::vector<std::vector<ArrayXd>> index;
-  std::vector<const Variable*> used;
-  for (const Variable& variable : variables()) {
+  std::vector<const IndexVariable*> used;
+  for (const IndexVariable& variable : index_variables()) {
     if (variable.name == std::string_view("torque") && !campaign.torque_varies) continue;
     std::vector<ArrayXd> values;
     if (scaled_variable(campaign, variable, values)) {
@@ -109,15 +84,26 @@ std::vector<UnknownGroup> score_groups(const Engine& engine) {
     for (const auto& values : index) {
       const ArrayXd& x = values[static_cast<std::size_t>(run)];
       const std::array<ArrayXd, 3> legendre{x, 1.5 * x.square() - 0.5, 2.5 * x.cube() - 1.5 * x};
+      const std::string name = used[static_cast<std::size_t>(&values - index.data())]->name;
       for (std::size_t injection = 0; injection < kActsOn.size(); ++injection) {
         for (const ArrayXd& p : legendre) {
           QuantityChange change;
+          if (!sensible(campaign, name,
+                        injection)) {  // a column all the same, its place is counted
+            columns.emplace_back();
+            continue;
+          }
           if (injection == 0) change.ln_capacity = p * kUnit[0];
           if (injection == 1) change.slip = p * kUnit[1];
           if (injection == 2) {
             change.torque = p * kUnit[2];
             change.balance = p * kUnit[2];
           }
+          if (injection == 3) {
+            change.torque = p * kUnit[3] * at.clean.torque.value;
+            change.balance = change.torque;
+          }
+          if (injection == 4) change.ln_capacity = p * kUnit[4] / at.there.force_N.max(50.0);
           columns.push_back(propagate(campaign, at, change));
         }
       }
@@ -140,8 +126,8 @@ std::vector<UnknownGroup> score_groups(const Engine& engine) {
   std::optional<double> none_left_out;
   for (std::size_t v = 0; v < used.size(); ++v) {
     for (std::size_t injection = 0; injection < kActsOn.size(); ++injection) {
-      if (!sensible(used[v]->name, injection)) continue;
-      const int first = static_cast<int>(n) + static_cast<int>(v * 9 + injection * 3);
+      if (!sensible(campaign, used[v]->name, injection)) continue;
+      const int first = static_cast<int>(n) + static_cast<int>(v * kPerVariable + injection * 3);
       std::vector<int> columns = base;
       Prior prior = base_prior;
       prior.pull.conservativeResize(n + 3);

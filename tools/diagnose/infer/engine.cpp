@@ -406,6 +406,21 @@ double Engine::degrees(double with_scatter, double without_scatter) const {
   return between / std::max(share * share, 1e-6);
 }
 
+std::vector<RandomVector> Engine::offsets() const {
+  std::vector<int> columns = columns_of(with_nuisances(accepted_));
+  VectorXd full(base_.step.size() + 1);
+  full << base_.step, 1.0;
+  const MatrixXd inverse = (1.0 / base_.scatter.variance).matrix().asDiagonal();
+  std::vector<RandomVector> out;
+  if (summaries_.empty()) return out;
+  columns.push_back(static_cast<int>(summaries_.front().aa.rows()) - 1);
+  for (const Summary& each : summaries_) {
+    const VectorXd right = each.ua(Eigen::all, columns) * full;
+    out.emplace_back(-(each.uu + inverse).llt().solve(right).array());
+  }
+  return out;
+}
+
 bool Engine::scatters_unusually() const {
   constexpr double kUnusual = 3.0;  // times the usual
   return (base_.scatter.variance > kUnusual * kUnusual * default_scatter().variance).any();

@@ -54,6 +54,9 @@ class Engine {
   const std::vector<Summary>& summaries() const { return summaries_; }
   const Whitening& whitening() const { return whitening_; }
   const std::vector<int>& active_nuisances() const { return nuisances_; }
+  const Scatter& scatter() const { return base_.scatter; }
+  // Of each experiment with valid samples: by how much it differs from the others.
+  std::vector<RandomVector> offsets() const;
 
   // Constants of the nominal machine from the data: robust, from several starts.
   void fit_machine(int jobs = 1);

@@ -13,6 +13,7 @@ namespace beltgrip::diagnose {
 // What varies from experiment to experiment in a healthy machine: level of friction, seat of the
 // ratio, zero of the torque, slip at the peak, zero of the secondary torque, zero of the tracking.
 inline constexpr int kRandomEffects = 6;
+using RandomVector = Eigen::Array<double, kRandomEffects, 1>;
 
 // Whitened columns of one residual; those that are zero there (the other end stop's, what another
 // residual alone sees) are left out: half of them.
@@ -46,7 +47,7 @@ struct Summary {
 };
 
 struct Scatter {
-  Eigen::Array<double, kRandomEffects, 1> variance;
+  RandomVector variance;
 };
 Scatter default_scatter();
 // A cause that acts in every experiment makes them more alike. What fits within each of them and

@@ -197,6 +197,7 @@ void add_tables(report::HtmlPage& page, const Diagnosis& d) {
 std::string html_text(const Diagnosis& d, const Plots& plots) {
   report::HtmlPage page("BeltGrip: diagnosis");
   page.paragraph(headline(d));
+  page.paragraph("Verdict: " + verdict_line(d) + ".");
   if (d.verdict == Verdict::kNothingWrong) {
     page.paragraph(
         "Nothing stands out from noise and from the scatter between experiments. What these "
@@ -204,11 +205,9 @@ std::string html_text(const Diagnosis& d, const Plots& plots) {
   }
   for (const Finding& finding : d.findings) page.paragraph(sentence(finding));
   if (d.unexplained) {
-    page.paragraph("Something that is not in the library acts on " + d.unexplained->acts_on +
-                   " and follows " + joined(d.unexplained->depends_on) + ": " +
-                   number(100.0 * d.unexplained->share) + " % of the residual's energy.");
+    page.paragraph("Unexplained: " + sentence(*d.unexplained) + ".");
   }
-  if (!d.next_experiment.empty()) page.paragraph("Next experiment: " + d.next_experiment + ".");
+  if (d.next_experiment) page.paragraph("Next experiment: " + d.next_experiment->text + ".");
   add_findings(page, d);
   add_errors(page, d);
   add_tables(page, d);

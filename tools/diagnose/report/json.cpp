@@ -1,6 +1,8 @@
 #include "tools/diagnose/report/json.h"
 
+#include <algorithm>
 #include <cstdio>
+#include <vector>
 
 #include "tools/text/json_writer.h"
 
@@ -31,7 +33,69 @@ std::string number(double value) {
   return buffer;
 }
 
+const char* kind_text(MisfitKind kind) {
+  switch (kind) {
+    case MisfitKind::kFunction:
+      return "function";
+    case MisfitKind::kLine:
+      return "line";
+    case MisfitKind::kBetweenRuns:
+      return "between_runs";
+    case MisfitKind::kSlow:
+      return "slow";
+  }
+  return "function";
+}
+
+void write_unexplained(text::JsonWriter& json, const std::optional<Unexplained>& left) {
+  json.key("unexplained");
+  if (!left) {
+    json.null();
+    return;
+  }
+  json.begin_object().field("acts_on", left->acts_on);
+  json.key("depends_on").begin_array();
+  for (const std::string& role : left->depends_on) json.value(role);
+  json.end_array().field("share", left->share).field("kind", kind_text(left->kind));
+  json.key("frequency_Hz");
+  left->frequency_Hz ? json.value(*left->frequency_Hz) : json.null();
+  json.end_object();
+}
+
+void write_next(text::JsonWriter& json, const std::optional<Recipe>& next) {
+  json.key("next_experiment");
+  if (!next) {
+    json.null();
+    return;
+  }
+  json.begin_object().field("text", next->text).field("scenario", next->scenario).end_object();
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string out;
+  for (const std::string& each : words) out += (out.empty() ? "" : ", ") + each;
+  return out;
+}
+
 }  // namespace
+
+std::string sentence(const Unexplained& left) {
+  const std::string share = number(100.0 * left.share) + " % of the misfit";
+  switch (left.kind) {
+    case MisfitKind::kFunction:
+      return "something that has no name here acts on " + left.acts_on + " and follows " +
+             joined(left.depends_on) + " (" + share + ")";
+    case MisfitKind::kLine:
+      return "a line at " + number(left.frequency_Hz.value_or(0.0)) + " Hz in " + left.acts_on +
+             (left.depends_on.empty() ? "" : ", stronger with " + joined(left.depends_on));
+    case MisfitKind::kBetweenRuns:
+      return left.acts_on +
+             " differs between experiments by more than it should and follows nothing recorded";
+    case MisfitKind::kSlow:
+      return left.acts_on + " departs slowly within experiments and follows nothing recorded";
+  }
+  return {};
+}
 
 std::string figure_text(const Rerun& rerun, const RerunFigure& figure) {
   const auto text = [&](const std::optional<Measured>& side) {
@@ -46,6 +110,7 @@ std::string json_text(const Diagnosis& d) {
   const char* verdict = verdict_text(d.verdict);
   json.key("verdict");
   verdict == nullptr ? json.null() : json.value(verdict);
+  json.field("headline", headline(d));
   json.field("complete", d.complete);
   json.field("experiments", d.experiments);
   json.field("usable_s", 0.1 * d.samples);
@@ -57,6 +122,12 @@ std::string json_text(const Diagnosis& d) {
     json.key("tests").begin_object();
     for (const auto& [test, p] : signal.tests) json.field(test, p);
     json.end_object().end_object();
+  }
+  json.end_object();
+  json.key("remaining").begin_object();
+  for (const auto& [name, test] : d.left) {
+    json.key(name).begin_object().field("value", test.value).field("limit", test.limit);
+    json.end_object();
   }
   json.end_object();
   json.key("simulation").begin_object();
@@ -109,15 +180,9 @@ std::string json_text(const Diagnosis& d) {
     json.end_object().end_object();
   }
   json.end_array();
-  json.key("unexplained");
-  if (d.unexplained) {
-    json.begin_object().field("acts_on", d.unexplained->acts_on);
-    json.key("depends_on").begin_array();
-    for (const std::string& role : d.unexplained->depends_on) json.value(role);
-    json.end_array().field("share", d.unexplained->share).end_object();
-  } else {
-    json.null();
-  }
+  write_unexplained(json, d.unexplained);
+  json.field("scatter_base", d.scatter_from_replicates ? "replicates" : "prior");
+  json.key("learned").begin_array().end_array();
   json.key("not_identifiable").begin_array();
   for (const NotIdentifiable& each : d.not_identifiable) {
     json.begin_object().field("effect", each.effect);
@@ -154,8 +219,7 @@ std::string json_text(const Diagnosis& d) {
     json.end_object();
   }
   json.end_array();
-  json.key("next_experiment");
-  d.next_experiment.empty() ? json.null() : json.value(d.next_experiment);
+  write_next(json, d.next_experiment);
   json.key("machine").begin_object();
   for (const auto& [name, value] : d.machine) {
     json.key(name).begin_object().field("value", value.value);
@@ -170,7 +234,7 @@ std::string json_text(const Diagnosis& d) {
   return json.take() + "\n";
 }
 
-std::string headline(const Diagnosis& d) {
+std::string verdict_line(const Diagnosis& d) {
   std::string what;
   switch (d.verdict) {
     case Verdict::kNone:
@@ -189,8 +253,56 @@ std::string headline(const Diagnosis& d) {
          " s usable)" + (d.complete ? "" : ", stopped before the end");
 }
 
+namespace {
+
+std::string size_text(const Finding& finding) {
+  std::string out = finding.effect + (finding.role.empty() ? "" : " (" + finding.role + ")");
+  for (const auto& [name, value] : finding.parameters) {
+    out += ", " + name + " " + number(value.value) + " [" + number(value.low) + ", " +
+           number(value.high) + "]";
+  }
+  return out;
+}
+
+// By how much the error of mu_max falls, or of the signal that gains most.
+std::string gain_text(const Diagnosis& d) {
+  if (d.mu_max && d.mu_max->after < d.mu_max->before) {
+    return "; with it mu_max is off by " + number(100.0 * d.mu_max->after) + " % instead of " +
+           number(100.0 * d.mu_max->before) + " %";
+  }
+  const auto best =
+      std::min_element(d.held_out.begin(), d.held_out.end(), [](const auto& a, const auto& b) {
+        return a.second.after * b.second.before < b.second.after * a.second.before;
+      });
+  if (best == d.held_out.end() || !(best->second.after < best->second.before)) return {};
+  return "; with it " + best->first + " is off by " + number(best->second.after) + " instead of " +
+         number(best->second.before) + " (SI)";
+}
+
+}  // namespace
+
+std::string headline(const Diagnosis& d) {
+  std::string found;
+  for (const Finding& finding : d.findings) {
+    found += (found.empty() ? "" : " and ") + size_text(finding);
+  }
+  if (d.verdict == Verdict::kUnexplained && d.unexplained) {
+    return (found.empty() ? "Unexplained: " : "Beside " + found + " is left: ") +
+           sentence(*d.unexplained) + ".";
+  }
+  if (d.verdict == Verdict::kExplained) {
+    return found + (d.findings.size() > 1 ? " explain" : " explains") + " what was wrong" +
+           gain_text(d) + ".";
+  }
+  if (d.verdict == Verdict::kNothingWrong) {
+    return "Nothing stands out from noise and scatter in " + std::to_string(d.experiments) +
+           (d.experiments == 1 ? " experiment." : " experiments.");
+  }
+  return "Stopped before the end: what is not named here may be there.";
+}
+
 std::string plain_text(const Diagnosis& d) {
-  std::string out = "verdict: " + headline(d) + "\n";
+  std::string out = "verdict: " + verdict_line(d) + "\n" + headline(d) + "\n";
   for (const auto& [name, signal] : d.baseline) {
     out += "  " + name + ": the simulation is off by " + number(signal.rmse) + " rms, noise " +
            number(signal.noise_floor) + "\n";
@@ -215,11 +327,7 @@ std::string plain_text(const Diagnosis& d) {
       out += "\n  what would: " + finding.separate_by + "\n";
     }
   }
-  if (d.unexplained) {
-    out += "unexplained: acts on " + d.unexplained->acts_on + ", follows";
-    for (const std::string& role : d.unexplained->depends_on) out += " " + role;
-    out += "\n";
-  }
+  if (d.unexplained) out += "unexplained: " + sentence(*d.unexplained) + "\n";
   if (!d.held_out.empty()) {
     out += "on experiments not used for the fit (before -> after, 95 % of the difference):\n";
   }
@@ -258,7 +366,7 @@ std::string plain_text(const Diagnosis& d) {
     for (const NotIdentifiable& each : d.not_identifiable) out += " " + each.effect;
     out += "\n";
   }
-  if (!d.next_experiment.empty()) out += "next experiment: " + d.next_experiment + "\n";
+  if (d.next_experiment) out += "next experiment: " + d.next_experiment->text + "\n";
   for (const std::string& note : d.notes) out += "note: " + note + "\n";
   return out;
 }

@@ -8,7 +8,11 @@
 
 namespace beltgrip::diagnose {
 std::string json_text(const Diagnosis& diagnosis);
-std::string headline(const Diagnosis& diagnosis);  // the verdict in one line
+std::string verdict_line(const Diagnosis& diagnosis);
+// What is left unexplained, as a part of a sentence.
+std::string sentence(const Unexplained& left);
+// What a reader has to know, in one sentence.
+std::string headline(const Diagnosis& diagnosis);
 std::string plain_text(const Diagnosis& diagnosis);
 
 // What a rerun shows, in the order of every output.

@@ -7,8 +7,10 @@
 #include "estimator/physics/clamp_force.h"
 #include "estimator/statistics/distributions.h"
 #include "estimator/statistics/interval.h"
+#include "tools/diagnose/decide/criticism.h"
 #include "tools/diagnose/decide/namer.h"
 #include "tools/diagnose/decide/plausibility.h"
+#include "tools/diagnose/decide/recipe.h"
 #include "tools/diagnose/infer/engine.h"
 #include "tools/diagnose/infer/gain.h"
 #include "tools/diagnose/infer/parallel.h"
@@ -46,6 +48,7 @@ class Run {
     answer_.extended = request_.model;
     std::vector<ExperimentData> runs;
     drop_copies(request_.experiments, doubts_);
+    is_coarse_ = std::any_of(request_.experiments.begin(), request_.experiments.end(), is_coarse);
     runs.resize(request_.experiments.size());
     in_parallel(request_.jobs, runs.size(), [&](std::size_t i) {
       runs[i] = prepare(request_.experiments[i], request_.model.variator);
@@ -62,10 +65,7 @@ class Run {
     check_same_machine(runs, request_.model.variator, doubts_);
     check_torques(runs, doubts_);
     if (out().samples < kSamplesMin) {
-      out().notes.push_back("too little data: " + text_of(0.1 * out().samples) +
-                            " s usable, at least 10 s are needed; nothing can be said");
-      nothing_identifiable("too little data");
-      tell_doubts();
+      answer_.impossible = too_little();
       return std::move(answer_);
     }
     check_friction(runs, request_.model.variator, doubts_);
@@ -89,6 +89,20 @@ class Run {
   }
   void progress(double share, const std::string& what) const {
     if (request_.progress) request_.progress(share, what);
+  }
+
+  // With the note that most likely says why.
+  std::string too_little() {
+    tell_doubts();
+    const std::vector<std::string>& notes = out().notes;
+    const auto telling = std::find_if(notes.begin(), notes.end(), [](const std::string& note) {
+      return note.find(": not used: ") != std::string::npos;
+    });
+    const std::string why = telling != notes.end() ? *telling
+                            : notes.empty()        ? std::string()
+                                                   : notes.front();
+    return "found " + text_of(0.1 * out().samples) + " s of usable data, expected at least " +
+           text_of(0.1 * kSamplesMin) + " s" + (why.empty() ? why : " (" + why + ")");
   }
 
   static std::string why_unusable(const ExperimentData& run) {
@@ -195,14 +209,7 @@ class Run {
     out().mu_max = gain.mu_max;
     for (const auto& [name, errors] : gain.forward) out().simulation[name].left_out = errors;
     fill_findings(engine, named ? naming.accepted : std::vector<Accepted>(), naming, gain);
-    if (naming.unknown) {
-      out().unexplained =
-          Unexplained{naming.unknown->acts_on, {naming.unknown->depends_on}, naming.unknown->share};
-    }
-    out().verdict = naming.unknown                   ? Verdict::kUnexplained
-                    : !out().findings.empty()        ? Verdict::kExplained
-                    : out().complete && !unconfirmed ? Verdict::kNothingWrong
-                                                     : Verdict::kNone;
+    judge(engine, naming, named);
     propose(engine, naming);
     answer_.extended = request_.model;
     const ModelState& stored = !named ? naming.nominal.state : extended;
@@ -214,6 +221,33 @@ class Run {
     }
     store_effects(campaign.slots, campaign.switched_on + stored.effects, stored.nuisance,
                   answer_.extended);
+  }
+
+  // The tests of the residuals that are left decide.
+  void judge(const Engine& engine, const Naming& naming, bool named) {
+    const Criticism criticism = criticise(engine, is_coarse_);
+    if (is_coarse_) {
+      out().notes.emplace_back(
+          "a pressure or torque moves in steps beyond its noise: lines and slow courses are not "
+          "judged, and only what is large is seen");
+    }
+    out().scatter_from_replicates = criticism.base.from_replicates;
+    for (const JudgedTest& test : criticism.tests) out().left[test.name] = {test.value, test.limit};
+    if (!criticism.passed()) {
+      out().unexplained = what_is_left(criticism);
+    } else if (naming.unknown) {
+      out().unexplained =
+          Unexplained{naming.unknown->acts_on, {naming.unknown->depends_on}, naming.unknown->share};
+    } else if (!named && !naming.accepted.empty()) {
+      const int slot = naming.accepted.front().slot;
+      const EffectRow& row = *engine.campaign().slots[static_cast<std::size_t>(slot)].row;
+      out().unexplained = Unexplained{std::string(row.acts_on), {std::string(row.depends_on)}};
+    }
+    out().verdict = !out().complete          ? Verdict::kNone
+                    : out().unexplained      ? Verdict::kUnexplained
+                    : out().findings.empty() ? Verdict::kNothingWrong
+                                             : Verdict::kExplained;
+    if (!out().complete) out().unexplained.reset();
   }
 
   void fill_machine(const Engine& engine, const Naming& naming) {
@@ -251,6 +285,9 @@ class Run {
     }
     const auto floors = noise_floors(campaign, naming.nominal.state);
     std::vector<ResidualTest> tests = test_residuals(engine, naming.nominal.state);
+    if (is_coarse_) {  // steps are not white, whatever the model
+      std::erase_if(tests, [](const ResidualTest& test) { return test.name == "whiteness"; });
+    }
     for (const UnknownGroup& group : naming.nominal_groups) {
       tests.push_back({group.acts_on, group.depends_on, estimator::chi2_p(group.chi2, 1)});
     }
@@ -374,37 +411,45 @@ class Run {
   }
 
   void propose(const Engine& engine, const Naming& naming) {
+    const Campaign& campaign = engine.campaign();
+    const ModelState& state = naming.hypothesis.state;
+    const auto next = [&](std::string_view depends_on, const std::string& why) {
+      out().next_experiment = recipe(campaign, state, varied_by(depends_on), why);
+    };
     for (const Finding& finding : out().findings) {
-      if (!finding.aliases.empty()) {
-        out().next_experiment = finding.separate_by;
-        return;
-      }
-    }
-    if (naming.unknown) {
-      out().next_experiment = "repeat one experiment with only " + naming.unknown->depends_on +
-                              " changed, at three levels, the first one again at the end";
+      if (finding.aliases.empty()) continue;
+      next(row_of(finding.effect)->depends_on,
+           "to tell " + finding.effect + " from " + finding.aliases.front());
       return;
     }
-    if (engine.campaign().runs.size() < 3) {
-      out().next_experiment =
-          "repeat the reference experiment three times: the scatter between "
-          "experiments is not known";
+    if (const auto& unexplained = out().unexplained) {
+      const Unexplained& left = *unexplained;
+      if (left.kind == MisfitKind::kFunction && !left.depends_on.empty()) {
+        next(left.depends_on.front(), "a further level of " + left.depends_on.front());
+      } else {
+        next("", "repeat the reference: is it the same every time");
+      }
+      return;
+    }
+    if (campaign.runs.size() < kExperimentsMin) {
+      next("", "repeat the reference three times: how experiments scatter is not known");
       return;
     }
     if (!out().not_identifiable.empty()) {
       const std::string& id = out().not_identifiable.front().effect;
-      for (const EffectRow& row : effect_rows()) {
-        if (row.id == id) {
-          out().next_experiment = row.separating;
-          return;
-        }
-      }
+      next(row_of(id)->depends_on, "to see " + id);
     }
+  }
+
+  static const EffectRow* row_of(const std::string& id) {
+    return &*std::find_if(effect_rows().begin(), effect_rows().end(),
+                          [&](const EffectRow& row) { return row.id == id; });
   }
 
   Request request_;
   Answer answer_;
   Doubts doubts_;
+  bool is_coarse_ = false;
 };
 
 }  // namespace

@@ -26,6 +26,7 @@ struct Answer {
   Diagnosis diagnosis;
   ModelFile extended;  // the model with what was found
   Plots plots;
+  std::string impossible;  // why nothing can be analysed; empty: it can
 };
 
 Answer diagnose(Request request);

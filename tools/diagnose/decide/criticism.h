@@ -1,0 +1,38 @@
+// What the model of the moment does not explain: the tests of its residuals, which decide the
+// verdict.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/diagnose/data/diagnosis.h"
+#include "tools/diagnose/infer/cells.h"
+#include "tools/diagnose/infer/line_test.h"
+#include "tools/diagnose/infer/scatter_base.h"
+
+namespace beltgrip::diagnose {
+
+struct JudgedTest {
+  std::string name;  // law_cell, smooth_cell, line, whiteness, scatter_friction, ...
+  double value = 0.0, limit = 0.0;
+  bool passed() const { return !(value > limit); }
+};
+
+struct Criticism {
+  std::vector<Cell> cells;  // the best first
+  SpectralLine line;
+  ScatterBase base;
+  std::vector<JudgedTest> tests;
+  bool passed() const;
+  const JudgedTest& test(const std::string& name) const;
+};
+
+// At the engine's state. coarse: channels move in steps, which leave lines and slow courses of
+// their own; those tests are left out, and a function has to explain more.
+Criticism criticise(const Engine& engine, bool coarse);
+
+// What is to be said of residuals that fail.
+Unexplained what_is_left(const Criticism& criticism);
+
+}  // namespace beltgrip::diagnose

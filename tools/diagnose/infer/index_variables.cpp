@@ -1,0 +1,123 @@
+#include "tools/diagnose/infer/index_variables.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+namespace beltgrip::diagnose {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+
+constexpr double kVaried = 0.05;      // of its middle; less may be the channel's own noise
+constexpr double kMovesShare = 0.06;  // of the span: an experiment that moves it less has one value
+constexpr double kLevelShare = 0.03;  // of the span: means nearer than that are one level
+constexpr double kLowPass_s = 3.0;
+constexpr std::size_t kSamplesMin = 50;
+
+constexpr std::array kAll{
+    IndexVariable{"oil_temperature",
+                  [](const ExperimentData& r, int) -> ArrayXd {
+                    return r.temperature.present ? r.temperature.value : ArrayXd();
+                  }},
+    IndexVariable{"primary_speed",
+                  [](const ExperimentData& r, int) -> ArrayXd { return r.omega_p.slow; }},
+    IndexVariable{"secondary_pressure",
+                  [](const ExperimentData& r, int) -> ArrayXd { return r.pressure.slow; }},
+    IndexVariable{"primary_pressure",
+                  [](const ExperimentData& r, int) -> ArrayXd {
+                    return r.pressure_p.present ? r.pressure_p.slow : ArrayXd();
+                  }},
+    IndexVariable{"torque", [](const ExperimentData& r, int) -> ArrayXd { return r.torque.slow; }},
+    IndexVariable{"acceleration",
+                  [](const ExperimentData& r, int) -> ArrayXd { return r.omega_p.slow_slope; }},
+    IndexVariable{"pressure_rate",
+                  [](const ExperimentData& r, int) -> ArrayXd { return r.pressure.slow_slope; }},
+    IndexVariable{"time", [](const ExperimentData& r, int) -> ArrayXd { return r.t_s; }},
+    IndexVariable{"experiment",
+                  [](const ExperimentData& r, int e) -> ArrayXd {
+                    return ArrayXd::Constant(r.size(), static_cast<double>(e));
+                  }},
+};
+
+// Mean over a window about each sample, of what is finite.
+ArrayXd low_passed(const ArrayXd& in, double dt_s) {
+  const auto half = static_cast<Index>(0.5 * kLowPass_s / dt_s);
+  ArrayXd out = in;
+  double sum = 0.0;
+  Index first = 0, behind = 0;
+  for (Index k = 0; k < in.size(); ++k) {
+    for (; behind < std::min(in.size(), k + half + 1); ++behind) sum += in[behind];
+    for (; first < k - half; ++first) sum -= in[first];
+    out[k] = sum / static_cast<double>(behind - first);
+  }
+  return out;
+}
+
+std::vector<double> valid_values(const ExperimentData& run, const ArrayXd& in) {
+  std::vector<double> out;
+  for (int k = 0; k < run.size(); ++k) {
+    if (run.valid[static_cast<std::size_t>(k)]) out.push_back(in[k]);
+  }
+  return out;
+}
+
+void number_levels(Abscissa& out) {
+  std::vector<std::size_t> order;
+  for (std::size_t e = 0; e < out.x.size(); ++e) {
+    if (out.x[e].size() > 0) order.push_back(e);
+  }
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return out.mean[a] < out.mean[b]; });
+  out.level.assign(out.x.size(), -1);
+  double begun = 0.0;
+  for (const std::size_t e : order) {
+    if (out.levels == 0 || out.mean[e] - begun > kLevelShare * (out.high - out.low)) {
+      ++out.levels;
+      begun = out.mean[e];
+    }
+    out.level[e] = out.levels - 1;
+  }
+}
+
+}  // namespace
+
+std::span<const IndexVariable> index_variables() { return kAll; }
+
+std::optional<Abscissa> abscissa_of(const Campaign& campaign, const IndexVariable& variable) {
+  Abscissa out;
+  out.variable = &variable;
+  std::vector<double> all;
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    const ExperimentData& run = campaign.runs[e];
+    out.mean.push_back(0.0);
+    out.x.emplace_back();
+    if (run.valid_count == 0) continue;
+    const ArrayXd value = variable.value(run, static_cast<int>(e));
+    if (value.size() == 0 || !value.allFinite()) return std::nullopt;
+    out.x.back() = low_passed(value, run.dt_s);
+    const std::vector<double> here = valid_values(run, out.x.back());
+    out.mean.back() =
+        std::accumulate(here.begin(), here.end(), 0.0) / static_cast<double>(here.size());
+    all.insert(all.end(), here.begin(), here.end());
+  }
+  if (all.size() < kSamplesMin) return std::nullopt;
+  std::sort(all.begin(), all.end());
+  out.low = all[all.size() / 100];
+  out.high = all[all.size() - 1 - all.size() / 100];
+  const double span = out.high - out.low;
+  if (!(span > kVaried * std::abs(all[all.size() / 2]) + 1e-12)) return std::nullopt;
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    if (out.x[e].size() == 0) continue;
+    const std::vector<double> here = valid_values(campaign.runs[e], out.x[e]);
+    const auto [least, most] = std::minmax_element(here.begin(), here.end());
+    if (*most - *least < kMovesShare * span) out.x[e].setConstant(out.mean[e]);
+    out.x[e] = ((out.x[e] - out.low) / span).max(0.0).min(1.0);
+  }
+  number_levels(out);
+  return out;
+}
+
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,128 @@
+#include "tools/diagnose/infer/line_test.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <vector>
+
+#include "estimator/statistics/order.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+using Eigen::ArrayXd;
+
+// Below the first ramps and sweeps leave their own lines; above the second the grid's filter ends.
+constexpr double kLowest_Hz = 0.7, kHighest_Hz = 4.5, kStep_Hz = 0.05;
+constexpr double kAround_Hz = 0.6;  // the noise's level is the median so far about
+constexpr double kSmooth_s = 2.0;   // slower courses are no line
+constexpr int kSamplesMin = 100;
+constexpr double kLeast = 0.05;  // of the noise: less is rounding
+constexpr double kClip = 4.0;    // sigmas
+
+// The residual's valid stretches without their slow course, outliers clipped; zero elsewhere.
+ArrayXd fast_part(const ExperimentData& run, const ArrayXd& residual, int every) {
+  const int half = static_cast<int>(0.5 * kSmooth_s / run.dt_s);
+  ArrayXd out = ArrayXd::Zero(residual.size());
+  std::vector<double> sizes;
+  for (int k = 0; k < run.size(); k += every) {
+    if (!run.valid[static_cast<std::size_t>(k)] || residual[k] == 0.0) continue;
+    double sum = 0.0;
+    int count = 0;
+    for (int i = std::max(0, k - half); i <= std::min(run.size() - 1, k + half); ++i) {
+      if (!run.valid[static_cast<std::size_t>(i)] || residual[i] == 0.0) continue;
+      sum += residual[i];
+      ++count;
+    }
+    if (count < half / every) continue;
+    out[k] = residual[k] - sum / count;
+    sizes.push_back(out[k]);
+  }
+  const double bound = kClip * robust_sigma(sizes);
+  if (!(bound > kClip * kLeast) || static_cast<int>(sizes.size()) < kSamplesMin) return {};
+  return out.max(-bound).min(bound);
+}
+
+std::vector<double> spectrum(const ArrayXd& values, double dt_s, double highest_Hz) {
+  std::vector<double> out;
+  for (double f = kLowest_Hz; f <= highest_Hz; f += kStep_Hz) {
+    const std::complex<double> turn = std::polar(1.0, 2.0 * std::numbers::pi * f * dt_s);
+    std::complex<double> phase = 1.0, sum = 0.0;
+    for (const double each : values) {
+      sum += each * phase;
+      phase *= turn;
+    }
+    out.push_back(std::norm(sum));
+  }
+  return out;
+}
+
+// In units of the level about it.
+std::vector<double> levelled(const std::vector<double>& power) {
+  const int around = static_cast<int>(kAround_Hz / kStep_Hz);
+  std::vector<double> out(power.size());
+  for (int i = 0; i < static_cast<int>(power.size()); ++i) {
+    std::vector<double> near;
+    for (int j = std::max(0, i - around);
+         j <= std::min(static_cast<int>(power.size()) - 1, i + around); ++j) {
+      near.push_back(power[static_cast<std::size_t>(j)]);
+    }
+    const double level = estimator::median(near) / std::numbers::ln2;  // of an exponential
+    out[static_cast<std::size_t>(i)] =
+        level > 0.0 ? power[static_cast<std::size_t>(i)] / level : 0.0;
+  }
+  return out;
+}
+
+}  // namespace
+
+SpectralLine strongest_line(const Campaign& campaign, const ModelState& state) {
+  struct Pool {
+    std::vector<double> sum;
+    double total = 0.0;
+    int runs = 0;
+  };
+  std::array<Pool, 2> pools;  // friction, balance
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    const ExperimentData& run = campaign.runs[e];
+    if (run.valid_count < kSamplesMin) continue;
+    const Residuals at = residuals_of(campaign, static_cast<int>(e), state);
+    for (const ResidualKind kind : {kFrictionResidual, kBalanceResidual}) {
+      const auto q = static_cast<std::size_t>(kind);
+      if (at.value[q].size() == 0) continue;
+      const int every = kind == kBalanceResidual ? kBalanceStep : 1;
+      const ArrayXd fast = fast_part(run, at.value[q], every);
+      if (fast.size() == 0) continue;
+      const double highest_Hz = std::min(kHighest_Hz, 0.45 / (run.dt_s * every));
+      const std::vector<double> own = levelled(spectrum(fast, run.dt_s, highest_Hz));
+      Pool& pool = pools[q];
+      pool.sum.resize(std::max(pool.sum.size(), own.size()), 0.0);
+      for (std::size_t i = 0; i < own.size(); ++i) pool.sum[i] += own[i];
+      ++pool.runs;
+    }
+  }
+  SpectralLine out;
+  constexpr std::array kActsOn{"friction", "torque"};
+  for (std::size_t q = 0; q < pools.size(); ++q) {
+    const Pool& pool = pools[q];
+    if (pool.runs == 0 || pool.sum.size() < 10) continue;
+    double whole = 0.0;
+    for (const double each : pool.sum) whole += each;
+    for (std::size_t i = 0; i < pool.sum.size(); ++i) {
+      // Wilson and Hilferty: a sum of exponential variables as a normal one.
+      const double n = pool.runs;
+      const double excess =
+          (std::cbrt(pool.sum[i] / n) - (1.0 - 1.0 / (9.0 * n))) * 3.0 * std::sqrt(n);
+      if (excess <= out.excess) continue;
+      double line = 0.0;
+      for (std::size_t j = i > 1 ? i - 1 : 0; j <= std::min(i + 1, pool.sum.size() - 1); ++j) {
+        line += pool.sum[j];
+      }
+      out = {kActsOn[q], kLowest_Hz + kStep_Hz * static_cast<double>(i), excess, line / whole};
+    }
+  }
+  return out;
+}
+
+}  // namespace beltgrip::diagnose
