@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "estimator/method/possible_friction.h"
 #include "estimator/paper/kalman.h"
@@ -14,7 +15,6 @@
 namespace beltgrip::estimator {
 namespace {
 
-constexpr double kInitialVariance = 100.0;    // P(0), in units of R
 constexpr double kMeasurementVariance = 1.0;  // R, equation (20)
 constexpr double kTableRate_hz = 200.0;       // at which Table I was chosen
 
@@ -35,11 +35,11 @@ class PaperEstimator final : public SlipCurveEstimator {
   void reset() noexcept override {
     chain_.reset();
     excitation_.reset();
-    filter_ = {Eigen::Vector2d::Zero(), Eigen::Matrix2d::Zero()};
+    filter_ = {Eigen::Vector2d(settings_.initial_slope, 0.0), Eigen::Matrix2d::Zero()};
+    began_ = near_peak_ = false;
     out_ = {};
     peak_ = {};
-    peak_samples_ = 0;
-    mean_ = squares_ = slip_mean_ = force_mean_ = torque_mean_ = omega_s_mean_ = 0.0;
+    forget_samples();
     largest_mu_ = largest_slip_ = 0.0;
   }
 
@@ -51,8 +51,9 @@ class PaperEstimator final : public SlipCurveEstimator {
     if (!now.usable) return out_;
 
     excitation_.step(now.slip_percent);
-    if (excitation_.opened()) {
-      filter_ = {Eigen::Vector2d(0.0, now.mu_star), kInitialVariance * Eigen::Matrix2d::Identity()};
+    const bool pause_ends = began_ && settings_.reopening == Reopening::kPaused;
+    if (excitation_.opened() && !pause_ends) {
+      begin(now);
     } else if (excitation_.open()) {
       kalman_step(filter_, now.slip_percent, now.mu_star, process_variance_, kMeasurementVariance);
     }
@@ -64,7 +65,12 @@ class PaperEstimator final : public SlipCurveEstimator {
       largest_mu_omega_s_rad_s_ = now.omega_s_rad_s;
     }
     if (out_.stop != StopReason::kNone || !excitation_.open()) return out_;
-    if (std::abs(out_.friction_slope) < settings_.peak_slope) collect(now);
+    const bool was_near_peak =
+        std::exchange(near_peak_, std::abs(out_.friction_slope) < settings_.peak_slope);
+    if (near_peak_) {
+      if (!was_near_peak && settings_.peak_samples == PeakSamples::kLast) forget_samples();
+      collect(now);
+    }
     if (out_.friction_slope < settings_.stop_slope) out_.stop = StopReason::kSlope;
     return out_;
   }
@@ -91,6 +97,20 @@ class PaperEstimator final : public SlipCurveEstimator {
   const PeakEstimate& peak() const noexcept override { return peak_; }
 
  private:
+  // The line through this sample, with an initial or the held slope.
+  void begin(const Measurement& now) noexcept {
+    const bool anew = !began_ || settings_.reopening == Reopening::kInitialSlope;
+    const double slope = anew ? settings_.initial_slope : filter_.x[0];
+    filter_ = {Eigen::Vector2d(slope, now.mu_star - slope * now.slip_percent),
+               settings_.initial_variance * Eigen::Matrix2d::Identity()};
+    began_ = true;
+  }
+
+  void forget_samples() noexcept {
+    peak_samples_ = 0;
+    mean_ = squares_ = slip_mean_ = force_mean_ = torque_mean_ = omega_s_mean_ = 0.0;
+  }
+
   void publish(const Measurement& now) noexcept {
     out_.mu_star = now.mu_star;
     out_.sigma_star_percent = now.slip_percent;
@@ -152,6 +172,8 @@ class PaperEstimator final : public SlipCurveEstimator {
   SlipExcitation excitation_;
   Eigen::Vector2d process_variance_;
   LineFilter filter_;
+  bool began_ = false;      // the gate has been open
+  bool near_peak_ = false;  // the last sample with the gate open
   CurveEstimate out_;
   PeakEstimate peak_;
   std::int64_t peak_samples_ = 0;

@@ -11,6 +11,9 @@ enum class EndStop { kOverdrive, kLow };
 enum class RatioChoice { kOverdrive, kLow, kEither };  // kEither: the stop nearest at the start
 enum class Method { kRobust, kPaper };
 enum class StopRule { kPeak, kConfidence };
+// What the paper's text leaves open, see paper/paper_estimator.h.
+enum class Reopening { kHeldSlope, kInitialSlope, kPaused };
+enum class PeakSamples { kAll, kLast };
 enum class Direction { kDrive, kOverrun };  // sign of the primary torque: +, -
 
 struct VariatorParameters {
@@ -64,6 +67,10 @@ struct EstimatorSettings {
   double excitation_threshold = 0.05;  // c_v, (percent slip)^2
   double stop_slope = -1e-3;           // c_k, 1 / percent slip
   double peak_slope = 1e-3;            // c_m, 1 / percent slip
+  double initial_slope = 0.015;        // k(0), 1 / percent slip
+  double initial_variance = 1e4;       // P(0), in units of R
+  Reopening reopening = Reopening::kHeldSlope;
+  PeakSamples peak_samples = PeakSamples::kAll;
 };
 
 }  // namespace beltgrip::estimator

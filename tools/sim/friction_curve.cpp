@@ -19,6 +19,16 @@ FrictionPoint rise(double mu_scale, double peak_slip, double slip) {
   return {mu_scale * t, mu_scale * (1.0 - t * t) * kSteepness / peak_slip};
 }
 
+FrictionPoint broad_rise(const FrictionCurve& curve, double slip) {
+  const double peak_slip = curve.peak_slip_percent / 100.0;
+  const double knee_slip = curve.knee_slip_percent / 100.0;
+  const double along = 100.0 * curve.rise_per_percent;
+  const double foot =
+      (curve.mu_max - along * peak_slip) / std::tanh(kSteepness * peak_slip / knee_slip);
+  const FrictionPoint steep = rise(foot, knee_slip, slip);
+  return {steep.mu + along * slip, steep.slope + along};
+}
+
 FrictionPoint magnitude(const FrictionCurve& curve, double slip) {
   const double peak_slip = curve.peak_slip_percent / 100.0;
   switch (curve.shape) {
@@ -39,6 +49,9 @@ FrictionPoint magnitude(const FrictionCurve& curve, double slip) {
             curve.mu_max * (1.0 - kSecondLower * t - 0.5 * kDip * (1.0 - std::cos(angle))),
             curve.mu_max / peak_slip * (-kSecondLower - std::numbers::pi * kDip * std::sin(angle))};
       }
+      break;
+    case CurveShape::kBroadTop:
+      if (slip <= peak_slip) return broad_rise(curve, slip);
       break;
     case CurveShape::kTanhFall:
       break;

@@ -73,6 +73,7 @@ void check_whole(ScenarioReader& r, const RigScenario& s) {
     r.contradiction("belt", "found \"" + s.belt + "\", expected one of the belts: " + names);
     return;
   }
+  for (const auto& [name, curve] : s.belts) check_curve(r, "belts." + name, curve);
   if (check_geometry(r, s.variator, {{"variator.ratio", s.variator.ratio}})) check_force(r, s);
   const double spring_N = s.variator.secondary_spring_force_N;
   if (s.start_force_N < spring_N) {

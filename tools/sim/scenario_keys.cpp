@@ -99,6 +99,9 @@ constexpr NumberKey<F> kCurve[] = {
     {"fall_per_percent", &F::fall_per_percent, 0.0, 0.1, "friction falls beyond its peak"},
     {"fall_at_once", &F::fall_at_once, 0.0, 0.5, "a share of the friction"},
     {"plateau_percent", &F::plateau_percent, 0.0, 20.0, "friction that lies level for some slip"},
+    {"knee_slip_percent", &F::knee_slip_percent, 0.1, 50.0,
+     "the steep foot of friction has an end"},
+    {"rise_per_percent", &F::rise_per_percent, 0.0, 0.1, "friction does not fall before its peak"},
 };
 
 void name_sensors(ScenarioReader& reader, Plant plant, SensorParameters& sensors) {
@@ -172,9 +175,20 @@ void name_world(ScenarioReader& reader, Plant plant, World& world) {
 }
 
 void name_curve(ScenarioReader& reader, const std::string& prefix, FrictionCurve& curve) {
-  reader.choice(prefix + "curve", {"tanh_fall", "magic_formula", "saturating", "two_peaks"},
+  reader.choice(prefix + "curve",
+                {"tanh_fall", "magic_formula", "saturating", "two_peaks", "broad_top"},
                 [&curve](std::size_t i) { curve.shape = static_cast<CurveShape>(i); });
   name_numbers<F>(reader, prefix, curve, kCurve, Plant::kRig);
+}
+
+void check_curve(ScenarioReader& reader, const std::string& place, const FrictionCurve& curve) {
+  const double along = curve.rise_per_percent * curve.peak_slip_percent;
+  if (curve.shape == CurveShape::kBroadTop && along >= curve.mu_max) {
+    reader.contradiction(place, "found rise_per_percent = " + number_text(curve.rise_per_percent) +
+                                    ": up to the peak at " + number_text(curve.peak_slip_percent) +
+                                    " % this alone is more than mu_max, " +
+                                    number_text(curve.mu_max));
+  }
 }
 
 bool check_geometry(ScenarioReader& reader, const VariatorParameters& v,

@@ -60,6 +60,8 @@ struct ScenarioResult {
 // name, [run], [variator], [sensors], [[fault]].
 void name_world(ScenarioReader& reader, Plant plant, World& world);
 void name_curve(ScenarioReader& reader, const std::string& prefix, FrictionCurve& curve);
+// place: a key or section that was read, where a contradiction is found.
+void check_curve(ScenarioReader& reader, const std::string& place, const FrictionCurve& curve);
 
 // What no key can tell alone: the belt fits around pulleys with these ratios, named by their keys;
 // each fault acts on something that is there. False where the geometry is wrong.

@@ -106,6 +106,7 @@ struct ScenarioReader::Impl {
         errors.push_back(wrong(section, shown, "a section [" + shown + "]"));
         continue;
       }
+      positions[shown] = place(section);
       ScenarioReader reader(kind.unknown);
       kind.begin(std::string(key.str()), reader);
       reader.impl_->source = source;

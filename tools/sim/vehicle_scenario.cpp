@@ -112,6 +112,7 @@ void check_whole(ScenarioReader& r, const VehicleScenario& s) {
   check_geometry(r, s.variator,
                  {{"variator.ratio_low", s.variator.ratio_low},
                   {"variator.ratio_overdrive", s.variator.ratio_overdrive}});
+  check_curve(r, "belt.curve", s.belt.overdrive);
   if (s.engine.stall_rad_s >= s.engine.idle_rad_s) {
     r.contradiction("engine.stall_rad_s", "found " + number_text(s.engine.stall_rad_s) +
                                               ", expected less than engine.idle_rad_s: the engine "

@@ -131,10 +131,11 @@ std::vector<VariatorSample> samples(const Trace& trace, double rate_hz) {
 // The method again, from the published sigma* and mu* of each usable sample.
 class Naive {
  public:
-  Naive(double rate_hz, double stop_slope)
-      : window_(static_cast<std::size_t>(std::lround(kT_s * rate_hz))),
-        scale_(200.0 / rate_hz),
-        stop_slope_(stop_slope) {}
+  explicit Naive(const EstimatorSettings& settings)
+      : k(settings.initial_slope),
+        settings_(settings),
+        window_(static_cast<std::size_t>(std::lround(kT_s * settings.sample_rate_hz))),
+        scale_(200.0 / settings.sample_rate_hz) {}
 
   void step(double slip, double mu) {
     slips_.push_back(slip);
@@ -142,11 +143,12 @@ class Naive {
     v = slips_.size() == window_ ? variance_in_two_passes(slips_) : 0.0;
     const bool was_open = open;
     open = v > kCv;
-    if (open && !was_open) {
-      ++rising;
-      k = 0.0;
-      mu0 = mu;
-      p11 = p22 = 100.0;
+    if (open && !was_open) ++rising;
+    const bool paused = settings_.reopening == Reopening::kPaused && rising > 1;
+    if (open && !was_open && !paused) {
+      if (settings_.reopening == Reopening::kInitialSlope) k = settings_.initial_slope;
+      mu0 = mu - k * slip;
+      p11 = p22 = settings_.initial_variance;
       p12 = 0.0;
     } else if (open) {
       const double s11 = p11 + kQk * scale_, s22 = p22 + kQmu0 * scale_, s12 = p12;  // (16), (21)
@@ -162,8 +164,11 @@ class Naive {
     }
     largest = std::max(largest, mu);
     if (stopped || !open) return;
-    if (std::abs(k) < kCm) near_peak.push_back(mu);
-    stopped = k < stop_slope_;
+    const bool inside = std::abs(k) < kCm;
+    if (inside && !was_inside && settings_.peak_samples == PeakSamples::kLast) near_peak.clear();
+    if (inside) near_peak.push_back(mu);
+    was_inside = inside;
+    stopped = k < settings_.stop_slope;
   }
   double mean() const {
     double sum = 0.0;
@@ -176,16 +181,16 @@ class Naive {
     return std::sqrt(sum / static_cast<double>(near_peak.size()));
   }
 
-  double v = 0.0, k = 0.0, mu0 = 0.0, p11 = 0.0, p12 = 0.0, p22 = 0.0, largest = 0.0;
-  bool open = false, stopped = false;
+  double v = 0.0, k, mu0 = 0.0, p11 = 0.0, p12 = 0.0, p22 = 0.0, largest = 0.0;
+  bool open = false, stopped = false, was_inside = false;
   int rising = 0;
   std::vector<double> near_peak;
 
  private:
+  EstimatorSettings settings_;
   std::deque<double> slips_;
   std::size_t window_;
   double scale_;
-  double stop_slope_;
 };
 
 struct Outcome {
@@ -196,16 +201,15 @@ struct Outcome {
 };
 
 // Steps both and compares them at every sample.
-Outcome compare(const Trace& trace, double rate_hz, double stop_slope = kCk,
+Outcome compare(const Trace& trace, double rate_hz, EstimatorSettings settings = {},
                 const SensorAccuracies& accuracies = {}) {
-  EstimatorSettings settings;
   settings.method = Method::kPaper;
   settings.sample_rate_hz = rate_hz;
   settings.torque_is_engine = false;
-  settings.stop_slope = stop_slope;
+  const double stop_slope = settings.stop_slope;
   const auto estimator = make_slip_curve_estimator(settings, kVariator, accuracies);
-  Outcome run = {.naive = Naive(rate_hz, stop_slope), .peak = {}};
-  double k_before = 0.0;
+  Outcome run = {.naive = Naive(settings), .peak = {}};
+  double k_before = settings.initial_slope;
   for (const VariatorSample& sample : samples(trace, rate_hz)) {
     const CurveEstimate& now = estimator->step(sample);
     EXPECT_EQ(now.t_ns, sample.t_ns);
@@ -218,10 +222,11 @@ Outcome compare(const Trace& trace, double rate_hz, double stop_slope = kCk,
     if (!run.naive.open) {
       EXPECT_EQ(now.friction_slope, k_before) << "held while the gate is closed";
       EXPECT_EQ(now.phase, Phase::kQuiet);
-      run.held += k_before != 0.0;
+      run.held += k_before != settings.initial_slope;
     } else {
-      if (!was_open) {
-        EXPECT_EQ(now.friction_slope, 0.0) << "starts anew at the rising edge";
+      const bool anew = run.naive.rising == 1 || settings.reopening == Reopening::kInitialSlope;
+      if (!was_open && anew) {
+        EXPECT_EQ(now.friction_slope, settings.initial_slope) << "the rising edge";
       }
       EXPECT_EQ(now.phase, run.naive.k > kCm          ? Phase::kExcited
                            : run.naive.k < stop_slope ? Phase::kMacroSlip
@@ -271,23 +276,51 @@ TEST(Paper, ScalesTheWalkWithTheSampleRate) {
 }
 
 TEST(Paper, SamplesBetweenTheBandAndTheStopAreOfThePeaksPhaseButNotOfItsMean) {
-  const Outcome run = compare({rig_slip, rig_mu, 11.0, 0.02}, 200.0, -1.5e-3);
+  EstimatorSettings later;
+  later.stop_slope = -1.5e-3;
+  const Outcome run = compare({rig_slip, rig_mu, 11.0, 0.02}, 200.0, later);
   EXPECT_EQ(run.stop, StopReason::kSlope);
   EXPECT_NEAR(run.peak.mu_max, run.naive.mean(), 1e-12);
   const Outcome early = compare({rig_slip, rig_mu, 11.0, 0.02}, 200.0);
   EXPECT_EQ(run.peak.samples, early.peak.samples);  // k only falls: the band is left once
 }
 
-TEST(Paper, HoldsTheSlopeWhileTheGateIsClosedAndStartsAnew) {
-  // Two strokes of slip over a rising curve with rest between them, then a third.
+// Strokes of slip with rest between them, up and down over a round peak of 0.1 at 2 %.
+TEST(Paper, ReadingsThatTheTextLeavesOpen) {
   const auto slip = [](double t_s) {
     const double part = std::fmod(t_s, 6.0);
     return 1.0 + (part < 3.0 ? 0.0 : std::min(1.0, part - 3.0) * 1.5);
   };
-  const auto mu = [&](double t_s) { return 0.05 + 0.012 * slip(t_s); };
-  const Outcome run = compare({slip, mu, 20.0}, 200.0);
-  EXPECT_GE(run.naive.rising, 3);
-  EXPECT_GT(run.held, 1000);
+  const auto mu = [&](double t_s) { return 0.1 - 0.002 * (slip(t_s) - 2.0) * (slip(t_s) - 2.0); };
+  std::vector<double> slopes;
+  int left_the_band = 0;
+  for (const Reopening reopening :
+       {Reopening::kHeldSlope, Reopening::kInitialSlope, Reopening::kPaused}) {
+    for (const auto& [slope, variance] : {std::pair{0.02, 1e4}, std::pair{0.0, 100.0}}) {
+      EstimatorSettings settings;
+      settings.reopening = reopening;
+      settings.initial_slope = slope;
+      settings.initial_variance = variance;
+      settings.stop_slope = -1.0;
+      const Outcome all = compare({slip, mu, 20.0}, 200.0, settings);
+      settings.peak_samples = PeakSamples::kLast;
+      const Outcome last = compare({slip, mu, 20.0}, 200.0, settings);
+      for (const Outcome& run : {all, last}) {
+        EXPECT_GE(run.naive.rising, 3);
+        EXPECT_GT(run.held, 1000);
+        ASSERT_FALSE(run.naive.near_peak.empty());
+        EXPECT_NEAR(run.peak.mu_max, run.naive.mean(), 1e-12);
+      }
+      EXPECT_EQ(all.naive.k, last.naive.k);
+      EXPECT_LE(last.peak.samples, all.peak.samples);
+      left_the_band += last.peak.samples < all.peak.samples ? 1 : 0;
+      slopes.push_back(all.naive.k);
+    }
+  }
+  EXPECT_GE(left_the_band, 2);
+  // Every reading of the filter is another one.
+  std::sort(slopes.begin(), slopes.end());
+  EXPECT_EQ(std::adjacent_find(slopes.begin(), slopes.end()), slopes.end());
 }
 
 TEST(Paper, NoSampleNearThePeakMeansALowerBound) {
@@ -318,7 +351,7 @@ TEST(Paper, SlipIsInPercent) {
 TEST(Paper, SensorAccuracyWidensTheInterval) {
   SensorAccuracies accuracies;
   accuracies.torque = {.bias = 1.0, .gain = 0.0};  // 2 % of 50 Nm
-  const Outcome run = compare({rig_slip, rig_mu, 11.0, 0.02}, 200.0, kCk, accuracies);
+  const Outcome run = compare({rig_slip, rig_mu, 11.0, 0.02}, 200.0, {}, accuracies);
   const double std = std::hypot(run.naive.deviation(), 0.02 * run.naive.mean());
   EXPECT_NEAR(run.peak.mu_max_std, std, 1e-7);
   EXPECT_NEAR(run.peak.ci95_high - run.peak.ci95_low, 2.0 * 1.96 * std, 1e-6);

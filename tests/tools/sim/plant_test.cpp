@@ -37,7 +37,8 @@ void run(RigSimulation& simulation) {
 }
 
 TEST(FrictionCurve, PeaksWhereItSaysAndIsOdd) {
-  for (const CurveShape shape : {CurveShape::kTanhFall, CurveShape::kMagicFormula}) {
+  for (const CurveShape shape :
+       {CurveShape::kTanhFall, CurveShape::kMagicFormula, CurveShape::kBroadTop}) {
     const FrictionCurve curve{shape, 0.105, 2.0, 1.5e-3};
     double best_mu = 0.0, best_slip = 0.0;
     for (double slip = 0.0; slip < 0.2; slip += 1e-5) {
@@ -58,14 +59,20 @@ TEST(FrictionCurve, PeaksWhereItSaysAndIsOdd) {
   EXPECT_EQ(friction_at(plateau, 0.034).mu, 0.105);
   EXPECT_EQ(friction_at(plateau, 0.034).slope, 0.0);
   EXPECT_NEAR(friction_at(plateau, 0.135).mu, 0.105 - 10 * 1.5e-3, 1e-12);
+  FrictionCurve broad{CurveShape::kBroadTop, 0.105, 4.5, 3e-3};
+  broad.knee_slip_percent = 1.0;
+  // Beyond the knee the foot gives nothing more: the top is a line.
+  EXPECT_NEAR(friction_at(broad, 0.035).mu, 0.105 - 1e-3, 1e-6);
+  EXPECT_NEAR(friction_at(broad, 0.065).mu, 0.105 - 2 * 3e-3, 1e-12);
+  EXPECT_NEAR(friction_at(broad, 5.0).mu, 0.0525, 1e-12);
   const FrictionCurve saturating{CurveShape::kSaturating, 0.105, 2.0, 0.0};
   EXPECT_GT(friction_at(saturating, 0.05).slope, 0.0);
   EXPECT_LT(friction_at(saturating, 1.0).mu, 0.105 + 1e-12);
 }
 
 TEST(FrictionCurve, SlopeIsTheDerivative) {
-  for (const CurveShape shape :
-       {CurveShape::kTanhFall, CurveShape::kMagicFormula, CurveShape::kSaturating}) {
+  for (const CurveShape shape : {CurveShape::kTanhFall, CurveShape::kMagicFormula,
+                                 CurveShape::kSaturating, CurveShape::kBroadTop}) {
     const FrictionCurve curve{shape, 0.1, 2.5, 2e-3};
     for (const double slip : {-0.04, -0.01, 0.001, 0.012, 0.024, 0.03, 0.15}) {
       const double h = 1e-7;

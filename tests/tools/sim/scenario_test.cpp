@@ -63,6 +63,8 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"[belts.new]\nmu = 0.1\n", "mine.toml:2: belts.new.mu: ", "not a key"},
         Mistake{"[belts.new]\nmu_max = 0\n", "mine.toml:2: belts.new.mu_max: found 0", "friction"},
         Mistake{"[belts.new]\ncurve = \"sine\"\n", "mine.toml:2: belts.new.curve: ", "tanh_fall"},
+        Mistake{"[belts.new]\ncurve = \"broad_top\"\nrise_per_percent = 0.06\n",
+                "mine.toml:1: belts.new: found rise_per_percent = 0.06", "more than mu_max"},
         Mistake{"belt = \"gold\"\n", "mine.toml:1: belt: found \"gold\"", "new, worn"},
         Mistake{"name = 3\n", "mine.toml:1: name: found 3", "text"},
         Mistake{"\n[driveline]\nsecondary_inertia_kg_m2 = -0.5\n",

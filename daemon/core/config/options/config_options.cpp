@@ -13,7 +13,9 @@ namespace {
 
 using estimator::EstimatorSettings;
 using estimator::Method;
+using estimator::PeakSamples;
 using estimator::RatioChoice;
+using estimator::Reopening;
 using estimator::StopRule;
 using estimator::VariatorParameters;
 using namespace option_row;
@@ -45,6 +47,11 @@ constexpr auto kDiagnostics =
     words<Diagnostics, 2>({{{Diagnostics::kListen, "listen"}, {Diagnostics::kPoll, "poll"}}});
 constexpr auto kStops =
     words<StopRule, 2>({{{StopRule::kPeak, "peak"}, {StopRule::kConfidence, "confidence"}}});
+constexpr auto kReopenings = words<Reopening, 3>({{{Reopening::kHeldSlope, "held_slope"},
+                                                   {Reopening::kInitialSlope, "initial_slope"},
+                                                   {Reopening::kPaused, "paused"}}});
+constexpr auto kPeakSamples =
+    words<PeakSamples, 2>({{{PeakSamples::kAll, "all"}, {PeakSamples::kLast, "last"}}});
 constexpr auto kByteOrders = words<can::ByteOrder, 2>(
     {{{can::ByteOrder::kLittle, "little"}, {can::ByteOrder::kBig, "big"}}});
 constexpr std::string_view kPathsExpected = "an array of paths: [\"vehicle.dbc\"]";
@@ -137,6 +144,21 @@ constexpr Option kOptions[] = {
     number<&Config::estimator, &EstimatorSettings::peak_slope>(
         "estimator", "peak_slope", "1/percent", 0.0, 1.0,
         "c_m, slope magnitude that counts as the peak, method \"paper\"."),
+    number<&Config::estimator, &EstimatorSettings::initial_slope>(
+        "estimator", "initial_slope", "1/percent", -1.0, 1.0,
+        "k(0), method \"paper\"; its text leaves it open, as it does the next three."),
+    number<&Config::estimator, &EstimatorSettings::initial_variance>(
+        "estimator", "initial_variance", "", 1e-12, 1e6,
+        "P(0) is this times the identity, method \"paper\"."),
+    choice<&Config::estimator, &EstimatorSettings::reopening>(
+        "estimator", "reopening", kReopenings,
+        "When slip is excited again, method \"paper\": \"held_slope\" k is held, mu_0 has "
+        "followed the\nmeasurement, P is P(0); \"initial_slope\" as at the first time; \"paused\" "
+        "as when it ended."),
+    choice<&Config::estimator, &EstimatorSettings::peak_samples>(
+        "estimator", "peak_samples", kPeakSamples,
+        "mu_max is the mean over \"all\" samples near the peak, or over the \"last\" unbroken "
+        "run of\nthem, method \"paper\"."),
     number<&Config::estimator, &EstimatorSettings::value_width>(
         "estimator", "value_width", "", 0.005, 0.5,
         "Share of mu_max that half of its 95 % interval by noise may be for a value; wider, the\n"
