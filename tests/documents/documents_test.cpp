@@ -14,6 +14,7 @@
 #include "daemon/core/publish/own_frames.h"
 #include "estimator/physics/machine_effects.h"
 #include "tests/support/program.h"
+#include "tools/reasons/reasons.h"
 
 namespace beltgrip::test {
 namespace {
@@ -181,6 +182,32 @@ std::string effects() {
   return out.str();
 }
 
+// The rows between the head of a table and the line behind it.
+std::string with_rows(const std::string& text, const std::string& head, const std::string& rows) {
+  const std::string line = "|---|---|---|\n";
+  const std::size_t begin = text.find(line, text.find(head)) + line.size();
+  std::size_t end = begin;
+  while (text.compare(end, 1, "|") == 0) end = text.find('\n', end) + 1;
+  return text.substr(0, begin) + rows + text.substr(end);
+}
+
+std::string reason_row(std::string_view name, const reasons::Words& words) {
+  return "| " + std::string(name) + " | " + cell(words.means) + " | " + cell(words.remedy) + " |\n";
+}
+
+std::string no_result() {
+  std::string inhibits, faults;
+  for (const auto& each : daemon::kInhibits) {
+    inhibits += reason_row(each.name, reasons::words_of(each.value));
+  }
+  for (const auto& each : daemon::kFaults) {
+    faults += reason_row(each.name, reasons::words_of(each.value));
+  }
+  const std::string text = read_file(BELTGRIP_SOURCE_DIR "/tools/NO_RESULT.md");
+  return with_rows(with_rows(text, "| name | what is missing", inhibits), "| fault | what it means",
+                   faults);
+}
+
 struct Document {
   std::string path;
   std::function<std::string()> text;
@@ -202,6 +229,7 @@ INSTANTIATE_TEST_SUITE_P(All, Documents,
                          testing::Values(Document{"can_dbc/FRAMES.md", frames},
                                          Document{"systemd/CONFIGURATION.md", configuration},
                                          Document{"tools/COMMANDS.md", commands},
+                                         Document{"tools/NO_RESULT.md", no_result},
                                          Document{"tools/DIAGNOSE.md", effects}));
 
 }  // namespace

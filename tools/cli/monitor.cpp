@@ -1,105 +1,131 @@
-// beltgrip monitor: BeltGrip's frames on a SocketCAN interface, decoded as they come.
-#include <unistd.h>
+// beltgrip monitor: what BeltGrip does, and why, on a bus or in a log: as a live view, as lines, as
+// JSON.
+#include "tools/cli/monitor.h"
 
-#include <array>
-#include <limits>
+#include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 
-#include "daemon/core/publish/own_frames.h"
-#include "tools/cli/bus.h"
 #include "tools/cli/command.h"
-#include "tools/cli/own_frame_view.h"
-#include "tools/cli/stop_signals.h"
-#include "tools/cli/verdict.h"
-#include "tools/sim/configuration.h"
+#include "tools/cli/configuration.h"
+#include "tools/cli/failure.h"
+#include "tools/monitor/screen.h"
 
 namespace beltgrip::cli {
 
 namespace {
 
 struct Options {
-  std::string bus;
-  bool json = false;
-  double duration_s = 0.0;
-  std::string truth;
+  std::string source, config, interface, truth;
+  bool plain = false, once = false, json = false, table = false;
+  double speed = 1.0, from_s = 0.0, duration_s = 0.0;
 };
 
+// A file by that name, or a path, is a log; else it is an interface.
+bool is_log(const std::string& source) {
+  std::error_code none;
+  return source == "-" || source.find('/') != std::string::npos ||
+         std::filesystem::exists(source, none);
+}
+
+MonitorOutput output_of(const Options& options) {
+  if (options.plain + options.once + options.table > 1) {
+    throw Failure{kUsage, "monitor: only one of --plain, --once, --table"};
+  }
+  if (options.json && (options.plain || options.table)) {
+    throw Failure{kUsage, "monitor: --json goes alone or with --once"};
+  }
+  if (options.once) return MonitorOutput::kOnce;
+  if (options.json) return MonitorOutput::kFrames;
+  if (options.table || !options.truth.empty()) return MonitorOutput::kTable;
+  if (options.plain || !monitor::Screen::possible()) return MonitorOutput::kPlain;
+  return MonitorOutput::kScreen;
+}
+
 void run(const Options& options) {
-  if (options.bus.starts_with("inproc:")) {
-    throw Failure{kUnavailable, "monitor: found " + options.bus +
+  if (options.source.starts_with("inproc:")) {
+    throw Failure{kUnavailable, "monitor: found " + options.source +
                                     ", a bus that no other process can be on, expected a "
                                     "SocketCAN interface such as can0"};
   }
-  std::optional<Truth> truth;
-  if (!options.truth.empty()) truth = read_truth(options.truth);
-  const daemon::FrameIdentifiers own;
-  std::vector<can::CanId> identifiers;
-  identifiers.reserve(daemon::kOwnMessageCount);
-  for (std::size_t i = 0; i < daemon::kOwnMessageCount; ++i) {
-    identifiers.push_back({daemon::own_identifier(own, static_cast<daemon::OwnMessage>(i)), false});
+  MonitorRequest request;
+  request.source = options.source;
+  request.interface = options.interface;
+  request.json = options.json;
+  request.speed = options.speed;
+  request.from_s = options.from_s;
+  request.duration_s = options.duration_s;
+  request.output = output_of(options);
+  if (!options.truth.empty()) request.truth = read_truth(options.truth);
+  if (!options.config.empty()) request.config = load_configuration(options.config, "");
+  if (is_log(options.source)) return monitor_log(request);
+  if (options.from_s > 0.0 || options.speed != 1.0 || !options.interface.empty()) {
+    throw Failure{kUsage, "monitor: --from, --speed and --interface are for a log; " +
+                              options.source + " is no file"};
   }
-  if (truth) {  // the rig's first frame says when its clock began to run on this bus
-    for (const can::MessageDef& message : sim::rig_database().messages) {
-      identifiers.push_back(message.id);
-    }
-  }
-  const std::unique_ptr<daemon::Port> port = open_bus(options.bus, identifiers, stop_descriptor());
-  OwnFrameDecoder decoder(own);
-  BusTable table(stdout);
-  Verdict verdict;
-  const daemon::MonoTime begin = port->now();
-  const daemon::MonoTime end = options.duration_s > 0.0
-                                   ? begin + static_cast<daemon::Duration>(options.duration_s * 1e9)
-                                   : std::numeric_limits<daemon::MonoTime>::max();
-  // Time shown = monotonic time - origin: from the start of the monitor, or the clock of the truth.
-  std::optional<daemon::MonoTime> origin;
-  if (!truth) origin = begin;
-
-  std::array<daemon::RxFrame, 64> frames;
-  while (port->now() < end) {
-    const daemon::Wake wake = port->wait_until(end);
-    if (wake == daemon::Wake::kClosed) break;
-    if (wake != daemon::Wake::kFrames) continue;
-    const std::size_t count = port->receive(frames);
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto view = decoder.decode(frames[i].frame);
-      if (!view) {
-        if (!origin && truth) origin = frames[i].t - truth->first_frame_ns;
-        continue;
-      }
-      if (!origin) continue;
-      const std::int64_t t_ns = frames[i].t - *origin;
-      if (options.json) {
-        std::fputs(json_line(t_ns, *view).c_str(), stdout);
-        std::fflush(stdout);
-      } else {
-        table.on_frame(t_ns, *view);
-      }
-      verdict.on_frame(t_ns, *view);
-    }
-  }
-  if (truth && !options.json) verdict.print(stdout, *truth);
+  monitor_bus(request);
 }
 
 }  // namespace
 
+FrameLister::FrameLister(const MonitorRequest& request)
+    : request_(request), decoder_(request.identifiers()) {}
+
+void FrameLister::on_frame(std::int64_t t_ns, const can::CanFrame& frame) {
+  const auto view = decoder_.decode(frame);
+  if (!view) return;
+  if (request_.output == MonitorOutput::kFrames) {
+    std::fputs(monitor::json_line(t_ns, *view).c_str(), stdout);
+    std::fflush(stdout);
+  } else {
+    table_.on_frame(t_ns, *view);
+  }
+  verdict_.on_frame(t_ns, *view);
+}
+
+void FrameLister::end() const {
+  if (request_.truth && request_.output == MonitorOutput::kTable) {
+    verdict_.print(stdout, *request_.truth);
+  }
+}
+
 void add_monitor(command_line::Command app) {
   const command_line::Command command =
-      app.add_subcommand("monitor", "Show BeltGrip's frames on a bus, decoded");
+      app.add_subcommand("monitor", "What BeltGrip does, and why: a view of a bus or a log");
   auto options = std::make_shared<Options>();
-  command.add_option("BUS", options->bus, "A SocketCAN interface").type_name("").required();
-  command.add_flag("--json", options->json, "A JSON line for each frame");
+  command.add_option("SOURCE", options->source, "A SocketCAN interface, or a log as for replay")
+      .type_name("")
+      .required();
+  command
+      .add_option("--config", options->config,
+                  "BeltGrip's configuration: shows the inputs, and why no experiment begins")
+      .type_name("FILE");
+  command.add_flag("--plain", options->plain,
+                   "A line for each change, with candump's stamps (default without a terminal)");
+  command.add_flag("--once", options->once,
+                   "One view and the end; of a log the view at its end, or at --from");
+  command.add_flag("--json", options->json,
+                   "A JSON line for each frame of BeltGrip; with --once: the view as JSON");
+  command.add_flag("--table", options->table, "A row every half second and for each change");
+  command.add_option("--speed", options->speed, "A log's, times real time; the view's keys too")
+      .capture_default_str()
+      .range(1e-2, 1e3);
+  command.add_option("--from", options->from_s, "Seconds of the log before the view begins")
+      .type_name("SECONDS")
+      .range(0.0, 1e9);
+  command.add_option("--interface", options->interface, "Frames of this interface of the log only")
+      .type_name("INTERFACE");
   command.add_option("--duration", options->duration_s, "Seconds to watch (default: until stopped)")
       .type_name("SECONDS")
       .range(1e-3, 1e9);
   command
       .add_option("--truth", options->truth,
-                  "truth.json of the simulation that is played onto the bus: shows its times, "
-                  "and its truth beside the result at the end")
+                  "truth.json of the simulation that is played onto the bus: --table with its "
+                  "times, and its truth beside the result at the end")
       .type_name("FILE");
   command.example("beltgrip monitor can0");
+  command.example("beltgrip monitor can0 --config mycar.toml");
+  command.example("beltgrip monitor drive/trace.log --config drive/beltgrip.toml --once");
   command.example("beltgrip monitor can0 --json --duration 60");
   command.callback([options] { run(*options); });
 }

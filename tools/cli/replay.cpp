@@ -1,5 +1,6 @@
 // beltgrip replay: the daemon's pipeline over logs, as fast as the machine can.
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -34,6 +35,7 @@ struct Options {
   unsigned jobs = 0;
   std::string json;
   bool resume = false;
+  bool quiet = false;
   std::string trace;
   std::string log_out;
   std::string bus;
@@ -81,6 +83,97 @@ void run_all(std::vector<Task>& tasks, unsigned jobs, const auto& work, const Re
   }
   worker();
 }
+
+// Tells results: those of a single run as they fall, of others when they are done.
+class Teller {
+ public:
+  Teller(std::FILE* json, bool in_words) : json_(json), in_words_(in_words) {}
+
+  void tell(const ReplayResult& result) {
+    if (told_ == result.experiments.size()) return;
+    if (json_ != nullptr) put(json_, experiment_lines(result, told_));
+    if (in_words_) {
+      text::print(stdout, experiment_text(result, told_));
+      std::fflush(stdout);
+    }
+    told_ = result.experiments.size();
+  }
+  void end(const ReplayResult& result) {
+    const bool none = result.experiments.empty();
+    tell(result);
+    if (json_ != nullptr) put(json_, summary_line(result));
+    if (in_words_) {
+      text::print(stdout, (none ? experiment_text(result) : "") + end_text(result));
+    } else if (none) {
+      text::complain(result.log + ": " + no_experiment(result));
+    }
+    told_ = 0;
+  }
+
+ private:
+  static void put(std::FILE* out, const std::string& lines) {
+    std::fwrite(lines.data(), 1, lines.size(), out);
+    std::fflush(out);
+  }
+
+  std::FILE* json_;
+  bool in_words_;
+  std::size_t told_ = 0;
+};
+
+// How far a run has come, on a terminal, where it takes longer than people wait without a word.
+class Progress final : public daemon::SampleSink {
+ public:
+  explicit Progress(bool shown) : shown_(shown && isatty(STDERR_FILENO) != 0) {}
+
+  // Of a single run.
+  void on_report(const daemon::SampleReport& report) noexcept override {
+    if (!shown_ || ++samples_ % kSamples != 0) return;
+    if (first_ns_ == 0) first_ns_ = report.t;
+    const double log_s = static_cast<double>(report.t - first_ns_) * 1e-9;
+    const double wall_s = passed_s();
+    if (is_due(wall_s)) show(log_s, "s of the log", log_s / wall_s, "times real time", 0.0);
+  }
+  // Of several, under the lock of their reports.
+  void on_done(std::size_t done, std::size_t all) {
+    const double wall_s = passed_s();
+    if (!shown_ || !is_due(wall_s)) return;
+    const double rate = static_cast<double>(done) / wall_s;
+    show(static_cast<double>(done), ("of " + std::to_string(all) + " logs").c_str(), rate, "logs/s",
+         static_cast<double>(all - done) / rate);
+  }
+  // Before other text.
+  void clear() {
+    if (on_screen_) std::fputs("\r\x1b[K", stderr);
+    on_screen_ = false;
+  }
+
+ private:
+  static constexpr std::uint64_t kSamples = 1024;
+  static constexpr double kPatience_s = 2.0, kPause_s = 0.2;
+
+  double passed_s() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
+  }
+  bool is_due(double wall_s) {
+    if (wall_s < std::max(kPatience_s, next_s_)) return false;
+    next_s_ = wall_s + kPause_s;
+    return true;
+  }
+  void show(double count, const char* what, double rate, const char* unit, double left_s) {
+    std::fprintf(stderr, "\r\x1b[Kbeltgrip: %.0f %s, %.3g %s", count, what, rate, unit);
+    if (left_s > 0.0) std::fprintf(stderr, ", %.0f s left", left_s);
+    std::fflush(stderr);
+    on_screen_ = true;
+  }
+
+  bool shown_;
+  bool on_screen_ = false;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  double next_s_ = 0.0;
+  std::uint64_t samples_ = 0;
+  std::int64_t first_ns_ = 0;
+};
 
 void print_speed(std::uint64_t frames, std::chrono::steady_clock::time_point begin) {
   const double wall_s =
@@ -158,10 +251,22 @@ void run(const Options& options) {
   }
   if (!options.trace.empty()) trace.emplace(options.trace, inputs);
   if (!options.log_out.empty()) log_out.emplace(options.log_out, inputs);
-  const ReplayOutputs outputs{trace ? trace->get() : nullptr, log_out ? log_out->get() : nullptr};
   const bool text_to_stdout = options.json != "-" && options.trace != "-" && options.log_out != "-";
 
+  Teller teller(json ? json->get() : nullptr, text_to_stdout);
+  Progress progress(!options.quiet);
+  ReplayOutputs outputs;
+  if (trace) outputs.trace = trace->get();
+  if (log_out) outputs.log_out = log_out->get();
+  if (tasks.size() == 1) {
+    outputs.also = &progress;
+    outputs.on_result = [&](const ReplayResult& result) {
+      progress.clear();
+      teller.tell(result);
+    };
+  }
   const auto begin = std::chrono::steady_clock::now();
+  std::size_t done = 0;
   std::uint64_t frames = 0;
   int exit_code = kDone;
   bool any = false;
@@ -169,6 +274,8 @@ void run(const Options& options) {
   run_all(
       tasks, std::max(jobs, 1u), [&](Task& task) { run_task(task, options, config, outputs); },
       [&](Task& task) {
+        progress.clear();
+        if (++done < tasks.size()) progress.on_done(done, tasks.size());
         if (task.failure) {
           text::complain(task.failure->text);
           if (exit_code == kDone) exit_code = task.failure->exit_code;
@@ -179,23 +286,18 @@ void run(const Options& options) {
         }
         any = true;
         frames += task.result->frames;
-        const std::string lines = experiment_lines(*task.result) + summary_line(*task.result);
-        if (json) json->write(lines);
-        if (resumed && !resumed->append(lines)) {
+        if (resumed &&
+            !resumed->append(experiment_lines(*task.result) + summary_line(*task.result))) {
           text::complain(options.json + ": cannot write");
           exit_code = kCannotWrite;
         }
-        if (text_to_stdout) {
-          text::print(stdout, text(*task.result));
-        } else if (task.result->experiments.empty()) {
-          text::complain(task.result->log + ": " + no_experiment(*task.result));
-        }
+        teller.end(*task.result);
       });
   if (!any && !tasks.empty()) throw Failure{exit_code, ""};  // what earlier runs left stays
   if (json) json->close();
   if (trace) trace->close();
   if (log_out) log_out->close();
-  if (frames > 0) print_speed(frames, begin);
+  if (frames > 0 && !options.quiet) print_speed(frames, begin);
   if (exit_code != kDone) throw Failure{exit_code, ""};
 }
 
@@ -229,6 +331,7 @@ void add_replay(command_line::Command app) {
       .add_option("--log-out", options->log_out,
                   "What the daemon would have put on the bus, as a candump log")
       .type_name("FILE");
+  command.add_flag("--quiet", options->quiet, "Neither progress nor speed on standard error");
   command.add_option("--bus", options->bus, "Play the log onto this bus in real time instead")
       .type_name("BUS");
   command.add_option("--speed", options->speed, "Times real time, with --bus")

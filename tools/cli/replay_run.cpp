@@ -17,6 +17,7 @@
 #include "tools/ports/record_port.h"
 #include "tools/ports/replay_port.h"
 #include "tools/text/json_writer.h"
+#include "tools/text/seconds.h"
 #include "tools/text/snake_case.h"
 
 namespace beltgrip::cli {
@@ -35,6 +36,7 @@ class Sink final : public daemon::SampleSink {
         pipeline_(pipeline),
         trace_(outputs.trace),
         also_(outputs.also),
+        on_result_(outputs.on_result),
         period_s_(1.0 / config.estimator.sample_rate_hz) {
     for (int phase = 0; phase < 4; ++phase) {
       phases_[phase] = daemon::phase_name(static_cast<estimator::Phase>(phase));
@@ -51,12 +53,13 @@ class Sink final : public daemon::SampleSink {
     if (report.new_result) {
       result_.experiments.push_back(report.result);
       result_.lost.push_back(lost_now());
+      if (on_result_) on_result_(result_);
     }
     count_inhibits(report, 1);
     if (also_ != nullptr) also_->on_report(report);
     if (trace_ == nullptr || !report.in_experiment || !report.curve.usable) return;
     const estimator::CurveEstimate& curve = report.curve;
-    row_ = seconds_text(report.t);
+    row_ = text::seconds_text(report.t);
     for (const double value :
          {curve.mu_star, curve.sigma_star_percent, curve.slip_variance, curve.friction_slope}) {
       append(value);
@@ -120,6 +123,7 @@ class Sink final : public daemon::SampleSink {
   const daemon::Pipeline& pipeline_;
   std::FILE* trace_;
   daemon::SampleSink* also_;
+  std::function<void(const ReplayResult&)> on_result_;
   double period_s_;
   std::string phases_[4];
   std::string row_;
@@ -179,15 +183,6 @@ std::string outcome_text(daemon::Outcome outcome) {
 }
 std::string reason_text(estimator::StopReason reason) {
   return text::snake_case(daemon::stop_reason_name(reason));
-}
-
-std::string seconds_text(std::int64_t t_ns) {
-  std::string digits = std::to_string(t_ns < 0 ? -t_ns : t_ns);
-  if (digits.size() < 10) digits.insert(0, 10 - digits.size(), '0');
-  digits.insert(digits.size() - 9, ".");
-  while (digits.back() == '0') digits.pop_back();
-  if (digits.back() == '.') digits.pop_back();
-  return (t_ns < 0 ? "-" : "") + digits;
 }
 
 std::unique_ptr<ports::LogTimeline> open_timeline(const std::vector<std::string>& paths,
@@ -414,10 +409,10 @@ std::string why(const daemon::ExperimentResult& e, const std::string& lost) {
 
 }  // namespace
 
-std::string experiment_lines(const ReplayResult& result) {
+std::string experiment_lines(const ReplayResult& result, std::size_t from) {
   std::string lines;
   text::JsonWriter json;
-  for (std::size_t i = 0; i < result.experiments.size(); ++i) {
+  for (std::size_t i = from; i < result.experiments.size(); ++i) {
     const daemon::ExperimentResult& e = result.experiments[i];
     const bool completed = e.outcome == daemon::Outcome::kCompleted;
     const bool slips = e.stopped && e.sigma_stop_percent < kSlipMost_percent;
@@ -425,9 +420,9 @@ std::string experiment_lines(const ReplayResult& result) {
         .field("type", "experiment")
         .field("log", result.log)
         .key("start_s")
-        .raw(seconds_text(e.start))
+        .raw(text::seconds_text(e.start))
         .key("stop_s")
-        .raw(e.stopped ? seconds_text(e.end) : "null")
+        .raw(e.stopped ? text::seconds_text(e.end) : "null")
         .field("outcome", outcome_text(e.outcome))
         .field("stop_reason", reason_text(e.stop_reason))
         .field("mu_max", completed ? e.peak.mu_max : text::kJsonNull)
@@ -464,7 +459,7 @@ std::string summary_line(const ReplayResult& result) {
       .field("frames_bad", result.frames_bad)
       .field("lines_bad", result.lines_bad)
       .key("duration_s")
-      .raw(seconds_text(result.duration_ns))
+      .raw(text::seconds_text(result.duration_ns))
       .end_object();
   return json.take() + "\n";
 }
@@ -492,9 +487,9 @@ std::string no_experiment(const ReplayResult& result) {
   return "no experiment: " + why;
 }
 
-std::string text(const ReplayResult& result) {
-  std::string out = result.log + "\n";
-  for (std::size_t i = 0; i < result.experiments.size(); ++i) {
+std::string experiment_text(const ReplayResult& result, std::size_t from) {
+  std::string out = from == 0 ? result.log + "\n" : "";
+  for (std::size_t i = from; i < result.experiments.size(); ++i) {
     const daemon::ExperimentResult& e = result.experiments[i];
     out += "  " + outcome_text(e.outcome) + ", " +
            text::snake_case(daemon::direction_name(e.direction)) + ", " +
@@ -517,6 +512,11 @@ std::string text(const ReplayResult& result) {
       out += "  no value: " + why_no_value(e, result.lost[i]) + "\n";
     }
   }
+  return out;
+}
+
+std::string end_text(const ReplayResult& result) {
+  std::string out;
   const std::string why = inhibits_text(result);
   if (result.experiments.empty()) {
     out += "  " + no_experiment(result) + "\n";

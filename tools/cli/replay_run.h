@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -36,9 +37,10 @@ struct ReplayResult {
 };
 
 struct ReplayOutputs {
-  std::FILE* trace = nullptr;          // CSV, one row a sample of an experiment
-  std::FILE* log_out = nullptr;        // candump, what the daemon would have sent
-  daemon::SampleSink* also = nullptr;  // sees every report, after the results
+  std::FILE* trace = nullptr;                          // CSV, one row a sample of an experiment
+  std::FILE* log_out = nullptr;                        // candump, what the daemon would have sent
+  daemon::SampleSink* also = nullptr;                  // sees every report, after the results
+  std::function<void(const ReplayResult&)> on_result;  // at each, then the last
 };
 
 // The logs as one timeline without BeltGrip's own frames; those of an interface named as the
@@ -58,15 +60,16 @@ ReplayResult replay(const std::vector<std::string>& paths, const std::string& in
 void run_daemon(daemon::Port& port, const daemon::Config& config, ReplayResult& result,
                 const ReplayOutputs& outputs = {});
 
-// A line for each experiment, and the line of the summary.
-std::string experiment_lines(const ReplayResult& result);
+// The experiments from one on, a JSON line each; and the line of the summary.
+std::string experiment_lines(const ReplayResult& result, std::size_t from = 0);
 std::string summary_line(const ReplayResult& result);
 // Why there was none.
 std::string no_experiment(const ReplayResult& result);
-std::string text(const ReplayResult& result);
+// In words: the experiments from one on, with the log's name before the first; and what follows
+// the last.
+std::string experiment_text(const ReplayResult& result, std::size_t from = 0);
+std::string end_text(const ReplayResult& result);
 
-// "12.345" without a rounding error, whatever the origin of the stamps.
-std::string seconds_text(std::int64_t t_ns);
 std::string outcome_text(daemon::Outcome outcome);
 std::string reason_text(estimator::StopReason reason);
 

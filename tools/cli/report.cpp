@@ -1,5 +1,7 @@
 // beltgrip report: the experiments of logs as one HTML file to look at.
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -51,6 +53,10 @@ class Courses final : public daemon::SampleSink {
       now_.mu_star.push_back(curve.mu_star);
       now_.sigma_star_percent.push_back(curve.sigma_star_percent);
       now_.friction_slope_per_percent.push_back(curve.friction_slope);
+      now_.slip_variance.push_back(curve.slip_variance);
+      now_.clamp_force_N.push_back(curve.clamp_force_N);
+      sigma_most_percent_ = std::max(sigma_most_percent_, std::abs(curve.sigma_star_percent));
+      energy_J_ = std::max(energy_J_, curve.slip_energy_J);
       now_.phase.push_back(static_cast<std::size_t>(curve.phase));
       end_stop_ = curve.end_stop;
     }
@@ -58,8 +64,12 @@ class Courses final : public daemon::SampleSink {
     finish(report.result);
     all_.push_back(std::move(now_));
     now_ = {};
+    energy_sum_J_ += energy_J_;
+    energy_J_ = sigma_most_percent_ = 0.0;
   }
   std::vector<report::ExperimentCourse> take() { return std::move(all_); }
+  // Dissipated by slip in all experiments, up to their results.
+  double energy_sum_J() const { return energy_sum_J_; }
   const std::optional<LastValue>& last_value() const { return last_value_; }
 
  private:
@@ -82,12 +92,15 @@ class Courses final : public daemon::SampleSink {
                             : "",
                     value ? number("%.4f .. %.4f", peak.ci95_low, peak.ci95_high) : "",
                     result.stopped ? number("%.2f", result.sigma_stop_percent) : "",
-                    value ? number("%.2f", peak.sigma_peak_percent) : ""};
+                    value ? number("%.2f", peak.sigma_peak_percent) : "",
+                    number("%.1f", sigma_most_percent_),
+                    number("%.0f", energy_J_)};
   }
 
   std::string log_;
   report::ExperimentCourse now_;
   std::vector<report::ExperimentCourse> all_;
+  double energy_J_ = 0.0, sigma_most_percent_ = 0.0, energy_sum_J_ = 0.0;
   estimator::EndStop end_stop_ = estimator::EndStop::kOverdrive;
   std::optional<LastValue> last_value_;
 };
@@ -133,15 +146,18 @@ void run(const Options& options) {
   std::vector<report::ExperimentCourse> experiments;
   std::optional<LastValue> last_value;
   std::string none;
+  double energy_J = 0.0;
   for (const std::string& log : options.logs) {
     Courses courses(log.substr(log.rfind('/') + 1));
-    const ReplayResult result =
-        replay({log}, options.interface, config, ReplayOutputs{.also = &courses});
+    ReplayOutputs outputs;
+    outputs.also = &courses;
+    const ReplayResult result = replay({log}, options.interface, config, outputs);
     for (const std::string& warning : result.warnings) {
       text::warn(warning);
     }
     if (result.experiments.empty()) none += log + ": " + no_experiment(result) + "\n";
     if (courses.last_value()) last_value = courses.last_value();
+    energy_J += courses.energy_sum_J();
     for (auto& each : courses.take()) experiments.push_back(std::move(each));
   }
   report::HtmlPage page("BeltGrip: experiments");
@@ -158,7 +174,17 @@ void run(const Options& options) {
     }
     page.paragraph(assumed);
   }
-  report::add_experiments(page, experiments, phases);
+  if (!experiments.empty()) {
+    page.paragraph(std::to_string(experiments.size()) + " experiments; the belt slipped away " +
+                   number("%.0f", energy_J) +
+                   " J in them, creep included, from each start to its result.");
+  }
+  std::optional<report::PhaseThresholds> thresholds;
+  if (config.estimator.method == estimator::Method::kPaper) {
+    thresholds = {config.estimator.excitation_threshold, config.estimator.stop_slope,
+                  config.estimator.peak_slope};
+  }
+  report::add_experiments(page, experiments, phases, thresholds);
   if (last_value) add_least_loss(page, config, *last_value);
   write_file(options.out, inputs, page.text());
   text::print(stdout, std::to_string(experiments.size()) + " experiments: " + options.out + "\n");

@@ -24,8 +24,16 @@ const Words kPressure = {"pressure", "press", "prs", "p"};
 const Words kTorque = {"torque", "trq", "tq", "moment", "md"};
 const Words kPrimary = {"primary", "prim", "pri", "turbine", "input", "inp"};
 const Words kSecondary = {"secondary", "sec", "scd", "output", "outp"};
-const Words kTarget = {"command", "cmd",     "target", "setpoint", "desired", "demand",
-                       "req",     "request", "set",    "limit",    "max",     "min"};
+const Words kTarget = {"command", "cmd", "target", "setpoint", "desired", "demand", "req",
+                       "request", "set", "limit",  "max",      "min",     "tgt",    "tg",
+                       "trgt",    "rq",  "rqd",    "rqst",     "lim",     "mx",     "mn"};
+// A message of these carries what somebody asks for, whatever its signals are called.
+const Words kAsking = {"command", "cmd", "request", "req", "target"};
+// What is no measurement of the role, or is one of something else.
+const Words kNever = {"counter", "cnt",       "checksum", "crc",  "valid",    "validity", "vld",
+                      "quality", "idle",      "idl",      "loss", "lss",      "gps",      "lkas",
+                      "pump",    "fan",       "steering", "top",  "friction", "offset",   "pmp",
+                      "acsy",    "accessory", "cruise",   "resv", "error"};
 const Words kEngine = {"engine", "eng", "motor"};
 
 Words both(Words a, const Words& b) {
@@ -39,7 +47,7 @@ const std::vector<RoleWords>& table() {
       {Role::kPrimarySpeed, {kPrimary, kSpeed}, both(kTarget, kSecondary)},
       {Role::kSecondarySpeed, {kSecondary, kSpeed}, both(kTarget, kPrimary)},
       {Role::kSecondaryPressure, {kSecondary, kPressure}, both(kTarget, kPrimary)},
-      {Role::kEngineTorque, {kEngine, kTorque}, both(kTarget, {"loss", "friction"})},
+      {Role::kEngineTorque, {kEngine, kTorque}, kTarget},
       {Role::kPrimaryTorque, {kPrimary, kTorque}, both(kTarget, both(kSecondary, kEngine))},
       {Role::kSecondaryTorque, {kSecondary, kTorque}, both(kTarget, both(kPrimary, kEngine))},
       {Role::kPrimaryPressure, {kPrimary, kPressure}, both(kTarget, kSecondary)},
@@ -54,9 +62,12 @@ const std::vector<RoleWords>& table() {
        kTarget},
       {Role::kBrakePressed,
        {{"brake", "brk"}, {"pressed", "switch", "sw", "pedal", "active", "lamp", "light"}},
-       {"park", "parking", "hand"}},
+       both(kTarget, {"park", "parking", "hand"})},
       {Role::kLockupClosed,
-       {{"lockup", "lock", "tcc", "lu"}, {"closed", "engaged", "state", "active", "on", "up"}},
+       {{"lockup", "lock", "tcc", "lu"},
+        {"closed", "engaged", "state", "active", "on", "up"},
+        // Doors, seats and shift levers have locks as well.
+        {"lockup", "tcc", "lu", "up", "converter", "clutch"}},
        {"door", "wheel", "command", "cmd", "request", "req"}},
       {Role::kExperimentPermitted,
        {{"experiment"}, {"permitted", "permission", "allowed", "enable"}},
@@ -79,7 +90,10 @@ int points(const Words& group, const std::vector<std::string>& words) {
 int score(const RoleWords& row, const std::string& message, const std::string& signal) {
   const std::vector<std::string> signal_words = words_of(signal);
   const std::vector<std::string> message_words = words_of(message);
-  if (points(row.excluded, signal_words) > 0) return 0;
+  if (points(row.excluded, signal_words) > 0 || points(kNever, signal_words) > 0) return 0;
+  if (row.role != daemon::Role::kSecondaryPressureCommand && points(kAsking, message_words) > 0) {
+    return 0;
+  }
   int sum = 0;
   for (const Words& group : row.groups) {
     const int own = points(group, signal_words);
@@ -89,6 +103,13 @@ int score(const RoleWords& row, const std::string& message, const std::string& s
     sum += gained;
   }
   return sum;
+}
+
+// A physical quantity in fewer bits is a stage or a flag; a flag in more is a quantity.
+bool fits(const can::SignalDef& signal, can::Dimension dimension) {
+  constexpr std::size_t kQuantityBits = 8, kFlagBits = 4;
+  return dimension == can::Dimension::kNone ? signal.length <= kFlagBits
+                                            : signal.length >= kQuantityBits;
 }
 
 // Names of the value at which a flag is 1, the more telling ones in front; of several such values
@@ -167,6 +188,7 @@ std::vector<RoleCandidate> guess_role(daemon::Role role,
   for (const can::Database& database : databases) {
     for (const can::MessageDef& message : database.messages) {
       for (const can::SignalDef& signal : message.signals) {
+        if (!fits(signal, dimension)) continue;
         RoleCandidate candidate{&message, &signal};
         if (!signal.unit.empty()) {
           const auto unit = can::parse_unit(signal.unit);

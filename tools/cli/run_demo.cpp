@@ -19,16 +19,20 @@
 #include "tools/cli/bus.h"
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"
-#include "tools/cli/own_frame_view.h"
 #include "tools/cli/scenario_options.h"
 #include "tools/cli/simulate_vehicle.h"
 #include "tools/cli/verdict.h"
+#include "tools/monitor/own_frame_view.h"
 #include "tools/sim/configuration.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/rig_source.h"
 #include "tools/sim/vehicle_port.h"
 
 namespace beltgrip::cli {
+
+using monitor::BusTable;
+using monitor::OwnFrameDecoder;
+using monitor::OwnFrameView;
 
 namespace {
 

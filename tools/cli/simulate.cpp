@@ -198,7 +198,8 @@ void run(const Options& options) {
     json->write(experiment_lines(run.daemon) + run.truth_json + summary_line(run.daemon));
     json->close();
   }
-  if (results && !to_stdout) text::print(stdout, text(run.daemon) + run.truth_text);
+  if (results && !to_stdout)
+    text::print(stdout, experiment_text(run.daemon) + end_text(run.daemon) + run.truth_text);
 }
 
 }  // namespace

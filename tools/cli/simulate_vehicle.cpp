@@ -16,6 +16,7 @@
 #include "tools/sim/resources.h"
 #include "tools/sim/vehicle_port.h"
 #include "tools/text/json_writer.h"
+#include "tools/text/seconds.h"
 
 namespace beltgrip::cli {
 
@@ -42,6 +43,7 @@ void write_request(text::JsonWriter& json, const sim::RequestTruth& request) {
       .field("end_s", request.end_s)
       .field("mu_max", request.mu_max)
       .field("peak_passed", request.peak_passed)
+      .field("peak_s", request.peak_passed ? request.peak_passed_s : text::kJsonNull)
       .field("mu_star_max", request.mu_star_max)
       .field("slip_stop_percent", 100.0 * request.slip_at_end)
       .field("slip_max_percent", 100.0 * request.slip_max)
@@ -74,7 +76,7 @@ std::string truth_json(const sim::VehicleSimulation& vehicle, std::uint64_t seed
       .field("scenario", vehicle.scenario().name)
       .field("seed", seed)
       .key("duration_s")
-      .raw(seconds_text(vehicle.now_ns()))
+      .raw(text::seconds_text(vehicle.now_ns()))
       .field("mu_max", vehicle.truth().belt.mu_max)
       .field("coast_downs", vehicle.truth().coast_downs)
       .field("stalls", vehicle.truth().stalls)

@@ -33,13 +33,16 @@ std::array<Slot, 16> slots;
 std::atomic<bool> in_good_order{false};
 std::atomic<int> asked{0};  // the signal
 std::atomic<int> descriptor{-1};
+std::atomic<void (*)()> before_end{nullptr};
 
-static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free);
+static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free &&
+              std::atomic<void (*)()>::is_always_lock_free);
 
 [[noreturn]] void end(int number) {
   for (const Slot& slot : slots) {
     if (slot.removable.load()) unlink(slot.path.data());
   }
+  if (const auto last = before_end.load(); last != nullptr) last();
   // As if there had been no handler: the shell sees what ended the program.
   signal(number, SIG_DFL);
   sigset_t only;
@@ -106,6 +109,8 @@ void end_streams_when_stopped(const std::vector<std::string>& logs) {
   });
   if (any) can::ByteSource::end_with(stop_descriptor());
 }
+
+void call_when_stopped(void (*last)()) { before_end.store(last); }
 
 std::size_t remove_when_stopped(const std::string& path) {
   for (std::size_t i = 0; i < slots.size() && path.size() < slots[i].path.size(); ++i) {

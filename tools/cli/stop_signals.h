@@ -23,6 +23,9 @@ int stop_descriptor();
 // taken as the end, and what came before is used as ever. Files only: nothing changes.
 void end_streams_when_stopped(const std::vector<std::string>& logs);
 
+// Called where a signal ends the program; async-signal-safe.
+void call_when_stopped(void (*last)());
+
 // A file that is removed where a signal ends the program. Nothing to remove: kNoSlot.
 inline constexpr std::size_t kNoSlot = ~std::size_t{0};
 std::size_t remove_when_stopped(const std::string& path);

@@ -39,6 +39,36 @@ Chart over_time(const ExperimentCourse& course, const char* title, const char* y
   return chart;
 }
 
+void add_level(Chart& chart, const ExperimentCourse& course, const char* name, double y) {
+  chart.series.push_back(level(name, course.t_s.front(), course.t_s.back(), y));
+}
+
+// What the method judged by, over time.
+std::vector<Chart> courses(const ExperimentCourse& course,
+                           const std::optional<PhaseThresholds>& thresholds) {
+  Chart traction = over_time(course, "Traction coefficient mu*", "mu*", course.mu_star);
+  add_peak(course, course.t_s.front(), course.t_s.back(), traction);
+  Chart variance = over_time(course, "Slip variance", "(%)^2", course.slip_variance);
+  Chart slope = over_time(course, "Friction slope", "1/%", course.friction_slope_per_percent);
+  if (thresholds) {
+    add_level(variance, course, "excited above", thresholds->excitation);
+    add_level(slope, course, "peak below", thresholds->peak_slope);
+    add_level(slope, course, "stop below", thresholds->stop_slope);
+  }
+  return {std::move(traction), over_time(course, "Slip sigma*", "%", course.sigma_star_percent),
+          over_time(course, "Clamping force", "N", course.clamp_force_N), std::move(variance),
+          std::move(slope)};
+}
+
+// The sample of the stop, on the curve.
+void add_stop(const ExperimentCourse& course, Chart& chart) {
+  if (!course.stop_s) return;
+  const auto at = std::lower_bound(course.t_s.begin(), course.t_s.end(), *course.stop_s);
+  if (at == course.t_s.end()) return;
+  const auto i = static_cast<std::size_t>(at - course.t_s.begin());
+  chart.series.push_back({"stop", {course.sigma_star_percent[i]}, {course.mu_star[i]}});
+}
+
 Chart traction_curve(const ExperimentCourse& course,
                      const std::array<std::string, kPhaseCount>& phase_names) {
   Chart chart{"Traction curve, by phase", "slip sigma*, %", "traction coefficient mu*", {}};
@@ -54,6 +84,7 @@ Chart traction_curve(const ExperimentCourse& course,
     }
     if (!points.x.empty()) chart.series.push_back(std::move(points));
   }
+  add_stop(course, chart);
   add_peak(course, from, to, chart);
   return chart;
 }
@@ -61,7 +92,8 @@ Chart traction_curve(const ExperimentCourse& course,
 }  // namespace
 
 void add_experiments(HtmlPage& page, const std::vector<ExperimentCourse>& experiments,
-                     const std::array<std::string, kPhaseCount>& phase_names) {
+                     const std::array<std::string, kPhaseCount>& phase_names,
+                     const std::optional<PhaseThresholds>& thresholds) {
   std::vector<std::vector<std::string>> rows;
   rows.reserve(experiments.size());
   for (const ExperimentCourse& course : experiments) rows.push_back(course.verdict);
@@ -72,11 +104,9 @@ void add_experiments(HtmlPage& page, const std::vector<ExperimentCourse>& experi
       page.paragraph("No sample of it could be used.");
       continue;
     }
-    Chart traction = over_time(course, "Traction coefficient mu*", "mu*", course.mu_star);
-    add_peak(course, course.t_s.front(), course.t_s.back(), traction);
-    page.charts({traction_curve(course, phase_names), std::move(traction),
-                 over_time(course, "Slip sigma*", "%", course.sigma_star_percent),
-                 over_time(course, "Friction slope", "1/%", course.friction_slope_per_percent)});
+    std::vector<Chart> charts = courses(course, thresholds);
+    charts.insert(charts.begin(), traction_curve(course, phase_names));
+    page.charts(charts);
   }
 }
 

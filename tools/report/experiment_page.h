@@ -17,7 +17,8 @@ struct ExperimentCourse {
   std::string name;                  // of its heading
   std::vector<std::string> verdict;  // a cell for each of kVerdictHeader
   // One entry a sample; all of one length.
-  std::vector<double> t_s, mu_star, sigma_star_percent, friction_slope_per_percent;
+  std::vector<double> t_s, mu_star, sigma_star_percent, slip_variance, friction_slope_per_percent,
+      clamp_force_N;
   std::vector<std::size_t> phase;  // 0 .. kPhaseCount - 1
   std::optional<double> stop_s;
   struct Peak {
@@ -25,12 +26,20 @@ struct ExperimentCourse {
   };
   std::optional<Peak> peak;  // where there is a value
 };
-inline const std::vector<std::string> kVerdictHeader{"experiment",         "outcome",
-                                                     "why it ended",       "mu_max",
-                                                     "95 % interval",      "slip at the stop, %",
-                                                     "slip at the peak, %"};
+inline const std::vector<std::string> kVerdictHeader{"experiment",          "outcome",
+                                                     "why it ended",        "mu_max",
+                                                     "95 % interval",       "slip at the stop, %",
+                                                     "slip at the peak, %", "slip up to, %",
+                                                     "slip energy, J"};
+
+// Of the paper's phases; method "robust" has none.
+struct PhaseThresholds {
+  double excitation = 0.0;                    // of the slip variance
+  double stop_slope = 0.0, peak_slope = 0.0;  // 1 / percent slip
+};
 
 void add_experiments(HtmlPage& page, const std::vector<ExperimentCourse>& experiments,
-                     const std::array<std::string, kPhaseCount>& phase_names);
+                     const std::array<std::string, kPhaseCount>& phase_names,
+                     const std::optional<PhaseThresholds>& thresholds);
 
 }  // namespace beltgrip::report

@@ -13,18 +13,28 @@ namespace {
 constexpr std::string_view kStyle = R"(
 body { font: 15px/1.45 sans-serif; max-width: 1180px; margin: 2em auto; padding: 0 1em; color: #222; }
 h1 { font-size: 1.5em; } h2 { font-size: 1.2em; margin-top: 2em; }
+.table { overflow-x: auto; }
 table { border-collapse: collapse; margin: 0.7em 0; }
 th, td { border: 1px solid #ccc; padding: 0.25em 0.6em; text-align: left; vertical-align: top; }
 th { background: #f3f3f3; }
-.charts { display: grid; grid-template-columns: repeat(auto-fill, minmax(370px, 1fr)); gap: 1em; }
+.charts { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(370px, 100%), 1fr)); gap: 1em; }
 .chart { position: relative; height: 320px; min-width: 0; }
+@media print {
+  body { max-width: none; margin: 0; font-size: 11px; }
+  .charts { grid-template-columns: 1fr 1fr; }
+  .chart, tr { break-inside: avoid; }
+  .chart { height: 250px; }
+  h2 { break-after: avoid; }
+}
 )";
 
 // One scatter chart per entry of `data`; a series is [name, is a line, is dashed, [x, y, x, y,
 // ...]].
 constexpr std::string_view kScript = R"(
-const colours = ['#1f6fb4', '#d1495b', '#999999', '#2e8b57', '#8d6a9f', '#b8860b', '#555555',
-                 '#17a2b8', '#e377c2', '#000000'];
+// Told apart without red and green (Okabe and Ito); points differ in shape as well.
+const colours = ['#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9', '#000000',
+                 '#8C8C8C'];
+const shapes = ['circle', 'triangle', 'rect', 'crossRot', 'star'];
 // What bears the same name has the same colour in every chart of the page.
 const names = [];
 const colourOf = (name) => {
@@ -32,19 +42,21 @@ const colourOf = (name) => {
   return colours[names.indexOf(name) % colours.length];
 };
 for (const [id, title, xLabel, yLabel, series] of data) {
-  const datasets = series.map(([label, line, dashed, xy]) => {
+  const datasets = series.map(([label, line, dashed, xy], place) => {
     const points = [];
     for (let k = 0; k + 1 < xy.length; k += 2) points.push({x: xy[k], y: xy[k + 1]});
     const colour = colourOf(label);
     return {label, data: points, showLine: line, borderColor: colour, backgroundColor: colour,
-            borderWidth: line ? 1.5 : 0, borderDash: dashed ? [5, 4] : [],
-            pointRadius: line ? 0 : 1.5};
+            borderWidth: line ? 1.5 : 1, borderDash: dashed ? [5, 4] : [],
+            pointStyle: shapes[place % shapes.length],
+            pointRadius: line ? 0 : points.length === 1 ? 7 : 2.5};
   });
   new Chart(document.getElementById(id), {
     type: 'scatter',
     data: {datasets},
     options: {
       animation: false, maintainAspectRatio: false, normalized: true,
+      interaction: {mode: 'nearest', intersect: false},
       plugins: {title: {display: true, text: title}, legend: {display: datasets.length > 1, labels: {boxWidth: 12}}},
       scales: {x: {title: {display: true, text: xLabel}}, y: {title: {display: true, text: yLabel}}}
     }
@@ -120,10 +132,10 @@ void HtmlPage::table(const std::vector<std::string>& header,
     }
     body_ += "</tr>\n";
   };
-  body_ += "<table>\n";
+  body_ += "<div class=\"table\"><table>\n";
   row("th", header);
   for (const auto& each : rows) row("td", each);
-  body_ += "</table>\n";
+  body_ += "</table></div>\n";
 }
 
 void HtmlPage::charts(const std::vector<Chart>& charts) {
@@ -150,9 +162,11 @@ void HtmlPage::charts(const std::vector<Chart>& charts) {
 }
 
 std::string HtmlPage::text() const {
-  std::string out = "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<title>" +
-                    escaped(title_) + "</title>\n<style>" + std::string(kStyle) +
-                    "</style>\n</head><body>\n<h1>" + escaped(title_) + "</h1>\n" + body_;
+  std::string out =
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<meta name=\"viewport\" "
+      "content=\"width=device-width\">\n<title>" +
+      escaped(title_) + "</title>\n<style>" + std::string(kStyle) +
+      "</style>\n</head><body>\n<h1>" + escaped(title_) + "</h1>\n" + body_;
   if (count_ > 0) {
     out += "<script>" + std::string(chart_js()) + "</script>\n<script>\nconst data = [\n" + data_ +
            "];" + std::string(kScript) + "</script>\n";

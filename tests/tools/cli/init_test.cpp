@@ -66,6 +66,53 @@ TEST(Roles, AreFoundByWordAndUnit) {
 }
 
 // A flag as an enumeration: the value is chosen by its name, and the proposal loads as it is.
+// Names that files of real cars have, each with the words of a role and none of its measurement.
+TEST(Roles, AreNeverWhatIsAskedForLimitedLostOrSomethingElses) {
+  using daemon::Role;
+  struct Case {
+    Role role;
+    const char* message;
+    const char* signal;
+    const char* unit;
+    int bits;
+  };
+  const Case cases[] = {
+      {Role::kEngineSpeed, "EMS_H2", "R_NEngIdlTgC", "rpm", 16},
+      {Role::kEngineSpeed, "Debug", "OilPumpMotorSpeed", "rpm", 16},
+      {Role::kEngineSpeed, "EngineData", "EngAout_N_RqMxPrtct", "rpm", 16},
+      {Role::kEngineSpeed, "EngineData", "EngineSpeed", "rpm", 7},
+      {Role::kEngineTorque, "EngineData", "TrnAin_Tq_MxSpcPdlEngN", "Nm", 16},
+      {Role::kEngineTorque, "EngineData", "EngGoutLss_Tq_Est", "Nm", 16},
+      {Role::kEngineTorque, "Engine_Information", "EngTrqDrRqdExtRng", "Nm", 16},
+      {Role::kEngineTorque, "EngineData", "EngAcsyArcPmp_Tq_Actl", "Nm", 16},
+      {Role::kBrakePressed, "ES_Brake", "Cruise_Brake_Active", "", 1},
+      {Role::kVehicleSpeed, "Telematics", "EnhSvVehTopSpdLim", "km/h", 12},
+      {Role::kVehicleSpeed, "SteeringCmd", "VehicleSpeed", "km/h", 12},
+      {Role::kVehicleSpeed, "Map", "UI_gpsVehicleSpeed", "km/h", 12},
+      {Role::kBrakePressed, "Mode_Switch_Status", "FwdClnMtgnBrkReqAct", "", 1},
+      {Role::kBrakePressed, "LvCommand", "BrakeLightEnable", "", 1},
+      {Role::kBrakePressed, "BrakePedal", "BrakeLevel", "", 8},
+      {Role::kLockupClosed, "Sys_Shift_Lock", "HghVltgPropState", "", 1},
+      {Role::kLockupClosed, "Hvac", "RSELockOnOff", "", 1},
+      {Role::kLockupClosed, "Body", "UI_autoRollWindowsOnLockEnable", "", 1},
+      {Role::kPrimarySpeed, "TCU", "InputSpeedCounter", "rpm", 16},
+  };
+  for (const Case& each : cases) {
+    const std::string dbc = std::string("VERSION \"\"\nBO_ 256 ") + each.message + ": 8 X\n SG_ " +
+                            each.signal + " : 0|" + std::to_string(each.bits) +
+                            "@1+ (1,0) [0|1] \"" + each.unit + "\" X\n";
+    EXPECT_TRUE(cli::guess_role(each.role, {can::parse_dbc(dbc).database}).empty())
+        << each.message << '.' << each.signal;
+  }
+  // The converter's own words are enough.
+  for (const char* name : {"TCC_State", "LockUpState", "LU_On", "TorqueConverterLockState"}) {
+    const std::string dbc = std::string("VERSION \"\"\nBO_ 256 TCU: 8 X\n SG_ ") + name +
+                            " : 0|1@1+ (1,0) [0|1] \"\" X\n";
+    EXPECT_EQ(cli::guess_role(Role::kLockupClosed, {can::parse_dbc(dbc).database}).size(), 1U)
+        << name;
+  }
+}
+
 TEST(Init, AFlagWithNamedValuesSaysWhenItIsTrue) {
   const auto proposed = [](const std::string& values, int bits = 3) {
     const test::Workplace place;

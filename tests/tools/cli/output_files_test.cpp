@@ -35,10 +35,9 @@ void PrintTo(const Output& output, std::ostream* out) { *out << output.title() <
 
 const std::vector<std::string> kReplay{"replay", "@trace.log", "--config", "@beltgrip.toml"};
 const std::vector<std::string> kReplayed{"trace.log", "beltgrip.toml", "vehicle.dbc"};
-const std::vector<std::string> kDiagnose{"diagnose",   "@trace.log", "--config", "@beltgrip.toml",
-                                         "--held-out", "@held.log",  "--model",  "@model.toml"};
-const std::vector<std::string> kDiagnosed{"trace.log", "beltgrip.toml", "vehicle.dbc", "held.log",
-                                          "model.toml"};
+const std::vector<std::string> kDiagnose{"diagnose",   "@run.csv",  "--config", "@beltgrip.toml",
+                                         "--held-out", "@held.csv", "--model",  "@model.toml"};
+const std::vector<std::string> kDiagnosed{"run.csv", "beltgrip.toml", "held.csv", "model.toml"};
 const std::vector<std::string> kSimulate{"simulate", "--scenario", "@scene.toml",
                                          "--start",  "80",         "--duration",
                                          "0.5",      "--model",    "@model.toml"};
@@ -71,6 +70,7 @@ const std::vector<Output> kOutputs{
     {"diagnose", "--json", false, kDiagnose, kDiagnosed, ""},
     {"diagnose", "--report", false, kDiagnose, kDiagnosed, ""},
     {"diagnose", "--model-out", true, kDiagnose, kDiagnosed, ""},
+    {"diagnose", "--next-out", false, kDiagnose, kDiagnosed, ""},
     {"simulate", "--json", false, kSimulate, kSimulated, ""},
     {"simulate", "--log-out", false, kSimulate, kSimulated, ""},
     {"simulate", "--out-dir", true, kSimulate, kSimulated, "trace.log"},
@@ -85,6 +85,18 @@ const std::vector<Output> kOutputs{
     {"dbc decode", "--text", false, kDecode, {"vehicle.dbc", "trace.log"}, ""},
 };
 
+// Twenty seconds at the overdrive end stop.
+std::string steady_run(double speed_rad_s) {
+  std::ostringstream out;
+  out << "t[s],primary_speed[rad/s],secondary_speed[rad/s],secondary_pressure[Pa],"
+         "primary_torque[Nm]\n";
+  for (int i = 0; i < 400; ++i) {
+    out << 0.05 * i << ',' << speed_rad_s + 0.01 * (i % 3) << ',' << 2.24 * speed_rad_s
+        << ",300000," << 50.0 + 0.1 * (i % 5) << '\n';
+  }
+  return out.str();
+}
+
 class OutputFiles : public testing::TestWithParam<Output> {
  protected:
   static void SetUpTestSuite() {
@@ -93,7 +105,8 @@ class OutputFiles : public testing::TestWithParam<Output> {
     const RunResult made =
         beltgrip({"simulate", "--start", "88", "--duration", "1", "--out-dir", in.path("")});
     ASSERT_EQ(made.status, 0) << made.err;
-    in.write("held.log", in.read("trace.log"));
+    in.write("run.csv", steady_run(105.0));
+    in.write("held.csv", steady_run(106.0));
     in.write("scene.toml", "name = \"scene\"\n");
     in.write("model.toml", "[variator]\n");
     std::string why;

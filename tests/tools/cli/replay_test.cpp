@@ -1,6 +1,9 @@
 // beltgrip replay: the same bytes every time, all its options, and logs and configurations that are
 // wrong in every way.
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <zlib.h>
 #include <zstd.h>
 
@@ -583,6 +586,50 @@ TEST_F(Replay, OutputsThatCannotBe) {
   EXPECT_EQ(beltgrip(with_config({path("trace.log"), "--trace", "/dev/full"})).status, 74);
   EXPECT_EQ(beltgrip(with_config({path("trace.log"), "--log-out", "/dev/full"})).status, 74);
   EXPECT_EQ(beltgrip(with_config({path("trace.log"), "--json", "/dev/full"})).status, 74);
+}
+
+// Two coast-downs through a pipe that stays open: the first result comes before the second drive.
+TEST(ReplayOfAStream, GivesEachResultWhenItFalls) {
+  const Workplace place;
+  ASSERT_EQ(beltgrip({"simulate", "--scenario", "demo", "--out-dir", place.path("drive")}).status,
+            0);
+  const std::string log = place.read("drive/trace.log");
+  const std::size_t half = log.find("(15.");  // s, after the first result, before the second drive
+  ASSERT_NE(half, std::string::npos);
+  for (const bool as_json : {false, true}) {
+    const std::string pipe = place.path(as_json ? "json.pipe" : "text.pipe");
+    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+    const int end = open(pipe.c_str(), O_RDWR | O_CLOEXEC);
+    std::vector<std::string> argv{
+        program_path(), "replay", "-", "--config", place.path("drive/beltgrip.toml"), "--quiet"};
+    if (as_json) argv.insert(argv.end(), {"--json", "-"});
+    Process replay(argv, pipe);
+    const auto feed = [&](std::string_view text) {
+      while (!text.empty()) {
+        const ssize_t written = write(end, text.data(), text.size());
+        ASSERT_GT(written, 0);
+        text.remove_prefix(static_cast<std::size_t>(written));
+      }
+    };
+    feed(std::string_view(log).substr(0, half));
+    EXPECT_TRUE(replay.wait_for_output("completed", Milliseconds{60'000})) << replay.err();
+    EXPECT_EQ(replay.out().find("summary"), std::string::npos);
+    EXPECT_EQ(replay.out().find(" frames in "), std::string::npos);
+    feed(std::string_view(log).substr(half));
+    close(end);
+    EXPECT_EQ(replay.wait(Milliseconds{60'000}), 0) << replay.err();
+    EXPECT_EQ(replay.err(), "") << "quiet";
+    // The same as from the file.
+    std::vector<std::string> of_file{"replay", place.path("drive/trace.log"), "--config",
+                                     place.path("drive/beltgrip.toml")};
+    if (as_json) of_file.insert(of_file.end(), {"--json", "-"});
+    std::string expected = beltgrip(of_file).out;
+    const std::string name = place.path("drive/trace.log");
+    for (std::size_t at; (at = expected.find(name)) != std::string::npos;) {
+      expected.replace(at, name.size(), "-");
+    }
+    EXPECT_EQ(replay.out(), expected);
+  }
 }
 
 }  // namespace

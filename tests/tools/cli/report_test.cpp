@@ -35,7 +35,7 @@ TEST_F(Report, ShowsEveryExperimentOfTheLog) {
   const std::string page = place_.read("page.html");
   EXPECT_EQ(count(page, "<h2>trace.log, from "), 2);
   EXPECT_EQ(count(page, "<td>completed, slope</td>"), 2);
-  EXPECT_EQ(count(page, "<canvas "), 8);
+  EXPECT_EQ(count(page, "<canvas "), 12);
   for (const char* name : {"Quiet", "Excited", "Peak", "MacroSlip", "mu_max", "stop"}) {
     EXPECT_NE(page.find("[\"" + std::string(name) + "\","), std::string::npos) << name;
   }

@@ -8,10 +8,11 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/core/publish/own_frames.h"
-#include "tools/cli/own_frame_view.h"
 #include "tools/cli/replay_run.h"
 #include "tools/cli/verdict.h"
+#include "tools/monitor/own_frame_view.h"
 #include "tools/text/json_writer.h"
+#include "tools/text/seconds.h"
 #include "tools/text/snake_case.h"
 
 namespace beltgrip::cli {
@@ -51,11 +52,11 @@ TEST(JsonWriter, WritesWhatAParserReadsBack) {
 }
 
 TEST(Seconds, AreExact) {
-  EXPECT_EQ(seconds_text(0), "0");
-  EXPECT_EQ(seconds_text(1), "0.000000001");
-  EXPECT_EQ(seconds_text(-1'500'000'000), "-1.5");
-  EXPECT_EQ(seconds_text(1'700'000'000'123'456'789), "1700000000.123456789");
-  EXPECT_EQ(seconds_text(20'000'000'000), "20");
+  EXPECT_EQ(text::seconds_text(0), "0");
+  EXPECT_EQ(text::seconds_text(1), "0.000000001");
+  EXPECT_EQ(text::seconds_text(-1'500'000'000), "-1.5");
+  EXPECT_EQ(text::seconds_text(1'700'000'000'123'456'789), "1700000000.123456789");
+  EXPECT_EQ(text::seconds_text(20'000'000'000), "20");
 }
 
 TEST(Labels, AreTheWireNamesInSnakeCase) {
@@ -112,9 +113,9 @@ class OwnFrameView : public testing::Test {
 
   daemon::FrameIdentifiers identifiers_;
   daemon::OwnFrames frames_{identifiers_};
-  OwnFrameDecoder decoder_{identifiers_};
+  monitor::OwnFrameDecoder decoder_{identifiers_};
   Printed table_out_;
-  BusTable table_{table_out_.file()};
+  monitor::BusTable table_{table_out_.file()};
   Verdict verdict_;
   std::uint8_t counter_ = 0;
 };
@@ -161,8 +162,8 @@ TEST_F(OwnFrameView, WrongProtectionIsShownNotBelieved) {
   frame.data[0] ^= 1;
   show(0, frame);
   EXPECT_NE(table_out_.text().find("wrong_crc"), std::string::npos);
-  const auto view = OwnFrameDecoder(identifiers_).decode(frame);
-  const auto json = nlohmann::json::parse(json_line(1'500'000'000, *view));
+  const auto view = monitor::OwnFrameDecoder(identifiers_).decode(frame);
+  const auto json = nlohmann::json::parse(monitor::json_line(1'500'000'000, *view));
   EXPECT_EQ(json.at("protection"), "wrong_crc");
   EXPECT_EQ(json.at("t_s"), 1.5);
   EXPECT_EQ(json.at("message"), "BeltGripEstimate");

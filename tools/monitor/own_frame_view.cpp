@@ -1,13 +1,13 @@
-#include "tools/cli/own_frame_view.h"
+#include "tools/monitor/own_frame_view.h"
 
 #include <cmath>
 
 #include "daemon/core/publish/own_frames.h"
-#include "tools/cli/replay_run.h"
 #include "tools/text/json_writer.h"
+#include "tools/text/seconds.h"
 #include "tools/text/snake_case.h"
 
-namespace beltgrip::cli {
+namespace beltgrip::monitor {
 
 namespace {
 
@@ -96,7 +96,7 @@ std::string json_line(std::int64_t t_ns, const OwnFrameView& view) {
   text::JsonWriter json;
   json.begin_object()
       .key("t_s")
-      .raw(seconds_text(t_ns))
+      .raw(text::seconds_text(t_ns))
       .field("message", view.message->name)
       .field("protection", check_text(view.check))
       .key("signals")
@@ -160,4 +160,4 @@ void BusTable::row(std::int64_t t_ns) {
   change_ns_.reset();
 }
 
-}  // namespace beltgrip::cli
+}  // namespace beltgrip::monitor

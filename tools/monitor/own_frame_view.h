@@ -15,7 +15,7 @@
 #include "can_dbc/frame/e2e.h"
 #include "daemon/core/config/options/config.h"
 
-namespace beltgrip::cli {
+namespace beltgrip::monitor {
 
 struct OwnFrameView {
   const can::MessageDef* message = nullptr;
@@ -77,4 +77,4 @@ class BusTable {
   std::uint64_t rows_ = 0;
 };
 
-}  // namespace beltgrip::cli
+}  // namespace beltgrip::monitor
