@@ -41,7 +41,7 @@ struct Unexplained {
   std::vector<std::string> depends_on;
   double share = 0.0;
   MisfitKind kind = MisfitKind::kFunction;
-  std::optional<double> frequency_Hz;  // of a line
+  std::optional<double> frequency_Hz = std::nullopt;  // of a line
 };
 
 // An experiment to do: in words, and as a scenario that the simulation runs.
