@@ -2,7 +2,6 @@
 // Linux (can-isotp): single frames, first frame with flow control and consecutive frames, padding
 // judged strictly. In the emulated machine, whose kernel has that module:
 // tests/system/qemu/run build/tests/isotp_test
-#include <gtest/gtest.h>
 #include <linux/can/isotp.h>
 #include <net/if.h>
 #include <poll.h>
@@ -18,6 +17,7 @@
 #include <system_error>
 #include <thread>
 
+#include "tests/support/assertions.h"
 #include "tests/system/vcan/uds_rig.h"
 
 namespace beltgrip::test {

@@ -2,8 +2,6 @@
 // error counters through netlink and libsocketcan, frames from one SJA1000 to the other, a card
 // that is pulled out and put back. In the emulated machine: tests/system/qemu/run
 // build/tests/sja1000_test
-#include <gtest/gtest.h>
-
 #include <algorithm>
 #include <csignal>
 #include <filesystem>
@@ -11,6 +9,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "tests/support/assertions.h"
 #include "tests/system/vcan/rig.h"
 
 namespace beltgrip::test {

@@ -2,8 +2,6 @@
 // can do with the same timer and one write, both in the same run on one vcan, stamped by the
 // kernel. Prints the delays and their ratio; what they are is the machine's business.
 // tests/latency.
-#include <gtest/gtest.h>
-
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
@@ -13,6 +11,7 @@
 #include <memory>
 
 #include "can_dbc/log/can_log.h"
+#include "tests/support/assertions.h"
 #include "tests/system/vcan/rig.h"
 
 namespace beltgrip::test {

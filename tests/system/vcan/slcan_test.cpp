@@ -3,7 +3,6 @@
 // and an adapter that is pulled out. In user-mode Linux: VCAN_BACKEND=uml tests/system/vcan/run
 // build/tests/slcan_test
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sched.h>
 #include <unistd.h>
 
@@ -17,6 +16,7 @@
 #include <sstream>
 #include <thread>
 
+#include "tests/support/assertions.h"
 #include "tests/system/vcan/rig.h"
 #include "tests/system/vcan/slcan_adapter.h"
 #include "tests/system/vcan/watch.h"
