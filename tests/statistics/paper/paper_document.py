@@ -14,6 +14,8 @@ from pathlib import Path
 import picture
 import runs
 
+# The scenario was chosen with the seeds 1 to 8; none of these had been run before that was done.
+FIRST_SEED = 101
 SEEDS = 20
 TRIED = 1
 RIGS = ("paper-figures", "paper-rig")
@@ -60,7 +62,7 @@ class Measured:
         bench = runs.Bench(program)
         for rig in RIGS:
             for belt in BELTS:
-                for seed in range(1, seeds + 1):
+                for seed in range(FIRST_SEED, FIRST_SEED + seeds):
                     self.run(bench, rig, belt, seed)
         self.shown = show(bench)
         self.escape = {belt: escape(bench, belt) for belt in BELTS}
@@ -92,8 +94,8 @@ def lowering(trial):
 
 
 def show(bench):
-    damaging = bench.simulate(RIGS[0], "new", 1, runs.DAMAGING)
-    before, after = (bench.simulate(RIGS[0], belt, 1) for belt in BELTS)
+    damaging = bench.simulate(RIGS[0], "new", FIRST_SEED, runs.DAMAGING)
+    before, after = (bench.simulate(RIGS[0], belt, FIRST_SEED) for belt in BELTS)
     return [lowering(bench.replay(place, "paper", options, trace=True))
             for place, options in ((damaging, {}), (damaging, {"lowpass_hz": 1.0}), (before, {}),
                                    (after, {}))]
@@ -101,7 +103,7 @@ def show(bench):
 
 def escape(bench, belt):
     """Equations (7) and (8): the least slip in the mean over 2 s, and the friction there."""
-    rows = bench.replay(bench.simulate(RIGS[0], belt, 1), "paper", trace=True).rows
+    rows = bench.replay(bench.simulate(RIGS[0], belt, FIRST_SEED), "paper", trace=True).rows
     means = [(statistics.fmean(r.slip for r in rows[i:i + 400]),
               statistics.fmean(r.mu for r in rows[i:i + 400])) for i in range(0, len(rows) - 400, 100)]
     return min(means)
@@ -109,7 +111,7 @@ def escape(bench, belt):
 
 def secondary_share(bench):
     """Equation (4) for the secondary pulley over (5), in the mean over the quiet first 60 s."""
-    place = bench.simulate(RIGS[0], "new", 1)
+    place = bench.simulate(RIGS[0], "new", FIRST_SEED)
     dbc, log = place / "vehicle.dbc", place / "trace.log"
     text = bench.call("dbc", "decode", "--dbc", dbc, log, "--json", "-")
     shares = [(float(a), float(b)) for a, b in re.findall(
@@ -174,6 +176,11 @@ def comparison(measured):
     def value(trial):
         return f"{trial.mu_max:.3f}" if trial.mu_max is not None else "none"
 
+    def stopped(trial):
+        return (f"the method says stop at {trial.slip_percent:.1f} % of slip, the operator lets go "
+                f"{1000.0 * (trial.let_go_s - trial.stop_s):.0f} ms later; at most "
+                f"{trial.most_slip_percent:.1f} % until the force is back")
+
     rows = (
         ("4", "slip* has a minimum; below it deformation dominates, above it macro slip",
          f"least slip* {least_slip:.2f} % at mu* = {mu_esc:.3f}"),
@@ -187,9 +194,9 @@ def comparison(measured):
         ("7", "sets (1) to (4) along the curve; mu_max 0.105, reasonable by visual inspection",
          f"in order: {'yes' if damaging.in_order else 'no'}; mu_max {value(damaging)}"),
         ("8", "stopped in time, no excessive slip; mu_max 0.105",
-         f"mu_max {value(before)}; stop at {before.slip_percent:.1f} % of slip"),
+         f"mu_max {value(before)}; {stopped(before)}"),
         ("9", "after the damage, the form has changed; mu_max 0.100",
-         f"mu_max {value(after)}; stop at {after.slip_percent:.1f} % of slip"),
+         f"mu_max {value(after)}; {stopped(after)}"),
     )
     return "\n".join(f"| {a} | {b} | {c} |" for a, b, c in rows)
 
@@ -205,23 +212,23 @@ Van Berkel, Fujii, Hofman, Steinbuch, "Belt-Pulley Friction Estimation for the C
 Written by `tests/statistics/paper/paper_document.py build/bin/beltgrip . --write`; `ctest --test-dir build -R paper_document` compares.
 
 ## The rig
-`paper-figures` (`tools/scenarios/paper-figures.toml`) is the paper's rig as far as the text gives it: speed, torque, ratio, ramp, rates, filter, Table I, the friction before and after the damage, and the times. What the file marks "assumed" the text does not say: the forms of the two friction curves, the inertia of the load machine, the noise of the speeds, and when the operator lets go. They were chosen so that what the text says comes about: this shows that the paper's figures are possible, not that its belt was like this one.
+`paper-figures` (`tools/scenarios/paper-figures.toml`) is the paper's rig as far as the text gives it: speed, torque, ratio, ramp, rates, filter, Table I, the friction before and after the damage, and the times. What the file marks "assumed" the text does not say: the forms of the two friction curves, the inertia of the load machine, the noise of the speeds, when the operator lets go and how fast the force is back. Nor does it say what is as in `paper-rig`: deformation, pulleys and piston, drag, the noise of torque and pressure, the force at the start. They were chosen, with the seeds 1 to 8, so that what the text says comes about: this shows that the paper's figures are possible, not that its belt was like this one.
 `paper-rig` is the harder rig of this project: a corner at the peak (2 and 2.4 % of slip), ten times the inertia. There the gate opens after the peak, and the method is late and low.
 
 ![Figures 4 to 9](paper_figures.svg)
 
-| figure | what the paper's text says | our run, seed 1 |
+| figure | what the paper's text says | our run, seed {FIRST_SEED} |
 |---|---|---|
 {comparison(measured)}
 
 ## Both methods on both rigs
-{len(differ)} seeds each. "Operator": the simulation's operator, who lets go at 8 % (`paper-figures`) or 10 % (`paper-rig`) of slip, after a reaction time; without him the force goes on falling (`--set operator.action=none`). Only a stop before he lets go counts as the method's own. Three figures: least / mean / greatest.
+Seeds {FIRST_SEED} to {FIRST_SEED + len(differ) - 1}; the scenario was chosen with others (1 to 8). "Operator": the simulation's operator, who lets go at 6 % (`paper-figures`) or 10 % (`paper-rig`) of slip, after a reaction time; without him the force goes on falling (`--set operator.action=none`). Only a stop before he lets go counts as the method's own. Three figures: least / mean / greatest.
 
 | rig | belt, mu_max | operator | method | own stop | mu_max | error | own stop after the peak | slip at the own stop | truth in 95 % interval | sets (2), (3), (4) in order |
 |---|---|---|---|---|---|---|---|---|---|---|
 {chr(10).join(result_rows(measured))}
 
-"Paper, as before": the reading of the last row below; without the operator its stop on `paper-rig` is later still, with him it mostly comes after he has let go. `robust` takes a top that rises by less than about 1e-3 per percent for level: on `paper-figures` it ends before the peak, low by what is still to come, and its interval mostly misses the peak.
+"Paper, as before": the reading of the last row below; without the operator its stop on `paper-rig` is later still, with him it mostly comes after he has let go. `robust` takes a top that rises by less than about 1e-3 per percent for level: on `paper-figures` it ends before the peak, low by what is still to come, and its interval mostly misses the peak (why: `estimator/ACCURACY.md`, Known limits).
 
 The two belts of `paper-figures` differ by {spread(differ, "%.4f")} in mu_max, seed by seed (method `paper`); the paper tells them apart as 0.105 and 0.100.
 
@@ -232,7 +239,7 @@ The two belts of `paper-figures` differ by {spread(differ, "%.4f")} in mu_max, s
 "In order": each set begins, and has its middle, after the one before. Noise can take single samples back.
 
 ## Readings that the text leaves open
-The copy of the paper that is to be had breaks off between "so q_k" and "90 s)": initial state, what happens while the gate is closed and the mean's set are not said. They are options of `[estimator]` with `method = "paper"`; the default reproduces what the text reports best. `paper-figures`, operator lets go, {len(differ)} seeds; the last row, "as before", is what was the default.
+The copy of the paper that is to be had breaks off between "so q_k" and "90 s)": initial state, what happens while the gate is closed and the mean's set are not said. They are options of `[estimator]` with `method = "paper"`; the default reproduces what the text reports best. `paper-figures`, operator lets go, the same seeds; the last row, "as before", is what was the default.
 
 | reading | new: own stop | in order | error | after the peak | worn: own stop | in order | error | after the peak |
 |---|---|---|---|---|---|---|---|---|
@@ -242,7 +249,7 @@ Percent or fraction: `c_v` in fractions would ask for slip that runs at 77 % a s
 
 ## Equations that the estimator does not use
 - (4), the friction of each pulley by its own torque: the primary's is (5) with the primary force, which the paper does not use either. The secondary's needs a torque sensor on the secondary shaft. Where one is there, (4) over (5) is the torque that arrives: {measured.secondary:.3f} in the mean of the first 60 s here, the rest is drag and deformation. This is the balance that `diagnose` fits (effect `secondary_loss`). For mu_max it would carry these losses into the value, and MinClampForce is asked for by the primary torque: not used.
-- (7) and (8), the friction mu_esc at the least slip*: seed 1, means over 2 s: {escapes}. With deformation as on this rig it lies far below mu_max, moves with the pulleys' stiffness rather than with friction, and the least slip* says where the ratio stands against its end stop. That place serves: `calibrate` takes the end stop's ratio from the quiet cells there, as a line in force and mu*, which needs no minimum. As a measure of friction the paper itself leaves it ("the relation between mu_esc and the maximum friction is not clear"): not used.
+- (7) and (8), the friction mu_esc at the least slip*: seed {FIRST_SEED}, means over 2 s: {escapes}. With deformation as on this rig it lies far below mu_max, moves with the pulleys' stiffness rather than with friction, and the least slip* says where the ratio stands against its end stop. That place serves: `calibrate` takes the end stop's ratio from the quiet cells there, as a line in force and mu*, which needs no minimum. As a measure of friction the paper itself leaves it ("the relation between mu_esc and the maximum friction is not clear"): not used.
 """
 
 
@@ -314,7 +321,7 @@ def main():
     document_path = given.source / "estimator/PAPER.md"
     picture_path = given.source / "estimator/paper_figures.svg"
     measured = Measured(given.program, SEEDS if given.write else TRIED)
-    text, drawn = document(measured), picture.svg(*measured.shown, THRESHOLDS)
+    text, drawn = document(measured), picture.svg(*measured.shown, measured.escape["new"], THRESHOLDS)
     wrong = list(broken(measured))
     if given.write:
         document_path.write_text(text)

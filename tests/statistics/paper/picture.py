@@ -1,7 +1,10 @@
 """Figures 4 to 9 of the paper, drawn from our runs: one SVG."""
 
+import statistics
+
 COLOURS = {1: "#9aa0a6", 2: "#1f77b4", 3: "#2ca02c", 4: "#d62728"}
-GAP = 8  # samples between two drawn points; in set (1) ten times as many
+GAP = 8  # samples between two drawn points; in set (1) eight times as many
+MEAN_PERCENT, MEAN_S = 0.15, 2.0  # a point of Figure 4
 
 
 class Panel:
@@ -22,7 +25,6 @@ class Panel:
         x, y, width, height = self.box
         share_x = (u - self.x_range[0]) / (self.x_range[1] - self.x_range[0])
         share_y = (v - self.y_range[0]) / (self.y_range[1] - self.y_range[0])
-        share_y = min(1.0, max(0.0, share_y))
         return x + width * share_x, y + height * (1.0 - share_y)
 
     def ticks(self, across, up):
@@ -43,11 +45,23 @@ class Panel:
                           f'stroke-dasharray="{dash}" fill="none"/>')
 
     def line(self, points, colour, width=1.0):
-        inside = [self.at(u, v) for u, v in points if self.x_range[0] <= u <= self.x_range[1]]
-        if len(inside) < 2:
-            return
-        path = " ".join(f"{px:.1f} {py:.1f}" for px, py in inside)
-        self.parts.append(f'<path d="M{path}" stroke="{colour}" stroke-width="{width}" fill="none"/>')
+        """What lies outside of the panel is left out."""
+        pieces = [[]]
+        for u, v in points:
+            if self.x_range[0] <= u <= self.x_range[1] and self.y_range[0] <= v <= self.y_range[1]:
+                pieces[-1].append(self.at(u, v))
+            elif pieces[-1]:
+                pieces.append([])
+        for piece in pieces:
+            if len(piece) > 1:
+                path = " ".join(f"{px:.1f} {py:.1f}" for px, py in piece)
+                self.parts.append(f'<path d="M{path}" stroke="{colour}" stroke-width="{width}" '
+                                  'fill="none"/>')
+
+    def point(self, u, v, text):
+        px, py = self.at(u, v)
+        self.parts.append(f'<circle cx="{px:.1f}" cy="{py:.1f}" r="3" fill="#000"/>')
+        self.label(u + 0.02 * (self.x_range[1] - self.x_range[0]), v, text)
 
     def label(self, u, v, text, colour="#000"):
         px, py = self.at(u, v)
@@ -88,8 +102,32 @@ def curve(x, y, title, trial, rows, names):
     return panel
 
 
+def means(rows):
+    """(slip, mu) in means, each as long as slip takes to move on by MEAN_PERCENT, or MEAN_S."""
+    part = []
+    for row in rows:
+        part.append(row)
+        if row.t_s - part[0].t_s > MEAN_S or abs(row.slip - part[0].slip) > MEAN_PERCENT:
+            yield tuple(statistics.fmean(v) for v in zip(*((r.slip, r.mu) for r in part)))
+            part = []
+
+
+def schematic(x, y, rows, escape):
+    """Figure 4: the minimum of slip*, and the top."""
+    panel = Panel(x, y, 250, 170, (1.0, 7.0), (0.055, 0.115), "Fig. 4: the damaging run, in means",
+                  "&#963;* [%]", "&#956;*")
+    panel.ticks((1, 2, 3, 4, 5, 6, 7), (0.06, 0.08, 0.1))
+    points = list(means(rows))
+    panel.line(points, "#000")
+    panel.point(*escape, "mu_esc")
+    top = max(points, key=lambda each: each[1])
+    panel.point(*top, "")
+    panel.label(top[0] - 0.5, top[1] + 0.003, "mu_max")
+    return panel
+
+
 def slip_curve(x, y, quick, slow):
-    panel = Panel(x, y, 250, 170, (0.0, 12.0), (0.06, 0.115), "Fig. 4 and 5: low-pass 5 Hz, 1 Hz",
+    panel = Panel(x, y, 250, 170, (0.0, 12.0), (0.06, 0.115), "Fig. 5: low-pass 5 Hz (grey), 1 Hz",
                   "&#963;* [%]", "&#956;*")
     panel.ticks((0, 2, 4, 6, 8, 10, 12), (0.06, 0.08, 0.1))
     panel.line([(r.slip, r.mu) for r in quick[::GAP]], "#bbb")
@@ -118,10 +156,11 @@ def courses(x, rows, mu_max, thresholds):
         yield panel
 
 
-def svg(damaging, slow, before, after, thresholds):
-    """Each argument but the last: a Trial with its rows up to where the force comes back."""
+def svg(damaging, slow, before, after, escape, thresholds):
+    """Trials with their rows up to where the force comes back; (slip, mu) at the least slip*."""
     panels = list(courses(60, damaging.rows, damaging.mu_max, thresholds))
-    panels.append(slip_curve(430, 40, damaging.rows, slow.rows))
+    panels.append(schematic(430, 40, slow.rows, escape))
+    panels.append(slip_curve(740, 270, damaging.rows, slow.rows))
     places = {1: (2.6, 0.078), 2: (3.0, 0.094), 3: (5.0, 0.108), 4: (8.0, 0.087)}
     panels.append(curve(430, 270, "Fig. 7: the damaging run", damaging, damaging.rows, places))
     panels.append(curve(430, 500, "Fig. 8: stopped in time, new belt", before, before.rows, {}))

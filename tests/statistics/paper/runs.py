@@ -34,6 +34,7 @@ class Trial:
     covered: bool
     slip_percent: float | None
     rows: list = field(default_factory=list)
+    most_slip_percent: float | None = None  # until the force is back
 
     @property
     def by_itself(self):
@@ -126,6 +127,7 @@ class Bench:
                       found.get("sigma_stop_percent"))
         if trace:
             trial.rows = read_trace(place / "trace.csv")
+            trial.most_slip_percent = max(r.slip for r in trial.rows)
         return trial
 
 
