@@ -22,7 +22,7 @@ namespace beltgrip::estimator {
 namespace {
 
 // Table I.
-constexpr double kT_s = 1.0, kQk = 5e-3, kQmu0 = 0.5, kCv = 0.05, kCk = -1e-3, kCm = 1e-3;
+constexpr double kT_s = 1.0, kQk = 5e-3, kQmu0 = 0.5, kCv = 0.05, kCm = 1e-3;
 
 const VariatorParameters kVariator;
 
