@@ -251,12 +251,15 @@ class RobustEstimator final : public SlipCurveEstimator {
            omega_s_.verdict() == ReadingVerdict::kFrozen;
   }
 
-  // What the curve may still rise by beyond the data, in terms of its slope at their end.
+  // What the curve may still rise by beyond the data, if they do not hold its top: as much as a
+  // power law of that slope, the friction that bends least, up to where friction counts.
   static double further_rise(const PeakFitResult& fit) noexcept {
-    if (fit.inside >= kTurnedDown) return 0.0;
-    if (!fit.end_slope_valid) return kUnknownRise * fit.mu;
+    const double outside = 1.0 - fit.inside;  // probability
+    if (!fit.end_slope_valid) return outside * kUnknownRise * fit.mu;
+    if (!(fit.end_slip > 0.0)) return 0.0;
     const double slope = fit.end_slope + kRiseDeviations * std::sqrt(fit.end_slope_variance);
-    return kRiseShare * std::max(0.0, slope) * fit.end_slip;
+    const double to_come = std::max(0.0, std::log(kFrictionTo_percent / fit.end_slip));
+    return outside * std::max(0.0, slope) * fit.end_slip * to_come;
   }
 
   // A value is an interval that is narrow enough, whether friction turned down or lies level.
