@@ -6,6 +6,7 @@
 
 #include "can_dbc/log/format.h"
 #include "can_dbc/log/text.h"
+#include "can_dbc/log/usual_line.h"
 
 namespace beltgrip::can {
 
@@ -77,6 +78,13 @@ class CandumpParser : public LineParser {
     record.interface = interface;
     record.sent = hash != std::string_view::npos && take_word(line) == "T";
     return LineKind::kFrame;
+  }
+
+  const char* quick_frame(std::string_view text, LogRecord& record) override {
+    if (text.size() < kUsualLineMost) return nullptr;
+    const char* const end = read_usual_line(text, record);
+    if (end != nullptr) after_error_ = false;
+    return end;
   }
 
  private:

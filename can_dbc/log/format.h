@@ -20,6 +20,9 @@ class LineParser {
  public:
   virtual ~LineParser() = default;
   virtual LineKind parse(std::string_view line, LogRecord& record) = 0;
+  // A frame from the front of the log's text, where the format knows a shorter way to it than
+  // parse(): behind its line. nullptr: go by parse().
+  virtual const char* quick_frame(std::string_view, LogRecord&) { return nullptr; }
   const char* reason() const noexcept { return reason_; }
 
  protected:

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
+#include <span>
 #include <string>
 
 #include "can_dbc/dbc/message_codec.h"
@@ -141,15 +143,27 @@ void check_other_texts(const Database& db) {
   }
 }
 
+// What the codec of the message found is what the codec of each signal alone finds.
+void check_values(const MessageCodec& codec, std::span<const std::uint8_t> payload,
+                  const DecodedMessage& values) {
+  values.for_each_present([&](std::size_t i) {
+    const SignalCodec& signal = codec.signal(i);
+    require(signal.fits(payload.size()) && values[i].raw == signal.raw(payload));
+    const double physical = signal.physical(values[i].raw);
+    require(std::memcmp(&values[i].physical, &physical, sizeof physical) == 0);
+  });
+}
+
 void check_decoding(const Database& db) {
   std::uint8_t payload[64];
   for (std::size_t i = 0; i < sizeof payload; ++i) payload[i] = static_cast<std::uint8_t>(i * 37);
-  std::vector<DecodedSignal> values;
   for (const MessageDef& message : db.messages) {
     const MessageCodec codec(message);
-    values.resize(codec.signal_count());
+    DecodedMessage values(codec.signal_count());
     for (std::size_t length = 0; length <= sizeof payload; length += length < 9 ? 1 : 11) {
-      require(codec.decode({payload, length}, values) <= message.signals.size());
+      codec.decode({payload, length}, values);
+      require(values.count() <= message.signals.size());
+      check_values(codec, {payload, length}, values);
     }
   }
   const Database* one = &db;

@@ -78,15 +78,11 @@ class Decoder {
     const ChosenMessage& message = messages_[place->database][place->message];
     if (!message.definition) return nullptr;
     message.codec.decode(frame.payload(), values_);
-    for (std::size_t i = 0; i < message.wanted.size(); ++i) {
-      values_[i].present = values_[i].present && message.wanted[i];
-    }
+    for (const std::size_t unwanted : message.unwanted) values_.drop(unwanted);
     if (message.names_repeat) keep_first_of_each_name(message);
     return &message;
   }
-  std::span<const can::DecodedSignal> values_of(const ChosenMessage& message) const {
-    return std::span(values_).first(message.wanted.size());
-  }
+  const can::DecodedMessage& values() const { return values_; }
 
  private:
   const can::MessageDef& message_at(can::MessageIndex::Place place) const {
@@ -140,7 +136,7 @@ class Decoder {
         chosen_.push_back(&message);
       }
     }
-    values_.resize(longest);
+    values_ = can::DecodedMessage(longest);
   }
 
   static ChosenMessage prepare(const can::MessageDef& definition, Names& signals) {
@@ -153,7 +149,9 @@ class Decoder {
       // Both, so that each counts as found.
       const bool by_name = signals.has(signal.name);
       const bool by_place = signals.has(definition.name + '.' + signal.name);
-      message.wanted.push_back(signals.all() || by_name || by_place);
+      const bool wanted = signals.all() || by_name || by_place;
+      if (!wanted) message.unwanted.push_back(message.wanted.size());
+      message.wanted.push_back(wanted);
     }
     return message;
   }
@@ -162,8 +160,8 @@ class Decoder {
   void keep_first_of_each_name(const ChosenMessage& message) {
     std::set<std::string_view> before;
     for (std::size_t i = 0; i < message.wanted.size(); ++i) {
-      if (!values_[i].present) continue;
-      values_[i].present = before.insert(message.definition->signals[i].name).second;
+      if (!values_.has(i)) continue;
+      if (!before.insert(message.definition->signals[i].name).second) values_.drop(i);
     }
   }
 
@@ -172,7 +170,7 @@ class Decoder {
   can::MessageIndex index_;
   std::vector<std::vector<ChosenMessage>> messages_;  // beside the databases' messages
   std::vector<const ChosenMessage*> chosen_;
-  std::vector<can::DecodedSignal> values_;
+  can::DecodedMessage values_;
 };
 
 // Instants of one log that are wanted, in seconds after its first frame.
@@ -225,7 +223,7 @@ void decode_log(Decoder& decoder, const DecodeOptions& options, const std::strin
     if (window.has(record.t_ns)) {
       ++in_time;
       if (const ChosenMessage* message = decoder.decode(record.frame)) {
-        writer.append({record, *message, decoder.values_of(*message)}, lines);
+        writer.append({record, *message, decoder.values()}, lines);
         ++decoded;
       }
     }

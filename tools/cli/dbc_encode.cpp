@@ -116,9 +116,9 @@ class Encoder {
     for (const bool multiplexed : {false, true}) {
       put_given();
       codec_.decode(frame_.payload(), decoded_);
-      for (std::size_t i = 0; i < decoded_.size(); ++i) {
+      for (std::size_t i = 0; i < message_.signals.size(); ++i) {
         const can::SignalDef& signal = message_.signals[i];
-        if (signal.multiplexed_by.has_value() != multiplexed || !decoded_[i].present) continue;
+        if (signal.multiplexed_by.has_value() != multiplexed || !decoded_.has(i)) continue;
         if (!is_given(i)) put(i, start_value(signal, codec_.signal(i)));
       }
     }
@@ -143,7 +143,7 @@ class Encoder {
 
   void check(const Given& given) const {
     const can::SignalDef& signal = message_.signals[given.index];
-    if (!decoded_[given.index].present) {
+    if (!decoded_.has(given.index)) {
       const std::string selector =
           signal.multiplexed_by ? signal.multiplexed_by->selector : "its multiplexer";
       refuse(signal.name + ": not in a frame with this value of " + selector);
@@ -155,7 +155,7 @@ class Encoder {
 
   const can::MessageDef& message_;
   can::MessageCodec codec_;
-  std::vector<can::DecodedSignal> decoded_;
+  can::DecodedMessage decoded_;
   std::vector<Given> given_;
   can::CanFrame frame_;
 };

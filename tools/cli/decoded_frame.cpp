@@ -75,14 +75,14 @@ class JsonFrames : public FrameWriter {
     });
     out += R"(},"labels":{)";
     bool first = true;
-    for (std::size_t i = 0; i < frame.values.size(); ++i) {
+    frame.values.for_each_present([&](std::size_t i) {
       const std::string* label = label_of(frame, i);
-      if (label == nullptr) continue;
+      if (label == nullptr) return;
       if (!first) out += ',';
       first = false;
       out += texts.keys[i];
       out += json_text(*label);
-    }
+    });
     if (with_raw_) {
       out += R"(},"raw":{)";
       for_each_present(frame, texts, out, [&](std::size_t i) {
@@ -118,13 +118,12 @@ class JsonFrames : public FrameWriter {
   static void for_each_present(const DecodedFrame& frame, const Texts& texts, std::string& out,
                                Write write) {
     bool first = true;
-    for (std::size_t i = 0; i < frame.values.size(); ++i) {
-      if (!frame.values[i].present) continue;
+    frame.values.for_each_present([&](std::size_t i) {
       if (!first) out += ',';
       first = false;
       out += texts.keys[i];
       write(i);
-    }
+    });
   }
 
   void append_interface(std::string_view interface, std::string& out) {
@@ -160,8 +159,7 @@ class TextFrames : public FrameWriter {
     line += ' ';
     line += frame.message.definition->name;
     const char* before = ": ";
-    for (std::size_t i = 0; i < frame.values.size(); ++i) {
-      if (!frame.values[i].present) continue;
+    frame.values.for_each_present([&](std::size_t i) {
       const can::SignalDef& signal = frame.message.definition->signals[i];
       line += before;
       before = ", ";
@@ -175,7 +173,7 @@ class TextFrames : public FrameWriter {
         line += frame.message.codec.signal(i).raw_text(frame.values[i].raw);
         line += ']';
       }
-    }
+    });
     out += can::printable(line);
     out += '\n';
   }
@@ -217,7 +215,7 @@ class CsvFrames : public FrameWriter {
     std::size_t next = frame.message.first_column;
     for (std::size_t i = 0; i < frame.message.wanted.size(); ++i) {
       if (!frame.message.wanted[i]) continue;
-      if (frame.values[i].present) {
+      if (frame.values.has(i)) {
         out.append(next + 1 - column, ',');
         column = next + 1;
         append_cell(frame, i, out);
@@ -251,8 +249,8 @@ class CsvFrames : public FrameWriter {
 
 const std::string* label_of(const DecodedFrame& frame, std::size_t signal) {
   const can::ValueTable& table = frame.message.definition->signals[signal].values;
+  if (!frame.values.has(signal) || table.empty()) return nullptr;
   const can::DecodedSignal& decoded = frame.values[signal];
-  if (!decoded.present || table.empty()) return nullptr;
   auto key = static_cast<std::int64_t>(decoded.raw);
   const can::SignalCodec& codec = frame.message.codec.signal(signal);
   if (codec.is_float()) {

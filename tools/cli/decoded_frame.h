@@ -16,16 +16,17 @@ namespace beltgrip::cli {
 struct ChosenMessage {
   const can::MessageDef* definition = nullptr;
   can::MessageCodec codec;
-  std::vector<bool> wanted;      // beside the definition's signals
-  std::size_t number = 0;        // among all messages of all DBC files
-  std::size_t first_column = 0;  // in CSV: of its first wanted signal
-  bool names_repeat = false;     // among its signals
+  std::vector<bool> wanted;           // beside the definition's signals
+  std::vector<std::size_t> unwanted;  // the others
+  std::size_t number = 0;             // among all messages of all DBC files
+  std::size_t first_column = 0;       // in CSV: of its first wanted signal
+  bool names_repeat = false;          // among its signals
 };
 
 struct DecodedFrame {
   const can::LogRecord& record;
   const ChosenMessage& message;
-  std::span<const can::DecodedSignal> values;  // beside the definition's signals
+  const can::DecodedMessage& values;  // what is present and wanted
 };
 
 // Text of the value table; nullptr: none.

@@ -86,7 +86,7 @@ std::optional<OwnFrameView> OwnFrameDecoder::decode(const can::CanFrame& frame) 
   Message& message = found->second;
   OwnFrameView view;
   view.message = message.definition;
-  view.signals.resize(message.codec.signal_count());
+  view.signals = can::DecodedMessage(message.codec.signal_count());
   message.codec.decode(frame.payload(), view.signals);
   view.check = message.checker.check(frame);
   return view;

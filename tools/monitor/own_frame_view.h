@@ -19,7 +19,7 @@ namespace beltgrip::monitor {
 
 struct OwnFrameView {
   const can::MessageDef* message = nullptr;
-  std::vector<can::DecodedSignal> signals;  // in the definition's order
+  can::DecodedMessage signals;  // in the definition's order
   can::e2e::CheckStatus check = can::e2e::CheckStatus::kOk;
 
   bool good() const {

@@ -145,7 +145,7 @@ class FileCheck {
     used_[message_] = true;
     ++messages_seen_;
     codec_ = MessageCodec(*message_);
-    decoded_.assign(codec_.signal_count(), {});
+    decoded_ = DecodedMessage(codec_.signal_count());
     signal_ = nullptr;
     texts_.clear();
     EXPECT_EQ(message_->length, std::stoul(f[3])) << f[6];
@@ -236,7 +236,7 @@ class FileCheck {
     ASSERT_NE(found, nullptr) << where;
     const auto index = static_cast<std::size_t>(found - message_->signals.data());
     const DecodedSignal& got = decoded_[index];
-    ASSERT_TRUE(got.present) << where;
+    ASSERT_TRUE(decoded_.has(index)) << where;
     if (codec_.signal(index).is_float()) {
       EXPECT_TRUE(same(number(codec_.signal(index).raw_text(got.raw)), number(f[2]))) << where;
     } else {
@@ -252,14 +252,14 @@ class FileCheck {
     if (!in_payload_) return;
     in_payload_ = false;
     std::size_t present = 0;
-    for (std::size_t i = 0; i < decoded_.size(); ++i) {
+    for (std::size_t i = 0; i < message_->signals.size(); ++i) {
       const SignalDef& signal = message_->signals[i];
       const SignalDef* selector =
           signal.multiplexed_by ? message_->find_signal(signal.multiplexed_by->selector) : nullptr;
       const bool beyond_reference =
           selector != nullptr && (!selector->short_name.empty() || !selector->is_multiplexer);
       if (beyond_reference && !value_names_.contains(signal.name)) continue;
-      if (decoded_[i].present) ++present;
+      if (decoded_.has(i)) ++present;
     }
     EXPECT_EQ(present, expected_present_) << message_->name << " of " << payload_text_;
   }
@@ -275,7 +275,7 @@ class FileCheck {
   std::map<std::string, std::size_t> value_names_;
   std::size_t messages_seen_ = 0;
   MessageCodec codec_;
-  std::vector<DecodedSignal> decoded_;
+  DecodedMessage decoded_;
   std::string payload_text_;
   bool in_payload_ = false;
   bool loaded_by_reference_ = true;

@@ -3,6 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <bit>
+#include <random>
+
+#include "tests/can_dbc/dbc/naive_codec.h"
 
 namespace beltgrip::can {
 namespace {
@@ -22,18 +26,18 @@ SignalDef selected(const char* name, std::uint32_t byte, const char* selector,
   return signal;
 }
 
-using Values = std::array<DecodedSignal, 8>;
-
 TEST(MessageCodec, LeavesOutWhatLiesOutsideThePayload) {
   MessageDef message;
   message.signals = {byte_signal("a", 0), byte_signal("b", 1), byte_signal("c", 7)};
   const MessageCodec codec(message);
-  Values values;
-  EXPECT_EQ(codec.decode(std::array<std::uint8_t, 2>{5, 6}, values), 2U);
-  EXPECT_TRUE(values[0].present);
+  DecodedMessage values(8);
+  codec.decode(std::array<std::uint8_t, 2>{5, 6}, values);
+  EXPECT_EQ(values.count(), 2U);
+  EXPECT_TRUE(values.has(0));
   EXPECT_EQ(values[1].raw, 6U);
-  EXPECT_FALSE(values[2].present);
-  EXPECT_EQ(codec.decode({}, values), 0U);
+  EXPECT_FALSE(values.has(2));
+  codec.decode({}, values);
+  EXPECT_EQ(values.count(), 0U);
 }
 
 TEST(MessageCodec, SelectsByRangesAlsoWhenTheSelectorComesLater) {
@@ -41,12 +45,12 @@ TEST(MessageCodec, SelectsByRangesAlsoWhenTheSelectorComesLater) {
   message.signals = {selected("low", 1, "mux", {{0, 3}, {7, 7}}),
                      selected("high", 1, "mux", {{4, 6}}), byte_signal("mux", 0)};
   const MessageCodec codec(message);
-  Values values;
+  DecodedMessage values(8);
   for (std::uint8_t mux = 0; mux < 9; ++mux) {
     codec.decode(std::array<std::uint8_t, 2>{mux, 9}, values);
-    EXPECT_EQ(values[0].present, mux <= 3 || mux == 7) << int{mux};
-    EXPECT_EQ(values[1].present, mux >= 4 && mux <= 6) << int{mux};
-    EXPECT_TRUE(values[2].present);
+    EXPECT_EQ(values.has(0), mux <= 3 || mux == 7) << int{mux};
+    EXPECT_EQ(values.has(1), mux >= 4 && mux <= 6) << int{mux};
+    EXPECT_TRUE(values.has(2));
   }
 }
 
@@ -55,13 +59,13 @@ TEST(MessageCodec, CascadesThroughSelectorsThatAreThemselvesSelected) {
   message.signals = {selected("leaf", 2, "inner", {{1, 1}}),
                      selected("inner", 1, "outer", {{5, 5}}), byte_signal("outer", 0)};
   const MessageCodec codec(message);
-  Values values;
+  DecodedMessage values(8);
   codec.decode(std::array<std::uint8_t, 3>{5, 1, 42}, values);
-  EXPECT_TRUE(values[0].present);
+  EXPECT_TRUE(values.has(0));
   EXPECT_EQ(values[0].physical, 42.0);
   codec.decode(std::array<std::uint8_t, 3>{4, 1, 42}, values);
-  EXPECT_FALSE(values[0].present);
-  EXPECT_FALSE(values[1].present);
+  EXPECT_FALSE(values.has(0));
+  EXPECT_FALSE(values.has(1));
 }
 
 TEST(MessageCodec, NeverSelectsThroughACircleOrAnUnknownSelector) {
@@ -71,9 +75,10 @@ TEST(MessageCodec, NeverSelectsThroughACircleOrAnUnknownSelector) {
       selected("below", 2, "a", {{0, 255}}),     selected("self", 3, "self", {{0, 255}}),
       selected("lost", 4, "nobody", {{0, 255}}), byte_signal("plain", 5)};
   const MessageCodec codec(message);
-  Values values;
-  EXPECT_EQ(codec.decode(std::array<std::uint8_t, 8>{}, values), 1U);
-  EXPECT_TRUE(values[5].present);
+  DecodedMessage values(8);
+  codec.decode(std::array<std::uint8_t, 8>{}, values);
+  EXPECT_EQ(values.count(), 1U);
+  EXPECT_TRUE(values.has(5));
 }
 
 TEST(MessageCodec, SelectsByTheBitsOfASignedSelector) {
@@ -82,11 +87,122 @@ TEST(MessageCodec, SelectsByTheBitsOfASignedSelector) {
   mux.type = ValueType::kSigned;
   message.signals = {mux, selected("a", 1, "mux", {{128, 255}})};
   const MessageCodec codec(message);
-  Values values;
+  DecodedMessage values(8);
   codec.decode(std::array<std::uint8_t, 2>{0x7F, 0}, values);
-  EXPECT_FALSE(values[1].present);
+  EXPECT_FALSE(values.has(1));
   codec.decode(std::array<std::uint8_t, 2>{0x80, 0}, values);
-  EXPECT_TRUE(values[1].present);
+  EXPECT_TRUE(values.has(1));
+}
+
+// --- against the naive codec ------------------------------------------------------------------
+
+class Drawn {
+ public:
+  explicit Drawn(unsigned seed) : random_(seed) {}
+
+  std::uint64_t below(std::uint64_t end) { return random_() % end; }
+
+  SignalDef signal(std::size_t number, std::uint32_t bytes) {
+    SignalDef signal;
+    signal.name = "s" + std::to_string(number);
+    signal.start_bit = static_cast<std::uint32_t>(below(bytes * 8));
+    const std::uint64_t lengths[] = {1, 8, 16, 32, 64, below(12), below(20), below(67)};
+    signal.length = static_cast<std::uint32_t>(lengths[below(8)]);
+    signal.byte_order = below(2) == 0 ? ByteOrder::kLittle : ByteOrder::kBig;
+    signal.type = below(3) == 0   ? ValueType::kSigned
+                  : below(8) == 0 ? ValueType::kFloat32
+                                  : ValueType::kUnsigned;
+    const double scales[] = {1.0, 0.1, 0.25, -3.0, 1e-9};
+    signal.scale = scales[below(5)];
+    signal.offset = below(2) == 0 ? 0.0 : -40.0;
+    return signal;
+  }
+
+  // Multiplexed by any other signal, by itself, or by none that there is.
+  void select(MessageDef& message, std::uint64_t range_most) {
+    for (SignalDef& signal : message.signals) {
+      if (below(3) == 0) continue;
+      MuxRule rule{"s" + std::to_string(below(message.signals.size() + below(2))), {}};
+      for (std::uint64_t k = below(4); k > 0; --k) {
+        const std::uint64_t low = below(range_most);
+        rule.ranges.emplace_back(low, low + below(range_most));
+      }
+      if (below(20) == 0) rule.ranges.emplace_back(7, 3);
+      signal.multiplexed_by = std::move(rule);
+    }
+  }
+
+  std::vector<std::uint8_t> payload(std::size_t bytes, bool small) {
+    std::vector<std::uint8_t> made(bytes);
+    for (std::uint8_t& byte : made) byte = static_cast<std::uint8_t>(below(small ? 4 : 256));
+    return made;
+  }
+
+ private:
+  std::mt19937_64 random_;
+};
+
+void expect_as_naive(const MessageDef& message, const MessageCodec& codec,
+                     const std::vector<std::uint8_t>& payload, DecodedMessage& values) {
+  codec.decode(payload, values);
+  std::size_t present = 0;
+  for (std::size_t i = 0; i < message.signals.size(); ++i) {
+    const SignalDef& signal = message.signals[i];
+    const bool expected = testing::naive_present(message, signal, payload);
+    ASSERT_EQ(values.has(i), expected) << signal.name;
+    if (!expected) continue;
+    ++present;
+    // A float of this width has its bits as its raw value, sign and all.
+    SignalDef bits = signal;
+    if (codec.signal(i).is_float()) bits.type = ValueType::kUnsigned;
+    ASSERT_EQ(values[i].raw, testing::naive_raw(bits, payload)) << signal.name;
+    const double physical = codec.signal(i).physical(values[i].raw);
+    ASSERT_EQ(std::bit_cast<std::uint64_t>(values[i].physical),
+              std::bit_cast<std::uint64_t>(physical))
+        << signal.name;
+  }
+  EXPECT_EQ(values.count(), present);
+  std::vector<std::size_t> visited;
+  values.for_each_present([&](std::size_t i) { visited.push_back(i); });
+  EXPECT_EQ(visited.size(), present);
+  EXPECT_TRUE(std::is_sorted(visited.begin(), visited.end()));
+}
+
+TEST(MessageCodec, DecodesAnyMessageAsBitsPickedOneByOne) {
+  for (unsigned seed = 0; seed < 600; ++seed) {
+    SCOPED_TRACE(seed);
+    Drawn drawn(seed);
+    MessageDef message;
+    const std::uint32_t bytes = seed % 3 == 0 ? 64 : 8;
+    const std::size_t count = 1 + drawn.below(seed % 10 == 0 ? 150 : 20);
+    for (std::size_t i = 0; i < count; ++i) message.signals.push_back(drawn.signal(i, bytes));
+    // Selectors of a few bits, of a byte, and of any width with values far apart.
+    if (seed % 4 != 0) drawn.select(message, seed % 4 == 1 ? 6 : seed % 4 == 2 ? 200 : 1ULL << 40);
+    const MessageCodec codec(message);
+    DecodedMessage values(count);
+    for (std::size_t length = 0; length <= bytes; length += length < 9 ? 1 : 11) {
+      expect_as_naive(message, codec, drawn.payload(length, seed % 2 == 0), values);
+      if (HasFatalFailure()) return;
+    }
+  }
+}
+
+// A table of all cases would be as long as the square of this message.
+TEST(MessageCodec, DecodesManyOverlappingRangesWithoutATableOfThemAll) {
+  Drawn drawn(1);
+  MessageDef message;
+  message.signals.push_back(byte_signal("mux", 0));
+  message.signals[0].length = 16;
+  for (std::uint64_t k = 0; k < 400; ++k) {
+    const std::string name = "s" + std::to_string(k);
+    message.signals.push_back(selected(name.c_str(), 2, "mux", {{k * 50, 30000 + k * 50}}));
+  }
+  const MessageCodec codec(message);
+  DecodedMessage values(message.signals.size());
+  for (int i = 0; i < 50; ++i) {
+    expect_as_naive(message, codec, drawn.payload(8, false), values);
+    if (HasFatalFailure()) return;
+  }
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
-// A signal's bits picked one by one, straight from the DBC's numbering: the truth the compiled
-// codec is compared with. Shares no code with it.
+// A signal's bits picked one by one, straight from the DBC's numbering, and whether a payload has
+// it by following its selectors: the truth the compiled codec is compared with. Shares no code with
+// it.
 #pragma once
 
 #include <cstdint>
@@ -47,6 +48,33 @@ inline std::uint64_t naive_raw(const can::SignalDef& signal,
     for (std::size_t i = bits.size(); i < 64; ++i) raw |= std::uint64_t{1} << i;
   }
   return raw;
+}
+
+// Whether a payload has the signal: inside it and, if multiplexed, selected by a signal that it
+// has.
+inline bool naive_present(const can::MessageDef& message, const can::SignalDef& signal,
+                          std::span<const std::uint8_t> payload) {
+  const can::SignalDef* at = &signal;
+  // A chain of selectors longer than there are signals comes back to itself.
+  for (std::size_t steps = 0; steps <= message.signals.size(); ++steps) {
+    if (!naive_fits(*at, payload.size())) return false;
+    if (!at->multiplexed_by) return true;
+    const can::SignalDef* selector = nullptr;
+    for (const can::SignalDef& each : message.signals) {
+      if (selector == nullptr && each.name == at->multiplexed_by->selector) selector = &each;
+    }
+    if (selector == nullptr || !naive_fits(*selector, payload.size())) return false;
+    can::SignalDef bits = *selector;
+    bits.type = can::ValueType::kUnsigned;
+    const std::uint64_t value = naive_raw(bits, payload);
+    bool selected = false;
+    for (const auto& [low, high] : at->multiplexed_by->ranges) {
+      selected = selected || (value >= low && value <= high);
+    }
+    if (!selected) return false;
+    at = selector;
+  }
+  return false;
 }
 
 }  // namespace beltgrip::testing

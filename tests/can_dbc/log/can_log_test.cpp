@@ -100,6 +100,66 @@ TEST(CandumpLog, CompactFormatReadsAndWritesBackTheSameBytes) {
   EXPECT_EQ(read_log.frames[8].frame.id, (CanId{0x4, false}));
 }
 
+// The usual line is read in a shorter way, but not where the log may end within it.
+TEST(CandumpLog, UsualLinesAreReadToTheLastDigit) {
+  const std::string comment = "# " + std::string(100, '-') + "\n";
+  const std::string log =
+      "(1700000000.123456) vcan0 123#0011223344556677\n"
+      "(0.000001) c 7fF#aB\n"
+      "(9223372034.999999999) can1 1fFfFfFf#\n"
+      "(12345678.100000) abcdefg 00000000#0123456789aBcDeF\n"
+      "(123456789.000000) can0 000#010203040506\n";
+  const Log read_log = read(log + comment);
+  EXPECT_EQ(read_log.stats.lines, 6U);
+  EXPECT_EQ(read_log.stats.lines_bad, 0U);
+  ASSERT_EQ(read_log.frames.size(), 5U);
+  const std::int64_t stamps_ns[] = {1'700'000'000'123'456'000, 1'000, 9'223'372'034'999'999'999,
+                                    12'345'678'100'000'000, 123'456'789'000'000'000};
+  const char* texts[] = {"vcan0 123#0011223344556677", "c 7FF#AB", "can1 1FFFFFFF#",
+                         "abcdefg 00000000#0123456789ABCDEF", "can0 000#010203040506"};
+  for (std::size_t i = 0; i < 5; ++i) {
+    EXPECT_EQ(read_log.frames[i].t_ns, stamps_ns[i]);
+    EXPECT_EQ(read_log.frames[i].text(), texts[i]);
+    const CanFrame& frame = read_log.frames[i].frame;
+    for (std::size_t k = frame.length; k < kMaxPayload; ++k) EXPECT_EQ(frame.data[k], 0);
+  }
+}
+
+// A line that begins with a blank is not a usual one and says the same. One character of each usual
+// line is another, one is missing, or one is there twice.
+TEST(CandumpLog, WhatIsNearlyAUsualLineIsReadAlikeBothWays) {
+  const std::string usual[] = {"(1700000000.123456) vcan0 123#0011223344556677",
+                               "(0.000001) c 7FF#AB", "(1700000001.123456789) can1 1FFFFFFF#DEAD",
+                               "(12345678.100000) abcdefg 00000123#0123456789ABCDEF",
+                               "(123456789.000000) can0 000#"};
+  const std::string characters = std::string("0189afAFgG(). #R@`:/_\t\r\x1B\x7F\xE9-") + '\0';
+  std::string log, shifted;
+  const auto add = [&](const std::string& line) {
+    log += line + '\n';
+    shifted += ' ' + line + '\n';
+  };
+  for (const std::string& line : usual) {
+    for (std::size_t at = 0; at <= line.size(); ++at) {
+      for (const char c : characters) add(line.substr(0, at) + c + line.substr(at));
+      if (at == line.size()) break;
+      for (const char c : characters) add(line.substr(0, at) + c + line.substr(at + 1));
+      add(line.substr(0, at) + line.substr(at + 1));
+    }
+    for (int i = 0; i < 3000; ++i) add(line);  // that it is taken for a candump log
+  }
+  const Log quick = read(log);
+  const Log slow = read(shifted);
+  EXPECT_EQ(quick.stats.lines, slow.stats.lines);
+  EXPECT_EQ(quick.stats.lines_bad, slow.stats.lines_bad);
+  ASSERT_EQ(quick.frames.size(), slow.frames.size());
+  EXPECT_GT(quick.frames.size(), 15'000U);
+  for (std::size_t i = 0; i < quick.frames.size(); ++i) {
+    ASSERT_EQ(quick.frames[i].t_ns, slow.frames[i].t_ns) << i;
+    ASSERT_EQ(quick.frames[i].text(), slow.frames[i].text()) << i;
+    ASSERT_EQ(quick.frames[i].frame, slow.frames[i].frame) << i;
+  }
+}
+
 TEST(CandumpLog, TakesWhatLogsInTheFieldHave) {
   const Log log = read(
       "(000.000000) can0 123#00.11.22\r\n"  // CRLF, dots
