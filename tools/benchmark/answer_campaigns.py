@@ -4,25 +4,16 @@
 METHOD: diagnose as shipped; two that must lose: nothing (never anything wrong) and usual (always a
 gain of the torque sensor).
 """
-import argparse
-import csv
 import json
-import subprocess
 import sys
-from pathlib import Path
 
-from make import PROGRAM
-from score import COLUMNS
-
-TRIVIAL = {"nothing": ("nothing_wrong", "", "", "", "", ""),
-           "usual": ("explained", "torque_gain", "gain", "", "", "")}
+import recipe
 
 
 def diagnose(folder):
-    logs = sorted(str(path) for path in folder.glob("run*.csv"))
-    done = subprocess.run([PROGRAM, "diagnose", "--config", folder / "config.toml", *logs, "--json",
-                           "-"], capture_output=True, text=True, check=True)
-    found = json.loads(done.stdout)
+    logs = sorted(folder.glob("run*.csv"))
+    found = json.loads(recipe.call("diagnose", "--config", folder / "config.toml", *logs, "--json",
+                                   "-"))
     if not found["findings"]:
         return found["verdict"], "", "", "", "", ""
     first = found["findings"][0]
@@ -32,18 +23,14 @@ def diagnose(folder):
     return found["verdict"], first["effect"], name, size["value"], *size["ci95"]
 
 
+METHODS = {"diagnose": diagnose,
+           "nothing": lambda _: ("nothing_wrong", "", "", "", "", ""),
+           "usual": lambda _: ("explained", "torque_gain", "gain", "", "", "")}
+
+
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("method", choices=("diagnose", *TRIVIAL))
-    given = parser.parse_args()
-    manifest = json.loads((given.folder / "manifest.json").read_text())
-    out = csv.writer(sys.stdout, lineterminator="\n")
-    out.writerow(COLUMNS["campaigns"])
-    for each in manifest["campaigns"]:
-        out.writerow([each, *(TRIVIAL.get(given.method) or diagnose(given.folder / each))])
-    return 0
+    return recipe.answer("campaigns", METHODS, __doc__)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(recipe.run(main))

@@ -80,7 +80,7 @@ def fault(**keys):
 
 
 def draw_rig(random, noise, family, kind):
-    """Scenario file of a ramp on the rig, and the time that its log begins at."""
+    """Scenario file of a ramp on the rig, the belt's keys, when a reading steps (None: never)."""
     belt = draw_curve(random, family, "rig")
     torque_Nm = random.uniform(25.0, 80.0)
     ramp = random.log_uniform(26.0, 400.0)
@@ -104,21 +104,24 @@ def draw_rig(random, noise, family, kind):
     peak_s = (start_N - needed_N) / ramp
     text += "\n[run]\n" + toml({"duration_s": 1.3 * peak_s + 10.0})
     text += "\n[sensors]\n" + toml(sensors) + "\n[belts.drawn]\n" + toml(belt)
+    at_s = None
     if kind == "disturbed":
         # A reading steps where mu* is at three quarters to nine tenths of its top.
         share = random.uniform(0.75, 0.9)
-        at_s = (start_N - needed_N / share) / ramp
+        at_s = max(1.0, (start_N - needed_N / share) / ramp)
         if random.uniform() < 0.5:
-            text += fault(kind="signal_gain", channel="PrimaryTorque", at_s=max(1.0, at_s), for_s=1e3,
+            text += fault(kind="signal_gain", channel="PrimaryTorque", at_s=at_s, for_s=1e3,
                           size=random.pick((0.93, 1.07)))
         else:
-            text += fault(kind="signal_bias", channel="SecondaryPressure", at_s=max(1.0, at_s),
+            text += fault(kind="signal_bias", channel="SecondaryPressure", at_s=at_s,
                           for_s=1e3, size=random.pick((-1.0, 1.0)) * 0.06 * needed_N / 0.0113)
-    return text, belt
+    return text, belt, at_s
 
 
 def draw_car(random, noise, family, kind):
-    """Scenario file of a coast-down whose transmission goes on holding what it was asked for."""
+    """The same of a coast-down whose transmission goes on holding what it was asked for; the time
+    counts from the request.
+    """
     belt = draw_curve(random, family, "car")
     sensors = {"primary_speed_noise_rad_s": 0.05, "secondary_speed_noise_rad_s": 0.10,
                "engine_speed_noise_rad_s": 0.1, "torque_noise_Nm": 0.2, "pressure_noise_Pa": 1000.0}
@@ -131,7 +134,9 @@ def draw_car(random, noise, family, kind):
     text += "\n[engine]\n" + toml({"overrun_torque_Nm": random.uniform(28.0, 45.0)})
     text += "\n[vehicle]\n" + toml({"mass_kg": random.uniform(1100.0, 1700.0)})
     text += fault(kind="tcu_latches", at_s=0.0, for_s=1e3)
+    at_s = None
     if kind == "disturbed":
-        text += fault(kind="signal_gain", channel="EngineTorque", after_request=True,
-                      at_s=random.uniform(1.0, 3.0), for_s=1e3, size=random.pick((0.93, 1.07)))
-    return text, belt
+        at_s = random.uniform(1.0, 3.0)
+        text += fault(kind="signal_gain", channel="EngineTorque", after_request=True, at_s=at_s,
+                      for_s=1e3, size=random.pick((0.93, 1.07)))
+    return text, belt, at_s

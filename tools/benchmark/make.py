@@ -4,31 +4,22 @@
 Each is a folder: trace.log, vehicle.dbc, beltgrip.toml. manifest.json names them with their hashes,
 truth.sealed is for score.py. Same seed and same program, same bytes. BELTGRIP names the program.
 """
-import argparse
-import hashlib
 import json
 import os
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 import draw
+import recipe
 import score
+from recipe import call
 
 TRIES = 60  # drawings until the peak is passed (with a peak) or there was a ramp (without)
 HEAD_S = 30.0  # of the rig's log before the peak
 LAG_S = 0.045  # of the low-pass of method "paper", which the course is read through
 COURSE_STEP = 10  # samples of 5 ms
 KEPT = ("trace.log", "vehicle.dbc", "beltgrip.toml")
-PROGRAM = os.environ.get("BELTGRIP", str(Path(__file__).parents[2] / "build/bin/beltgrip"))
-
-
-def call(*arguments):
-    done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True)
-    if done.returncode != 0:
-        raise RuntimeError(f"{' '.join(map(str, arguments))}: {done.stderr.strip()}")
-    return done.stdout
 
 
 def course_of(folder, begin_s, end_s):
@@ -61,7 +52,7 @@ def configure(folder, plant, kind):
 def attempt(random, number, folder):
     """One drawing into FOLDER: its truth, or None where it is of no use."""
     plant, noise, family, kind = draw.combination(number)
-    text, belt = (draw.draw_rig if plant == "rig" else draw.draw_car)(random, noise, family, kind)
+    text, belt, steps_s = (draw.draw_rig if plant == "rig" else draw.draw_car)(random, noise, family, kind)
     scenario = folder / "scenario.toml"
     scenario.write_text(text)
     seed = 1 + number
@@ -84,6 +75,8 @@ def attempt(random, number, folder):
     configure(folder, plant, kind)
     truth = {"plant": plant, "noise": noise, "family": family, "kind": kind, "peak_s": peak_s,
              "mu_max": run["mu_max"]}
+    if steps_s is not None:
+        truth["disturbed_s"] = steps_s + (0.0 if plant == "rig" else run["begin_s"])
     if rising:
         # What friction has come to at 10 % of slip.
         truth["mu_max"] -= belt["rise_per_percent"] * (draw.RISING_TO_PERCENT - 10.0)
@@ -96,43 +89,25 @@ def attempt(random, number, folder):
     return truth
 
 
-def make(number, seed, folder):
+def make(number, seed, target):
     random = draw.Random(1_000_003 * seed + number)
     for _ in range(TRIES):
-        with tempfile.TemporaryDirectory(dir=folder) as name:
+        with tempfile.TemporaryDirectory(dir=target.parent) as name:
             place = Path(name)
             truth = attempt(random, number, place)
             if truth is None:
                 continue
-            target = folder / f"{number:03d}"
             target.mkdir()
-            files = {}
             for each in KEPT:
-                files[each] = hashlib.sha256((place / each).read_bytes()).hexdigest()
                 (place / each).rename(target / each)
-            return truth, files
-    raise RuntimeError(f"experiment {number}: no drawing of {TRIES} reaches its peak")
+            return truth, {"plant": truth["plant"], "noise": truth["noise"]}
+    raise recipe.Refused(recipe.INTERNAL,
+                         f"experiment {number}: no drawing of {TRIES} reaches its peak")
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--count", type=int, default=120)
-    parser.add_argument("--seed", type=int, default=2011)
-    given = parser.parse_args()
-    given.folder.mkdir(parents=True)
-    truths, entries = {}, {}
-    for number in range(given.count):
-        name = f"{number:03d}"
-        truths[name], files = make(number, given.seed, given.folder)
-        entries[name] = {"plant": truths[name]["plant"], "noise": truths[name]["noise"], "files": files}
-    text, digest = score.seal(truths)
-    (given.folder / "truth.sealed").write_text(text)
-    manifest = {"type": "experiments", "seed": given.seed, "program": call("--version").strip(),
-                "truth_sha256": digest, "experiments": entries}
-    (given.folder / "manifest.json").write_text(json.dumps(manifest, indent=1, sort_keys=True) + "\n")
-    return 0
+    return recipe.write("experiments", 120, make, __doc__)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(recipe.run(main))

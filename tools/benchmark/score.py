@@ -3,26 +3,30 @@
 
 Experiments: id,stop_s,mu_max,lo,hi,kind with kind value, lower_bound or none; empty where there is
 none. Campaigns: id,verdict,effect,parameter,value,lo,hi. One row an id. Prints one row of a Markdown
-table for each file; --by noise, plant or kind: one for each class of it as well.
+table for each file; --by noise, plant, kind or family: one for each class of it as well.
 """
 import argparse
 import base64
 import csv
 import hashlib
 import json
+import math
 import sys
 import zlib
 from pathlib import Path
 
 EARLY_SHARE = 0.8  # of the slip at the peak: a stop before it is early (near_s in the truth)
 LATE_PERCENT = 1.0  # slip past the peak, in points, that is still in time
+# How far from the truth an interval or a bound may reach and still be of use: the usual safety factor
+# of the clamp force. Who knows no more than that has nothing to save.
+USEFUL_FACTOR = 1.3
 COLUMNS = {
     "experiments": ("id", "stop_s", "mu_max", "lo", "hi", "kind"),
     "campaigns": ("id", "verdict", "effect", "parameter", "value", "lo", "hi"),
 }
 HEADERS = {
     "experiments": ("answers", "right", "stops", "early", "slip past the peak, 50 / 90 %", "values",
-                    "error, 50 / 95 %", "truth in the interval", "bounds right",
+                    "error, 50 / 95 %", "half width, 50 / 95 %", "truth in the interval", "bounds right",
                     "no peak: a value that misses"),
     "campaigns": ("answers", "right", "cause named", "cause within its interval",
                   "false alarms without a cause"),
@@ -42,18 +46,33 @@ def unseal(text, digest):
     return json.loads(zlib.decompress(base64.decodebytes(text.encode())))
 
 
+def read_manifest(path):
+    """What make.py or make_campaigns.py wrote, and of which kind it is."""
+    try:
+        manifest = json.loads(path.read_text())
+        kind, _ = manifest["type"], manifest["truth_sha256"]
+    except (ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"{path}: {error!r}, expected what make.py writes") from None
+    if kind not in COLUMNS:
+        raise ValueError(f"{path}: type: found {kind!r}, expected {' or '.join(COLUMNS)}")
+    return manifest, kind
+
+
 def number(text, where):
     if text.strip() == "":
         return None
     try:
-        return float(text)
+        value = float(text)
     except ValueError:
-        raise ValueError(f"{where}: found {text!r}, expected a number or nothing") from None
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(f"{where}: found {text!r}, expected a number or nothing")
+    return value
 
 
 def read_answers(path, columns, numbers):
     answers = {}
-    with open(path, newline="") as file:
+    with open(path, newline="", encoding="utf-8-sig", errors="replace") as file:
         reader = csv.DictReader(file)
         if tuple(reader.fieldnames or ()) != columns:
             raise ValueError(f"{path}:1: found {','.join(reader.fieldnames or ())}, "
@@ -95,28 +114,37 @@ def slip_at(course, t_s):
 
 def judge_experiment(truth, answer):
     """What is to be counted of one answer."""
-    value = answer["kind"] == "value"
-    judged = {"peak": truth["peak_s"] is not None, "stops": answer["stop_s"] is not None,
-              "value": value, "bound": answer["kind"] == "lower_bound"}
+    value, bound = (answer["kind"] == each for each in ("value", "lower_bound"))
+    peak, stops = truth["peak_s"] is not None, answer["stop_s"] is not None
+    judged = {"peak": peak, "stops": stops, "value": value, "bound": bound}
     reference = truth["mu_max"]
+    known = False  # something true and of use is said of mu_max
     if value:
+        low, high = answer["lo"], answer["hi"]
         judged["error"] = 100.0 * abs(answer["mu_max"] / reference - 1.0)
-        judged["held"] = answer["lo"] <= reference <= answer["hi"]
-    if judged["bound"]:
+        judged["width"] = 50.0 * (high - low) / reference
+        judged["held"] = low <= reference <= high
+        known = (judged["held"] and low * USEFUL_FACTOR >= reference and
+                 high <= USEFUL_FACTOR * reference)
+    if bound:
         judged["bound_right"] = answer["mu_max"] <= reference
-    if not judged["peak"]:
+        known = judged["bound_right"] and answer["mu_max"] * USEFUL_FACTOR >= reference
+    if not peak:
         judged["misses"] = value and not judged["held"]
-        judged["right"] = not judged["misses"] and judged.get("bound_right", True)
+        judged["right"] = known
         return judged
-    if judged["stops"]:
+    late = True
+    if stops:
         judged["early"] = answer["stop_s"] < truth["near_s"]
         judged["past"] = (slip_at(truth["course"], answer["stop_s"]) -
                           slip_at(truth["course"], truth["peak_s"]))
+        late = judged["past"] > LATE_PERCENT
     if truth["kind"] == "disturbed" and not value:
-        judged["right"] = judged.get("bound_right", True)  # to see it and say so is an answer
-        return judged
-    judged["right"] = bool(judged["stops"] and not judged["early"] and
-                           judged["past"] <= LATE_PERCENT and value and judged["held"])
+        # To stop from then on, early or not, and to give no value is an answer.
+        judged["right"] = (not late and answer["stop_s"] >= truth["disturbed_s"] and
+                           judged.get("bound_right", True))
+    else:
+        judged["right"] = not late and not judged["early"] and value and known
     return judged
 
 
@@ -129,6 +157,7 @@ def experiment_cells(truths, answers):
             share(j["early"] for j in stopped),
             pair([j["past"] for j in stopped], (0.5, 0.9), " points"),
             share(j["value"] for j in peaked), pair([j["error"] for j in values], (0.5, 0.95), " %"),
+            pair([j["width"] for j in values], (0.5, 0.95), " %"),
             share(j["held"] for j in values),
             share(j["bound_right"] for j in judged if j["bound"]),
             share(j["misses"] for j in judged if not j["peak"])]
@@ -168,6 +197,27 @@ def check_answers(kind, path, answers, truths):
             for each in needed[answer["kind"]]:
                 if answer[each] is None:
                     raise ValueError(f"{path}: {name}: a {answer['kind']} needs {each}")
+        low, high = answer["lo"], answer["hi"]
+        if low is not None and high is not None and low > high:
+            raise ValueError(f"{path}: {name}: lo {low:g} lies above hi {high:g}")
+
+
+def table(folder, paths, by=None):
+    """Lines of the Markdown table."""
+    manifest, kind = read_manifest(folder / "manifest.json")
+    if by and kind != "experiments":
+        raise ValueError(f"--by {by}: {kind} have no classes that may be told")
+    truths = unseal((folder / "truth.sealed").read_text(), manifest["truth_sha256"])
+    cells = experiment_cells if kind == "experiments" else campaign_cells
+    numbers = ("stop_s", "mu_max", "lo", "hi", "value")
+    yield "| " + " | ".join(HEADERS[kind]) + " |\n" + "|---" * len(HEADERS[kind]) + "|"
+    for path in paths:
+        answers = read_answers(path, COLUMNS[kind], numbers)
+        check_answers(kind, path, answers, truths)
+        yield f"| {path.stem} | " + " | ".join(cells(truths, answers)) + " |"
+        for group in sorted({t[by] for t in truths.values()}) if by else ():
+            some = {i: t for i, t in truths.items() if t[by] == group}
+            yield f"| {path.stem}, {group} | " + " | ".join(cells(some, answers)) + " |"
 
 
 def main():
@@ -177,20 +227,12 @@ def main():
     parser.add_argument("--by", choices=("noise", "plant", "kind", "family"))
     given = parser.parse_args()
     try:
-        manifest = json.loads((given.folder / "manifest.json").read_text())
-        kind = manifest["type"]
-        truths = unseal((given.folder / "truth.sealed").read_text(), manifest["truth_sha256"])
-        cells = experiment_cells if kind == "experiments" else campaign_cells
-        numbers = ("stop_s", "mu_max", "lo", "hi", "value")
-        print("| " + " | ".join(HEADERS[kind]) + " |\n" + "|---" * len(HEADERS[kind]) + "|")
-        for path in given.answers:
-            answers = read_answers(path, COLUMNS[kind], numbers)
-            check_answers(kind, path, answers, truths)
-            print(f"| {path.stem} | " + " | ".join(cells(truths, answers)) + " |")
-            for group in sorted({t[given.by] for t in truths.values()}) if given.by else ():
-                some = {i: t for i, t in truths.items() if t[given.by] == group}
-                print(f"| {path.stem}, {group} | " + " | ".join(cells(some, answers)) + " |")
-    except (OSError, ValueError) as error:
+        for line in table(given.folder, given.answers, given.by):
+            print(line)
+    except OSError as error:
+        print(f"score.py: {error.filename}: {error.strerror}", file=sys.stderr)
+        return 66
+    except ValueError as error:
         print(f"score.py: {error}", file=sys.stderr)
         return 65
     return 0
