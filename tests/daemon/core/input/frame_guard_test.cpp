@@ -189,6 +189,76 @@ TEST(FrameGuard, APauseIsNoWrongRate) {
   }
 }
 
+// Ten times as often until the pause: does the wrong rate outlive it?
+bool outlives(Duration period, Duration pause) {
+  FrameGuard guard(period, nullptr);
+  MonoTime t = 0;
+  for (int i = 0; i < 40; ++i) guard.count(t += period / 10);
+  EXPECT_TRUE(guard.wrong_rate());
+  guard.count(t + pause);
+  return guard.wrong_rate();
+}
+
+TEST(FrameGuard, WhenAPauseBeginsTheCountAnew) {
+  // 50 ms, or 2.5 periods where that is longer.
+  EXPECT_TRUE(outlives(10 * kMillisecond, 50 * kMillisecond));
+  EXPECT_FALSE(outlives(10 * kMillisecond, 50 * kMillisecond + 1));
+  EXPECT_TRUE(outlives(40 * kMillisecond, 100 * kMillisecond));
+  EXPECT_FALSE(outlives(40 * kMillisecond, 100 * kMillisecond + 1));
+}
+
+TEST(FrameGuard, WithoutAPeriodNoRateIsWrong) {
+  FrameGuard guard;
+  for (MonoTime t = 1; t < 100; ++t) guard.count(t);
+  EXPECT_FALSE(guard.wrong_rate());
+}
+
+TEST(FrameGuard, WithoutACounterTheCrcAloneCounts) {
+  MessageProtection given = protection();
+  given.counter.reset();
+  FrameGuard guard(std::nullopt, &given);
+  for (const unsigned any : {3U, 3U, 12U, 0U}) EXPECT_TRUE(guard.admit(frame_of(any)));
+  EXPECT_FALSE(guard.admit(frame_of(1, 0, 0x121)));
+}
+
+TEST(FrameGuard, ACounterThatEndsAtFourteen) {
+  MessageProtection given = protection();
+  given.counter->maximum = 14;
+  FrameGuard guard(std::nullopt, &given);
+  for (unsigned i = 0; i < 60; ++i) EXPECT_TRUE(guard.admit(frame_of(i % 15))) << i;
+  EXPECT_FALSE(guard.admit(frame_of(15)));  // no number of this counter, and no step from it
+  EXPECT_TRUE(guard.admit(frame_of(0)));
+  EXPECT_FALSE(guard.admit(frame_of(0)));
+  EXPECT_FALSE(guard.invalid());
+}
+
+TEST(FrameGuard, OfACounterOfTwoBitsHalfTheWayRoundIsTheMost) {
+  MessageProtection given = protection();
+  given.counter->maximum = 3;
+  for (const unsigned step : {1U, 2U}) {
+    FrameGuard guard(std::nullopt, &given);
+    EXPECT_TRUE(guard.admit(frame_of(1)));
+    EXPECT_TRUE(guard.admit(frame_of((1 + step) % 4))) << step;
+  }
+  FrameGuard guard(std::nullopt, &given);
+  EXPECT_TRUE(guard.admit(frame_of(1)));
+  EXPECT_FALSE(guard.admit(frame_of(0)));
+  EXPECT_TRUE(guard.invalid());
+  for (unsigned i = 1; i < FrameGuard::kGood; ++i) EXPECT_FALSE(guard.admit(frame_of(i % 4))) << i;
+  EXPECT_TRUE(guard.admit(frame_of(FrameGuard::kGood % 4)));
+}
+
+TEST(FrameGuard, WhatWasBadBeforeItWasValidAgainIsForgotten) {
+  Bench bench;
+  bench.good();
+  for (int i = 0; i < FrameGuard::kBad; ++i) bench.guard.admit(frame_of(bench.counter));
+  EXPECT_TRUE(bench.guard.invalid());
+  for (int i = 0; i < FrameGuard::kGood; ++i) bench.good();
+  EXPECT_FALSE(bench.guard.invalid());
+  bench.guard.admit(frame_of(bench.counter));
+  EXPECT_FALSE(bench.guard.invalid());
+}
+
 TEST(FrameGuard, NothingIsTakenFromABadFrame) {
   Config config;
   config.trigger = Trigger::kAlways;

@@ -177,5 +177,73 @@ TEST(Publisher, ClampFramesWithControlCommandOnly) {
   EXPECT_EQ(last.size, 8U);
 }
 
+TEST(Publisher, AnotherGoesOnWhereOneEnded) {
+  Bench bench(4 * kMillisecond);
+  bench.now.command = bench.now.in_experiment = true;
+  bench.now.clamp = {true, 3000.0};
+  bench.now.slip.macro_slip_stop = true;
+  bench.now.status.outcome = Outcome::kAborted;
+  std::uint8_t counter = 0;
+  for (MonoTime t = 0; t <= 20 * kMillisecond; t += 4 * kMillisecond) {
+    const Outbox outbox = bench.at(t);
+    if (count_of(outbox, 0x6A2) > 0) counter = outbox.frames[0].data[1] & 15;
+  }
+  Bench next(4 * kMillisecond);
+  next.now = bench.now;
+  next.publisher.go_on_from(bench.publisher);
+  // Nothing is due, nothing has changed, nothing begins.
+  EXPECT_EQ(next.at(24 * kMillisecond).size, 0U);
+  const Outbox outbox = next.at(28 * kMillisecond);
+  EXPECT_EQ(outbox.size, 2U);  // clamp and slip
+  EXPECT_EQ(outbox.frames[0].id.value, 0x6A2U);
+  EXPECT_EQ(outbox.frames[0].data[1] & 15, counter + 1);
+}
+
+TEST(Publisher, HalfASampleBeforeItsInstantIsTheNearestSample) {
+  Bench bench(4 * kMillisecond);
+  bench.now.in_experiment = true;
+  bench.at(0);
+  EXPECT_EQ(count_of(bench.at(4 * kMillisecond), 0x6A1), 0U);
+  EXPECT_EQ(count_of(bench.at(8 * kMillisecond), 0x6A1), 1U);
+}
+
+TEST(Publisher, ASampleAtTheNextInstantButOneIsNotCaughtUpEither) {
+  Bench bench;
+  bench.now.in_experiment = true;
+  bench.at(0);
+  EXPECT_EQ(count_of(bench.at(20 * kMillisecond), 0x6A1), 1U);
+  EXPECT_EQ(count_of(bench.at(25 * kMillisecond), 0x6A1), 0U);
+}
+
+TEST(Publisher, WhileARequestStandsTheInactiveFramesAreNotTold) {
+  Bench bench;
+  bench.now.command = true;
+  for (MonoTime t = 0; t < kSecond; t += kFive) bench.at(t);
+  EXPECT_TRUE(bench.publisher.inactive_told());
+  bench.now.clamp = {true, 3000.0};
+  for (MonoTime t = kSecond; t < 2 * kSecond; t += kFive) {
+    bench.at(t);
+    ASSERT_FALSE(bench.publisher.inactive_told()) << t;
+  }
+}
+
+TEST(Publisher, TheEndTakesBackARequestThatStands) {
+  Bench bench;
+  bench.now.command = true;
+  bench.now.clamp = {true, 3000.0};
+  bench.at(0);
+  Outbox last;
+  bench.publisher.collect_all(kFive, bench.now, last);
+  EXPECT_EQ(count_of(last, 0x6A2), 5U);
+  const OwnFrames frames{FrameIdentifiers{}};
+  for (std::size_t i = 0; i < 5; ++i) {
+    const auto counter = static_cast<std::uint8_t>(last.frames[i].data[1] & 15);
+    EXPECT_EQ(last.frames[i].data, frames.pack(ClampValues{}, counter).data) << i;
+  }
+  // All are told: no more leave.
+  bench.now.clamp = {};
+  EXPECT_EQ(count_of(bench.at(kSecond), 0x6A2), 0U);
+}
+
 }  // namespace
 }  // namespace beltgrip::daemon
