@@ -228,7 +228,7 @@ Seeds {FIRST_SEED} to {FIRST_SEED + len(differ) - 1}; the scenario was chosen wi
 |---|---|---|---|---|---|---|---|---|---|---|
 {chr(10).join(result_rows(measured))}
 
-"Paper, as before": the reading of the last row below; without the operator its stop on `paper-rig` is later still, with him it mostly comes after he has let go. `robust` takes a top that rises by less than about 1e-3 per percent for level: on `paper-figures` it ends before the peak, low by what is still to come, and its interval mostly misses the peak (why: `estimator/ACCURACY.md`, Known limits).
+"Paper, as before": the reading of the last row below; without the operator its stop on `paper-rig` is later still, with him it mostly comes after he has let go. `robust` takes a top that rises by less than about 1e-3 per percent for level: on `paper-figures` it ends before the peak, low by what is still to come, which its interval allows for (why: `estimator/ACCURACY.md`, Known limits).
 
 The two belts of `paper-figures` differ by {spread(differ, "%.4f")} in mu_max, seed by seed (method `paper`); the paper tells them apart as 0.105 and 0.100.
 
