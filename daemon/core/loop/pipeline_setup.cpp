@@ -1,4 +1,6 @@
 // Construction of the pipeline: all its memory is taken here, at start-up.
+#include "daemon/core/loop/pipeline_setup.h"
+
 #include <cmath>
 
 #include "daemon/core/loop/pipeline_parts.h"
@@ -6,9 +8,6 @@
 
 namespace beltgrip::daemon {
 
-namespace {
-
-// Independent of what the experiment uses: wider than its own limits, and it keeps to them.
 SafetyLimits safety_limits(const Config& config) {
   SafetyLimits limits;
   limits.speed_min_rad_s = limits::kMonitorSpeedShare * config.experiment.primary_speed_min_rad_s;
@@ -21,9 +20,6 @@ SafetyLimits safety_limits(const Config& config) {
   return limits;
 }
 
-// What is only watched is read best in the middle of what is possible: a force that is off by a
-// constant bends the curve, and without any inertia the torque that slip takes from the belt cannot
-// be seen. A request is made in the transmission's own measure of force, which the defaults are.
 Config as_read(Config config) {
   if (config.control == Control::kCommand) return config;
   for (std::size_t i = 0; i < estimator::kConstantCount; ++i) {
@@ -32,8 +28,6 @@ Config as_read(Config config) {
   }
   return config;
 }
-
-}  // namespace
 
 Pipeline::Parts::Parts(const Config& given)
     : config(as_read(given)),

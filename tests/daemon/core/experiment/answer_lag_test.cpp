@@ -121,5 +121,63 @@ TEST(AnswerLag, NoiseMakesItLess) {
   EXPECT_GT(mean, 0.15);
 }
 
+// After three lags three samples are a line, two are none.
+TEST(AnswerLag, TakesThreeSamples) {
+  AnswerLag lag;
+  lag.begin(0, kConfigured_s);
+  double filtered = 0.0;
+  for (int k = 1; k <= 128; ++k) {  // 126 is at 0.63 s
+    EXPECT_EQ(lag.least_s(), 0.0) << k;
+    const double rate = k < 126 ? 0.0 : 1e5;
+    filtered += (1.0 - std::exp(-kSample_s / kConfigured_s)) * (rate - filtered);
+    lag.step(k * kSample, rate, 0.3 * filtered);
+  }
+  EXPECT_NEAR(lag.least_s(), 0.3, 1e-6);
+}
+
+// The least lag as a line of what lies behind over the rate gives it, by sums over all samples from
+// three lags on; its slope less two deviations, each reading of the force standing in four samples.
+TEST(AnswerLag, IsTheLowerEndOfALine) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> slow(380.0, 560.0), first_s(0.0, 5000.0);
+  int told = 0, silent = 0;
+  for (int i = 0; i < 200; ++i) {
+    const MonoTime begin = std::llround(first_s(random) * 1e9);
+    const double slow_N_per_s = slow(random);
+    AnswerLag lag;
+    lag.begin(begin, kConfigured_s);
+    double filtered = 0.0;
+    std::vector<double> rates, behind;
+    for (int k = 1; k <= 400; ++k) {
+      const double rate = k <= 260 ? 600.0 : slow_N_per_s;
+      const double lies_N = 0.3 * rate + 3.0 * normal(random);
+      lag.step(begin + k * kSample, rate, lies_N);
+      filtered += (1.0 - std::exp(-kSample_s / kConfigured_s)) * (rate - filtered);
+      if (k * 5 < 630) continue;  // milliseconds
+      rates.push_back(filtered);
+      behind.push_back(lies_N);
+    }
+    const auto n = static_cast<double>(rates.size());
+    double mean_rate = 0.0, mean_behind = 0.0, xx = 0.0, xy = 0.0, rest = 0.0;
+    for (const double each : rates) mean_rate += each / n;
+    for (const double each : behind) mean_behind += each / n;
+    for (std::size_t k = 0; k < rates.size(); ++k) {
+      xx += (rates[k] - mean_rate) * (rates[k] - mean_rate);
+      xy += (rates[k] - mean_rate) * (behind[k] - mean_behind);
+    }
+    for (std::size_t k = 0; k < rates.size(); ++k) {
+      const double off = behind[k] - mean_behind - xy / xx * (rates[k] - mean_rate);
+      rest += off * off;
+    }
+    const bool contrast = std::sqrt(xx / n) >= 60.0;  // N/s
+    const double wanted = xy / xx - 2.0 * std::sqrt(4.0 * rest / (n - 2.0) / xx);
+    EXPECT_NEAR(lag.least_s(), contrast ? wanted : 0.0, 1e-6) << slow_N_per_s;
+    ++(contrast ? told : silent);
+  }
+  EXPECT_GT(told, 30);
+  EXPECT_GT(silent, 30);
+}
+
 }  // namespace
 }  // namespace beltgrip::daemon
