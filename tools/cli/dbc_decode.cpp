@@ -20,6 +20,7 @@
 #include "tools/cli/failure.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/stop_signals.h"
+#include "tools/text/short_number.h"
 #include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
@@ -152,6 +153,10 @@ class Decoder {
       const bool wanted = signals.all() || by_name || by_place;
       if (!wanted) message.unwanted.push_back(message.wanted.size());
       message.wanted.push_back(wanted);
+      const bool is_float = message.codec.signal(message.decimals.size()).is_float();
+      message.decimals.push_back(
+          is_float ? text::kNoDecimals
+                   : std::max(text::decimals_of(signal.scale), text::decimals_of(signal.offset)));
     }
     return message;
   }

@@ -1,15 +1,18 @@
 #include "tools/cli/decoded_frame.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cinttypes>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <string_view>
 
 #include "can_dbc/text/printable.h"
 #include "tools/cli/failure.h"
 #include "tools/text/json_writer.h"
+#include "tools/text/short_number.h"
 
 namespace beltgrip::cli {
 
@@ -34,23 +37,42 @@ void append_readable(std::string& line, double value) {
   line.append(text.data(), end.ptr);
 }
 
+void append_value(std::string& line, double value, unsigned decimals) {
+  std::array<char, text::kNumberLongest> text;
+  line.append(text.data(), text::write_short(text.data(), value, decimals));
+}
+
 // Seconds with every digit that the log has, and no more zeros than needed.
 void append_seconds(std::string& line, std::int64_t t_ns) {
   constexpr std::uint64_t kSecond_ns = 1'000'000'000;
+  constexpr std::size_t kPlaces = 9;
   if (t_ns < 0) line += '-';
   const auto magnitude =
       t_ns < 0 ? ~static_cast<std::uint64_t>(t_ns) + 1 : static_cast<std::uint64_t>(t_ns);
   append_number(line, magnitude / kSecond_ns);
-  std::uint64_t fraction = magnitude % kSecond_ns;
-  line += '.';
-  for (std::uint64_t unit = kSecond_ns / 10; unit > 0; unit /= 10) {
-    line += static_cast<char>('0' + fraction / unit);
-    fraction %= unit;
-    if (fraction == 0) break;
+  auto fraction = static_cast<std::uint32_t>(magnitude % kSecond_ns);
+  std::array<char, kPlaces + 1> text;
+  text[0] = '.';
+  for (std::size_t i = kPlaces; i > 0; --i, fraction /= 10) {
+    text[i] = static_cast<char>('0' + fraction % 10);
   }
+  std::size_t length = text.size();
+  while (length > 2 && text[length - 1] == '0') --length;
+  line.append(text.data(), length);
 }
 
 std::string json_text(std::string_view text) { return text::JsonWriter().value(text).take(); }
+
+// Where the signal's value table has its value; nothing: nowhere, whatever the table.
+std::optional<std::int64_t> table_key(const DecodedFrame& frame, std::size_t signal) {
+  const can::SignalCodec& codec = frame.message.codec.signal(signal);
+  const std::uint64_t raw = frame.values[signal].raw;
+  if (!codec.is_float()) return static_cast<std::int64_t>(raw);
+  const double value = codec.value_of(raw);
+  constexpr double kExactWhole = 9007199254740992.0;  // 2^53
+  if (!(std::fabs(value) <= kExactWhole) || value != std::trunc(value)) return std::nullopt;
+  return static_cast<std::int64_t>(value);
+}
 
 class JsonFrames : public FrameWriter {
  public:
@@ -68,21 +90,13 @@ class JsonFrames : public FrameWriter {
     for_each_present(frame, texts, out, [&](std::size_t i) {
       const double value = frame.values[i].physical;
       if (std::isfinite(value)) {
-        append_number(out, value);
+        append_value(out, value, frame.message.decimals[i]);
       } else {
         out += "null";
       }
     });
     out += R"(},"labels":{)";
-    bool first = true;
-    frame.values.for_each_present([&](std::size_t i) {
-      const std::string* label = label_of(frame, i);
-      if (label == nullptr) return;
-      if (!first) out += ',';
-      first = false;
-      out += texts.keys[i];
-      out += json_text(*label);
-    });
+    append_labels(frame, texts, out);
     if (with_raw_) {
       out += R"(},"raw":{)";
       for_each_present(frame, texts, out, [&](std::size_t i) {
@@ -95,10 +109,19 @@ class JsonFrames : public FrameWriter {
   }
 
  private:
+  struct Label {
+    std::int64_t key = 0;
+    std::string member;  // "name":"text"
+  };
+  struct Labels {
+    std::size_t signal = 0;
+    std::vector<Label> of;  // by their keys
+  };
   // What never changes of a message.
   struct Texts {
     std::string head;               // ,"extended":false,"message":"X","signals":{
     std::vector<std::string> keys;  // "name": of each signal
+    std::vector<Labels> labels;     // of the signals that have any
   };
 
   const Texts& texts_of(const ChosenMessage& message) {
@@ -110,8 +133,29 @@ class JsonFrames : public FrameWriter {
                  R"(,"message":)" + json_text(definition.name) + R"(,"signals":{)";
     for (const can::SignalDef& signal : definition.signals) {
       texts.keys.push_back(json_text(signal.name) + ':');
+      if (signal.values.empty()) continue;
+      texts.labels.push_back({texts.keys.size() - 1, {}});
+      for (const auto& [key, text] : signal.values) {
+        texts.labels.back().of.push_back({key, texts.keys.back() + json_text(text)});
+      }
     }
     return texts;
+  }
+
+  static void append_labels(const DecodedFrame& frame, const Texts& texts, std::string& out) {
+    bool first = true;
+    for (const Labels& labels : texts.labels) {
+      if (!frame.values.has(labels.signal)) continue;
+      const std::optional<std::int64_t> key = table_key(frame, labels.signal);
+      if (!key) continue;
+      const auto found = std::lower_bound(
+          labels.of.begin(), labels.of.end(), *key,
+          [](const Label& label, std::int64_t wanted) { return label.key < wanted; });
+      if (found == labels.of.end() || found->key != *key) continue;
+      if (!first) out += ',';
+      first = false;
+      out += found->member;
+    }
   }
 
   template <typename Write>
@@ -210,7 +254,7 @@ class CsvFrames : public FrameWriter {
   void append(const DecodedFrame& frame, std::string& out) override {
     append_seconds(out, frame.record.t_ns);
     out += ',';
-    out += csv_cell(can::printable(std::string(frame.record.interface)));
+    append_interface(frame.record.interface, out);
     std::size_t column = 0;
     std::size_t next = frame.message.first_column;
     for (std::size_t i = 0; i < frame.message.wanted.size(); ++i) {
@@ -236,13 +280,23 @@ class CsvFrames : public FrameWriter {
     if (with_raw_) {
       out += frame.message.codec.signal(i).raw_text(frame.values[i].raw);
     } else {
-      append_number(out, plain(frame.values[i].physical));
+      append_value(out, plain(frame.values[i].physical), frame.message.decimals[i]);
     }
+  }
+
+  void append_interface(std::string_view interface, std::string& out) {
+    if (interface != interface_) {
+      interface_ = interface;
+      interface_cell_ = csv_cell(can::printable(interface_));
+    }
+    out += interface_cell_;
   }
 
   bool with_raw_;
   std::size_t columns_ = 0;
   std::string head_ = "t_s,iface";
+  std::string interface_;
+  std::string interface_cell_;
 };
 
 }  // namespace
@@ -250,16 +304,8 @@ class CsvFrames : public FrameWriter {
 const std::string* label_of(const DecodedFrame& frame, std::size_t signal) {
   const can::ValueTable& table = frame.message.definition->signals[signal].values;
   if (!frame.values.has(signal) || table.empty()) return nullptr;
-  const can::DecodedSignal& decoded = frame.values[signal];
-  auto key = static_cast<std::int64_t>(decoded.raw);
-  const can::SignalCodec& codec = frame.message.codec.signal(signal);
-  if (codec.is_float()) {
-    const double value = codec.value_of(decoded.raw);
-    constexpr double kExactWhole = 9007199254740992.0;  // 2^53
-    if (!(std::fabs(value) <= kExactWhole) || value != std::trunc(value)) return nullptr;
-    key = static_cast<std::int64_t>(value);
-  }
-  const auto found = table.find(key);
+  const std::optional<std::int64_t> key = table_key(frame, signal);
+  const auto found = key ? table.find(*key) : table.end();
   return found == table.end() ? nullptr : &found->second;
 }
 

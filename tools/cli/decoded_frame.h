@@ -18,6 +18,7 @@ struct ChosenMessage {
   can::MessageCodec codec;
   std::vector<bool> wanted;           // beside the definition's signals
   std::vector<std::size_t> unwanted;  // the others
+  std::vector<unsigned> decimals;     // of each signal's values, as text::decimals_of() has it
   std::size_t number = 0;             // among all messages of all DBC files
   std::size_t first_column = 0;       // in CSV: of its first wanted signal
   bool names_repeat = false;          // among its signals

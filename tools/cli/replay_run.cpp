@@ -10,6 +10,7 @@
 #include "daemon/core/loop/loop.h"
 #include "daemon/core/publish/names.h"
 #include "daemon/core/publish/own_frames.h"
+#include "daemon/io/reloader.h"
 #include "estimator/method/possible_friction.h"
 #include "tools/cli/failure.h"
 #include "tools/cli/table_hint.h"
@@ -188,7 +189,8 @@ std::string reason_text(estimator::StopReason reason) {
 std::unique_ptr<ports::LogTimeline> open_timeline(const std::vector<std::string>& paths,
                                                   const std::string& interface,
                                                   const daemon::FrameIdentifiers& own,
-                                                  const std::string& further_interface) {
+                                                  const std::string& further_interface,
+                                                  std::vector<daemon::WantedFrames> wanted) {
   std::vector<std::unique_ptr<can::LogReader>> readers;
   for (const std::string& path : paths) {
     try {
@@ -200,6 +202,7 @@ std::unique_ptr<ports::LogTimeline> open_timeline(const std::vector<std::string>
   ports::FrameSelection selection;
   selection.interface = interface;
   selection.further_interface = further_interface;
+  selection.wanted = std::move(wanted);
   for (std::size_t i = 0; i < daemon::kOwnMessageCount; ++i) {
     selection.ignored.push_back(
         {daemon::own_identifier(own, static_cast<daemon::OwnMessage>(i)), false});
@@ -325,7 +328,8 @@ ReplayResult replay(const std::vector<std::string>& paths, const std::string& in
     }
     return result;
   }
-  const auto timeline = open_timeline(paths, interface, config.identifiers, further);
+  const auto timeline =
+      open_timeline(paths, interface, config.identifiers, further, daemon::wanted_frames(config));
   ports::ReplayPort port(*timeline, std::move(receiver));
   const can::LogStats head = timeline->stats();
   if (head.frames == 0 || port.empty()) throw no_frames(result, head, interface);

@@ -44,11 +44,13 @@ struct ReplayOutputs {
 };
 
 // The logs as one timeline without BeltGrip's own frames; those of an interface named as the
-// further bus's are of that bus, all others of the first. Throws Failure 66.
+// further bus's are of that bus, all others of the first. wanted: FrameSelection. Throws
+// Failure 66.
 std::unique_ptr<ports::LogTimeline> open_timeline(const std::vector<std::string>& paths,
                                                   const std::string& interface,
                                                   const daemon::FrameIdentifiers& own,
-                                                  const std::string& further_interface = "");
+                                                  const std::string& further_interface = "",
+                                                  std::vector<daemon::WantedFrames> wanted = {});
 // Empty where the configuration has one bus.
 std::string further_interface(const daemon::Config& config);
 

@@ -13,33 +13,53 @@ constexpr std::int64_t kDisorder_ns = kSecond_ns;
 constexpr std::int64_t kSilence_ns = 600 * kSecond_ns;
 }  // namespace
 
-// One log, one frame ahead of what is taken.
+// One log, one frame ahead of what is taken. The two frames change places; none is copied before it
+// is known to be wanted.
 class LogTimeline::Source {
  public:
   Source(std::unique_ptr<can::LogReader> log, const FrameSelection& selection,
-         TimelineCounters& counters)
-      : log_(std::move(log)), selection_(selection), counters_(counters) {
-    has_second_ = read(second_);
+         const WantedSet& wanted, TimelineCounters& counters)
+      : log_(std::move(log)), selection_(selection), wanted_(wanted), counters_(counters) {
+    read(*second_);
     advance();
   }
 
-  const can::StampedFrame* front() const { return has_first_ ? &first_ : nullptr; }
+  bool has_front() const { return first_->there; }
+  std::int64_t front_ns() const { return last_ns_; }
+  void take_front(can::StampedFrame& frame) {
+    frame.t_ns = last_ns_;
+    frame.frame = first_->record.frame;
+    frame.bus = first_->bus;
+    advance();
+  }
   const can::LogStats& stats() const { return log_->stats(); }
 
+ private:
+  struct Ahead {
+    can::LogRecord record;
+    std::uint8_t bus = 0;
+    bool wanted = false;
+    bool there = false;
+  };
+
+  // To the next frame that is wanted, or to the last.
   void advance() {
+    bool is_first = !has_before_;
+    while (step() && !first_->wanted && !is_first && second_->there) ++counters_.frames;
+  }
+
+  // False at the end.
+  bool step() {
     for (;;) {
-      has_first_ = has_second_;
-      if (!has_first_) return;
-      first_ = second_;
-      has_second_ = read(second_);
-      const bool leaps = has_before_ && first_.t_ns - before_ns_ > kDisorder_ns;
-      if (leaps && has_second_ && second_.t_ns < first_.t_ns - kDisorder_ns) {
-        ++counters_.frames_bad;
-        continue;
-      }
-      break;
+      std::swap(first_, second_);
+      if (!first_->there) return false;
+      read(*second_);
+      const std::int64_t t_ns = first_->record.t_ns;
+      const bool leaps = has_before_ && t_ns - before_ns_ > kDisorder_ns;
+      if (!leaps || !second_->there || second_->record.t_ns >= t_ns - kDisorder_ns) break;
+      ++counters_.frames_bad;
     }
-    const std::int64_t log_ns = first_.t_ns;
+    const std::int64_t log_ns = first_->record.t_ns;
     if (has_before_) {
       const std::int64_t gap_ns = log_ns - before_ns_;
       if (gap_ns < -kDisorder_ns || gap_ns > kSilence_ns) {
@@ -50,32 +70,33 @@ class LogTimeline::Source {
     before_ns_ = log_ns;
     last_ns_ = has_before_ ? std::max(last_ns_, log_ns + shift_ns_) : log_ns;
     has_before_ = true;
-    first_.t_ns = last_ns_;
+    return true;
   }
 
- private:
-  bool read(can::StampedFrame& frame) {
-    can::LogRecord record;
-    while (log_->next(record)) {
+  void read(Ahead& ahead) {
+    const can::LogRecord& record = ahead.record;
+    while ((ahead.there = log_->next(ahead.record))) {
       if (!selection_.interface.empty() && record.interface != selection_.interface) continue;
       if (std::find(selection_.ignored.begin(), selection_.ignored.end(), record.frame.id) !=
           selection_.ignored.end()) {
         continue;
       }
-      frame.t_ns = record.t_ns;
-      frame.frame = record.frame;
-      frame.bus =
+      const bool further =
           !selection_.further_interface.empty() && record.interface == selection_.further_interface;
-      return true;
+      ahead.bus = further ? 1 : 0;
+      ahead.wanted = wanted_.has(record.frame, ahead.bus);
+      return;
     }
-    return false;
   }
 
   std::unique_ptr<can::LogReader> log_;
   const FrameSelection& selection_;
+  const WantedSet& wanted_;
   TimelineCounters& counters_;
-  can::StampedFrame first_, second_;
-  bool has_first_ = false, has_second_ = false, has_before_ = false;
+  Ahead one_, other_;
+  Ahead* first_ = &one_;
+  Ahead* second_ = &other_;
+  bool has_before_ = false;
   std::int64_t before_ns_ = 0;  // stamp in the log of the frame before
   std::int64_t last_ns_ = 0;    // stamp on the timeline of the frame before
   std::int64_t shift_ns_ = 0;
@@ -83,9 +104,9 @@ class LogTimeline::Source {
 
 LogTimeline::LogTimeline(std::vector<std::unique_ptr<can::LogReader>> logs,
                          FrameSelection selection)
-    : selection_(std::move(selection)) {
+    : selection_(std::move(selection)), wanted_(selection_.wanted) {
   for (auto& log : logs) {
-    sources_.push_back(std::make_unique<Source>(std::move(log), selection_, counters_));
+    sources_.push_back(std::make_unique<Source>(std::move(log), selection_, wanted_, counters_));
   }
 }
 
@@ -94,15 +115,13 @@ LogTimeline::~LogTimeline() = default;
 bool LogTimeline::next(can::StampedFrame& frame) {
   Source* earliest = nullptr;
   for (const auto& source : sources_) {
-    const can::StampedFrame* front = source->front();
-    if (front != nullptr && (earliest == nullptr || front->t_ns < earliest->front()->t_ns)) {
-      earliest = source.get();
-    }
+    if (!source->has_front()) continue;
+    if (earliest == nullptr || source->front_ns() < earliest->front_ns()) earliest = source.get();
   }
   if (earliest == nullptr) return false;
-  frame = *earliest->front();
-  earliest->advance();
-  if (counters_.frames == 0) counters_.first_ns = frame.t_ns;
+  earliest->take_front(frame);
+  if (!has_begun_) counters_.first_ns = frame.t_ns;
+  has_begun_ = true;
   counters_.last_ns = frame.t_ns;
   ++counters_.frames;
   return true;

@@ -11,14 +11,15 @@
 
 #include "can_dbc/frame/can_frame.h"
 #include "can_dbc/log/can_log.h"
+#include "tools/ports/wanted_set.h"
 
 namespace beltgrip::ports {
 
 struct TimelineCounters {
-  std::uint64_t frames = 0;       // delivered
+  std::uint64_t frames = 0;       // delivered, or not wanted
   std::uint64_t frames_bad = 0;   // dropped because of their stamp
   std::uint64_t clock_steps = 0;  // steps of a log's clock that were taken out
-  std::int64_t first_ns = 0;      // stamp of the first frame delivered
+  std::int64_t first_ns = 0;      // stamp of the first of them
   std::int64_t last_ns = 0;       // and of the last
 };
 
@@ -26,6 +27,9 @@ struct FrameSelection {
   std::string interface;            // empty: all
   std::string further_interface;    // its frames are of bus 1, all others of bus 0; empty: none
   std::vector<can::CanId> ignored;  // BeltGrip's own frames are no input
+  // Of the others those alone, the errors of a controller, and for the time that it spans each
+  // log's first frame and last. Empty: all.
+  std::vector<daemon::WantedFrames> wanted;
 };
 
 class LogTimeline {
@@ -41,8 +45,10 @@ class LogTimeline {
  private:
   class Source;
   FrameSelection selection_;
+  WantedSet wanted_;
   std::vector<std::unique_ptr<Source>> sources_;
   TimelineCounters counters_;
+  bool has_begun_ = false;
 };
 
 }  // namespace beltgrip::ports

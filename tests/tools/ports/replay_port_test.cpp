@@ -79,6 +79,59 @@ TEST(LogTimeline, SelectsByInterfaceAndIdentifier) {
   EXPECT_EQ(stamps(log), (Stamps{2, 5}));
 }
 
+TEST(LogTimeline, OfFramesThatAreNotWantedOnlyTheFirstAndTheLastAreHandedOver) {
+  FrameSelection selection;
+  selection.wanted = {{{0x100, false}, false}};
+  LogTimeline log =
+      timeline({{{1, 1}, {2, 0x100}, {3, 2}, {4, 2}, {5, 0x100}, {6, 3}, {7, 4}}}, selection);
+  std::vector<std::uint32_t> ids;
+  can::StampedFrame frame;
+  while (log.next(frame)) ids.push_back(frame.frame.id.value);
+  EXPECT_EQ(ids, (std::vector<std::uint32_t>{1, 0x100, 0x100, 4}));
+  EXPECT_EQ(log.counters().frames, 7U);
+  EXPECT_EQ(log.counters().first_ns, 1);
+  EXPECT_EQ(log.counters().last_ns, 7);
+}
+
+// What is not wanted has a stamp as well, and keeps the order and the clock of the rest.
+TEST(LogTimeline, FramesThatAreNotWantedKeepTheTime) {
+  FrameSelection selection;
+  selection.wanted = {{{0x100, false}, false}};
+  LogTimeline log = timeline({{{1 * kS, 1},
+                               {2 * kS, 0x100},
+                               {900000000 * kS, 2},
+                               {3 * kS, 2},
+                               {2 * kS + 999 * kMs, 0x100},
+                               {800000000 * kS, 2},
+                               {800000001 * kS, 0x100}}},
+                             selection);
+  EXPECT_EQ(stamps(log), (Stamps{1 * kS, 2 * kS, 3 * kS, 603 * kS + 999 * kMs}));
+  EXPECT_EQ(log.counters().frames_bad, 1U);
+  EXPECT_EQ(log.counters().clock_steps, 1U);
+}
+
+TEST(WantedSet, GoesByIdentifierGroupAndBus) {
+  const daemon::WantedFrames wanted[] = {
+      {{0x100, false}, false}, {{0x200, false}, false, 1}, {{0x0CF00400, true}, true}};
+  const WantedSet set(wanted);
+  const auto has = [&](std::uint32_t id, bool extended, std::uint8_t bus, bool error = false) {
+    can::CanFrame frame;
+    frame.id = {id, extended};
+    frame.error = error;
+    return set.has(frame, bus);
+  };
+  EXPECT_TRUE(has(0x100, false, 0));
+  EXPECT_FALSE(has(0x100, false, 1));
+  EXPECT_FALSE(has(0x100, true, 0));
+  EXPECT_TRUE(has(0x200, false, 1));
+  EXPECT_FALSE(has(0x200, false, 0));
+  EXPECT_TRUE(has(0x0CF004FE, true, 0));  // another source address of the group
+  EXPECT_FALSE(has(0x0CF005FE, true, 0));
+  EXPECT_FALSE(has(0x0CF004FE, true, 1));
+  EXPECT_TRUE(has(0x4, false, 1, true));
+  EXPECT_TRUE(WantedSet({}).has({}, 0));
+}
+
 TEST(LogTimeline, ALittleDisorderIsHeldBack) {
   LogTimeline log = timeline({{{10}, {30}, {20}, {40}}});
   EXPECT_EQ(stamps(log), (Stamps{10, 30, 30, 40}));

@@ -1,0 +1,95 @@
+// Fixed work, for callgrind (tests/work): each kind is done once unmeasured, then counted, and
+// callgrind dumps its cost under its name. Prints "NAME TIMES": how often the work's unit was done.
+#include <valgrind/callgrind.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "can_dbc/dbc/message_codec.h"
+#include "can_dbc/dbc/parser.h"
+#include "can_dbc/log/can_log.h"
+#include "tests/pairs/made_inputs.h"
+#include "tools/ports/log_timeline.h"
+#include "tools/text/short_number.h"
+
+namespace beltgrip::test {
+
+namespace {
+
+constexpr int kFrames = 10'000;
+
+void count(const char* name, long times, const std::function<void()>& work) {
+  work();
+  CALLGRIND_START_INSTRUMENTATION;
+  CALLGRIND_ZERO_STATS;
+  work();
+  CALLGRIND_DUMP_STATS_AT(name);
+  CALLGRIND_STOP_INSTRUMENTATION;
+  std::printf("%s %ld\n", name, times);
+}
+
+void decode(const char* name, unsigned id, unsigned selectors) {
+  const can::DbcParseResult file = can::parse_dbc(plain_dbc());
+  const can::MessageCodec codec(*file.database.find_message(can::CanId{id, false}));
+  can::DecodedMessage values(codec.signal_count());
+  std::mt19937_64 random(1);
+  std::vector<std::array<std::uint8_t, 8>> payloads(kFrames);
+  for (auto& payload : payloads) {
+    for (std::uint8_t& byte : payload) byte = static_cast<std::uint8_t>(random());
+    payload[0] = static_cast<std::uint8_t>(payload[0] % selectors);
+  }
+  count(name, kFrames, [&] {
+    for (const auto& payload : payloads) codec.decode(payload, values);
+  });
+}
+
+void read(const std::string& path) {
+  can::LogRecord record;
+  const auto log = can::LogReader::open(path);
+  while (log->next(record)) {
+  }
+}
+
+// One frame in five is wanted, as in a replay of a bus with other traffic.
+void follow(const std::string& path, bool one_in_five) {
+  ports::FrameSelection selection;
+  selection.wanted = {{{one_in_five ? 0x100U : 0x7FFU, false}, false}};
+  std::vector<std::unique_ptr<can::LogReader>> logs;
+  logs.push_back(can::LogReader::open(path));
+  ports::LogTimeline timeline(std::move(logs), std::move(selection));
+  can::StampedFrame frame;
+  while (timeline.next(frame)) {
+  }
+}
+
+void write_numbers() {
+  std::array<char, text::kNumberLongest> text;
+  for (int i = 0; i < kFrames; ++i) text::write_short(text.data(), i * 0.25 - 40.0, 2);
+}
+
+int run() {
+  constexpr unsigned kSelectors = 16;
+  decode("plain_frame", kPlainId, 256);
+  decode("multiplexed_frame", kCasesId, kSelectors);
+  const std::string dbc = made_dbc(100);
+  count("dbc_byte", static_cast<long>(dbc.size()), [&] { can::parse_dbc(dbc); });
+  const Folder folder;
+  const std::string log = folder.path("fixed.log");
+  write_log(log, kFrames, 0x100, 5);
+  count("log_line", kFrames, [&] { read(log); });
+  count("replay_one_in_five", kFrames, [&] { follow(log, true); });
+  count("replay_foreign", kFrames, [&] { follow(log, false); });
+  count("number_text", kFrames, write_numbers);
+  return 0;
+}
+
+}  // namespace
+
+}  // namespace beltgrip::test
+
+int main() { return beltgrip::test::run(); }
