@@ -19,6 +19,12 @@ TEST(RampRate, ThePeakIsFarWhileFrictionIsLowAndSlipIsSlow) {
   EXPECT_FALSE(peak_is_far(kLaw, 0.05, 0.0063));  // a quarter of 0.025 is 0.00625
 }
 
+TEST(RampRate, AtTheBorderThePeakIsNear) {
+  EXPECT_FALSE(peak_is_far(kLaw, kLaw.mu_far, 0.0));
+  EXPECT_FALSE(peak_is_far(kLaw, 0.05, 0.25 * 0.025));
+  EXPECT_DOUBLE_EQ(ramp_near_N_per_s(kLaw, kLaw.mu_top, 0.0), 200.0);
+}
+
 TEST(RampRate, FallsByTheTopsRateWhileTheBeltHardlySlips) {
   EXPECT_DOUBLE_EQ(ramp_near_N_per_s(kLaw, 0.1, 0.0), 200.0);
   EXPECT_DOUBLE_EQ(ramp_near_N_per_s(kLaw, 0.1, -0.02), 200.0);  // noise of a slip rate

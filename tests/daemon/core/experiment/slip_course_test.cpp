@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
+#include <vector>
 
 namespace beltgrip::daemon {
 namespace {
@@ -139,6 +141,71 @@ TEST(SlipCourse, KnowsHowMuchOfItsRateIsNoise) {
     EXPECT_NEAR(off_mean, 0.0, 3.0 * truth_1_s / std::sqrt(kSeeds)) << sample;
     EXPECT_GT(two, kSeeds * 85 / 100) << sample;  // 95 %, were the deviation known and not measured
     EXPECT_EQ(stop, 0U) << sample;                // what a request takes for no noise
+  }
+}
+
+// Slip, rate and deviation from all samples of a request, written anew.
+struct ByHand {
+  void step(MonoTime t, double slip) {
+    samples.push_back({t, slip});
+    double recent = 0.0, recent_n = 0.0, mean_s = 0.0, mean = 0.0, n = 0.0;
+    const auto in_window = [&](const auto& use) {
+      for (const auto& [at, value] : samples) {
+        if (t - at <= 60 * kMillisecond) use(-seconds(t - at), value);
+      }
+    };
+    for (const auto& [at, value] : samples) {
+      if (t - at <= 15 * kMillisecond) recent += value, recent_n += 1.0;
+    }
+    mean_slip = recent / recent_n;
+    double oldest_s = 0.0;
+    in_window([&](double at_s, double value) {
+      mean_s += at_s, mean += value, n += 1.0;
+      oldest_s = std::min(oldest_s, at_s);
+    });
+    double tt = 0.0, tx = 0.0;
+    in_window([&](double at_s, double value) {
+      tt += (at_s - mean_s / n) * (at_s - mean_s / n);
+      tx += (at_s - mean_s / n) * (value - mean / n);
+    });
+    rate = -oldest_s > 0.0485 ? tx / tt : 0.0;
+    // The newest of the samples older than the window has the rate before.
+    const auto before = static_cast<std::size_t>(n) + 1;
+    if (rate != 0.0 && samples.size() >= before && rates.size() + 1 >= before) {
+      const double last = rates[samples.size() - before];
+      if (last != 0.0) {
+        ++changes;
+        const double count = std::min(changes, 100.0);
+        square += ((rate - last) * (rate - last) - square) / count;
+      }
+    }
+    rates.push_back(rate);
+  }
+  double deviation() const { return changes < 20.0 ? kUnknown : std::sqrt(0.5 * square); }
+  std::vector<std::pair<MonoTime, double>> samples;
+  std::vector<double> rates;
+  double mean_slip = 0.0, rate = 0.0, square = 0.0, changes = 0.0;
+};
+
+TEST(SlipCourse, IsWhatSumsOverAllSamplesOfTheRequestSay) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  SlipCourse course;  // one request after the other, at instants that begin anew
+  for (const Duration sample : {5 * kMillisecond, kMillisecond, 7 * kMillisecond}) {
+    course.begin(kRatio, kOverrun_Nm);
+    ByHand hand;
+    for (int i = 0; i < 400; ++i) {
+      const double slip = 0.02 + 1e-4 * i + (i < 250 ? 1e-4 : 1e-3) * normal(random);
+      course.step(i * sample, kRatio * (1.0 + slip));
+      hand.step(i * sample, slip);
+      ASSERT_NEAR(course.slip(), hand.mean_slip, 1e-12) << sample << ' ' << i;
+      ASSERT_NEAR(course.rate_1_s(), hand.rate, 1e-9) << sample << ' ' << i;
+      if (hand.deviation() == kUnknown) {
+        ASSERT_EQ(course.rate_deviation_1_s(), kUnknown) << sample << ' ' << i;
+      } else {
+        ASSERT_NEAR(course.rate_deviation_1_s(), hand.deviation(), 1e-9) << sample << ' ' << i;
+      }
+    }
   }
 }
 

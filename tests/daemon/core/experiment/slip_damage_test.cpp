@@ -125,6 +125,23 @@ TEST_F(Damage, TheBestIsSeenSomewhatLate) {
   EXPECT_LT(damage_.energy_J(), since_J + 2.7);
 }
 
+// Two lags of 35 ms, a seventh of the way each sample: of a step three samples show 10 %, four 15.2.
+TEST_F(Damage, AStepByAPercentIsARiseAfterFourSamples) {
+  run(0.2);
+  EXPECT_TRUE(damage_.beyond());
+  now_.mu_star = 1.01 * kMu;
+  run(0.015);
+  EXPECT_TRUE(damage_.beyond());
+  run(0.005);
+  EXPECT_FALSE(damage_.beyond());
+}
+
+TEST_F(Damage, JustAsFastAsTheLimitIsNotFast) {
+  now_.slip_speed_m_s = 0.4;
+  run(0.5);
+  EXPECT_EQ(damage_.fast_s(), 0.0);
+}
+
 TEST_F(Damage, BeginsAnew) {
   run(1.0);
   damage_.begin(now_.t, 0.08);
