@@ -125,7 +125,8 @@ TEST_F(Damage, TheBestIsSeenSomewhatLate) {
   EXPECT_LT(damage_.energy_J(), since_J + 2.7);
 }
 
-// Two lags of 35 ms, a seventh of the way each sample: of a step three samples show 10 %, four 15.2.
+// Two lags of 35 ms, a seventh of the way each sample: of a step three samples show 10 %,
+// four 15.2.
 TEST_F(Damage, AStepByAPercentIsARiseAfterFourSamples) {
   run(0.2);
   EXPECT_TRUE(damage_.beyond());
