@@ -135,7 +135,8 @@ void run(const Options& options) {
   if (isatty(STDERR_FILENO) != 0) request.progress = show_progress;
   diagnose::Answer answer = diagnose::diagnose(std::move(request));
   if (!answer.impossible.empty()) throw Failure{kBadInput, answer.impossible};
-  if (answer.diagnosis.complete && !answer.diagnosis.findings.empty()) {
+  const bool has_found = !answer.diagnosis.findings.empty() || !answer.diagnosis.learned.empty();
+  if (answer.diagnosis.complete && has_found) {
     std::vector<std::string> all = options.logs;
     all.insert(all.end(), options.held_out.begin(), options.held_out.end());
     answer.diagnosis.reruns = rerun(all, options.model.empty() ? config : told(config, before),

@@ -336,16 +336,44 @@ bool all_pass(const json& remaining) {
   });
 }
 
-TEST_F(Diagnose, FrictionThatDipsAboutOneSpeedIsNeverNothingWrong) {
-  const json result = of(record(rig(12, {{"x_friction_speed_bump", {{"size", -0.08}}, ""}})).csv);
-  EXPECT_EQ(result.at("verdict"), "unexplained") << result.at("headline");
-  const json& left = result.at("unexplained");
-  EXPECT_EQ(left.at("acts_on"), "friction");
-  EXPECT_EQ(left.at("depends_on"), json::array({"primary_speed"}));
-  EXPECT_EQ(left.at("kind"), "function");
-  EXPECT_TRUE(left.at("frequency_Hz").is_null());
-  EXPECT_FALSE(all_pass(result.at("remaining")));
+double value_at(const json& function, double x) {
+  for (std::size_t i = 1; i < function.size(); ++i) {
+    const double begins = function[i - 1][0], ends = function[i][0];
+    if (x > ends) continue;
+    const double before = function[i - 1][1], behind = function[i][1];
+    return before + (behind - before) * (x - begins) / (ends - begins);
+  }
+  return function.back()[1];
+}
+
+TEST_F(Diagnose, FrictionThatDipsAboutOneSpeedIsLearned) {
+  blind::Trial trial = rig(12, {{"x_friction_speed_bump", {{"size", -0.08}}, ""}});
+  // On both sides of it and in it.
+  for (std::size_t i = 0; i < trial.plan.size(); ++i) {
+    trial.plan[i].speed_rad_s = 85.0 + 14.0 * static_cast<double>(i);
+  }
+  auto logs = write(record(trial).csv);
+  const auto tables = logs;
+  logs.insert(logs.end(), {"--model-out", place_.path("model.toml")});
+  const json result = answer(logs);
+  EXPECT_EQ(result.at("verdict"), "explained") << result.at("headline");
+  EXPECT_TRUE(all_pass(result.at("remaining"))) << result.at("remaining");
+  ASSERT_EQ(result.at("learned").size(), 1U);
+  const json& learned = result.at("learned")[0];
+  EXPECT_EQ(learned.at("acts_on"), "friction");
+  EXPECT_EQ(learned.at("depends_on"), json::array({"primary_speed"}));
+  EXPECT_GE(learned.at("levels"), 5);
+  EXPECT_TRUE(learned.at("box").contains("primary_speed"));
   EXPECT_NE(result.at("headline").get<std::string>().find("primary_speed"), std::string::npos);
+  // The generator's dip: -0.08 exp(-((omega - 150) / 25)^2).
+  const json& function = learned.at("function");
+  EXPECT_NEAR(value_at(function, 150.0) - value_at(function, 105.0), -0.077, 0.02);
+  // With it in the model there is nothing left to say.
+  auto again = tables;
+  again.insert(again.end(), {"--model", place_.path("model.toml")});
+  const json known = answer(again);
+  EXPECT_EQ(known.at("verdict"), "nothing_wrong") << known.at("headline");
+  EXPECT_TRUE(known.at("learned").empty());
 }
 
 TEST_F(Diagnose, FrictionThatDiffersBetweenExperimentsIsSaidToFollowNothing) {

@@ -38,7 +38,8 @@ Campaign campaign_of(const SignalTable& table) {
 
 ModelState nominal_state(const Campaign& campaign) {
   ModelState state{Eigen::VectorXd(kNuisanceCount),
-                   Eigen::VectorXd::Zero(static_cast<Eigen::Index>(campaign.slots.size()))};
+                   Eigen::VectorXd::Zero(static_cast<Eigen::Index>(campaign.slots.size())),
+                   {}};
   for (int i = 0; i < kNuisanceCount; ++i) {
     state.nuisance[i] = campaign.nuisances[static_cast<std::size_t>(i)].nominal;
   }

@@ -33,6 +33,46 @@ TEST(ModelFile, ReadsBackWhatItWrites) {
   EXPECT_EQ(read.effects.at("channel_skew").role, "secondary_speed");
 }
 
+TEST(ModelFile, WhatWasLearnedReadsBack) {
+  ModelFile model = nominal_model({});
+  daemon::ModelLearned& learned = model.learned["friction_over_oil_temperature"];
+  learned.acts_on = "friction";
+  learned.depends_on = {"oil_temperature"};
+  learned.knots = {40.0, 60.0, 100.0};
+  learned.values = {0.0, -0.02, 1e-3};
+  learned.covariance = {4e-6, 1e-6, 0.0, 1e-6, 4e-6, 1e-6, 0.0, 1e-6, 4e-6};
+  learned.box["oil_temperature"] = {40.0, 100.0};
+  learned.law = "kink at 60 degC";
+  const ModelFile read = parse_model(model_text(model), "m.toml", nominal_model({}));
+  EXPECT_EQ(model_text(read), model_text(model));
+  const std::vector<estimator::LearnedTerm> terms = daemon::learned_terms(read);
+  ASSERT_EQ(terms.size(), 1U);
+  EXPECT_EQ(terms[0].point, estimator::LearnedPoint::kFriction);
+  EXPECT_EQ(terms[0].variable, estimator::LearnedVariable::kOilTemperature);
+  EXPECT_DOUBLE_EQ(terms[0].at(50.0), -0.01);
+  EXPECT_DOUBLE_EQ(terms[0].at(0.0), 0.0);
+}
+
+TEST(ModelFile, WhatIsWrongWithALearnedTermIsNamed) {
+  const std::string good = "[learned.a]\nacts_on = \"torque\"\ndepends_on = [\"primary_speed\"]\n";
+  EXPECT_EQ(error_of(good + "knots = [1, 2]\nvalues = [0, 1.5]\n"), "no error");
+  EXPECT_EQ(error_of("[learned.a]\nacts_on = \"oil\"\n"),
+            "m.toml:2: learned.a.acts_on: found \"oil\", expected one of torque, torque_gain, "
+            "clamp_force, ratio or friction");
+  EXPECT_EQ(error_of(good + "knots = [2, 1]\nvalues = [0, 1]\n"),
+            "m.toml:4: learned.a.knots: found 2 numbers, expected 2 to 64 numbers, each above the "
+            "last");
+  EXPECT_EQ(error_of(good + "knots = [1, 2]\nvalues = [0]\n"),
+            "m.toml:5: learned.a.values: found 1 numbers, expected 2, one for each knot");
+  EXPECT_EQ(error_of(good + "knots = [1, 2]\nvalues = [0, 1]\ncovariance = [[1, 2]]\n"),
+            "m.toml:6: learned.a.covariance: found 2 numbers, expected 2 rows of 2");
+  EXPECT_EQ(error_of(good + "knots = [1, 2]\nvalues = [0, 1]\nbox = { primary_speed = [2, 1] }\n"),
+            "m.toml:6: learned.a.box.primary_speed: found an array, expected [lowest, highest]");
+  EXPECT_EQ(error_of(good + "knot = [1, 2]\n"),
+            "m.toml:4: learned.a.knot: found an unknown key, expected acts_on, depends_on, knots, "
+            "values, covariance, box or law; nearest is \"knots\"");
+}
+
 TEST(ModelFile, NominalMachineSurvivesTheWayThroughTheFile) {
   const NuisanceTable direct = default_nuisances();
   const NuisanceTable through = nuisances_of(nominal_model({}));

@@ -2,6 +2,7 @@
 // made.
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -42,6 +43,23 @@ struct Unexplained {
   double share = 0.0;
   MisfitKind kind = MisfitKind::kFunction;
   std::optional<double> frequency_Hz = std::nullopt;  // of a line
+};
+
+// A cause without a name, as learned: a function of one recorded variable.
+struct LearnedFinding {
+  std::string name;  // in the model file
+  std::string acts_on;
+  std::vector<std::string> depends_on;  // roles
+  std::string law;                      // in words; empty: none stands alone
+  std::vector<std::string> laws;        // that these data cannot tell apart
+  std::vector<std::string> aliases;     // "acts_on over role", that these data cannot tell from it
+  int levels = 0;                       // of the variable
+  std::map<std::string, BeforeAfter> gain;  // on experiments that were left out of the fit
+  // The same, of the metric named, with all experiments at its level of the variable left out.
+  std::string metric;
+  std::optional<BeforeAfter> at_left_out_values;
+  std::map<std::string, std::array<double, 2>> box;  // by role
+  std::vector<double> knots, values, covariance;     // of the values, row by row
 };
 
 // An experiment to do: in words, and as a scenario that the simulation runs.
@@ -98,6 +116,7 @@ struct Diagnosis {
   std::map<std::string, Left> left;
   std::map<std::string, SimulatedSignal> simulation;
   std::vector<Finding> findings;
+  std::vector<LearnedFinding> learned;
   std::optional<Unexplained> unexplained;
   std::vector<NotIdentifiable> not_identifiable;
   std::map<std::string, BeforeAfter> held_out;

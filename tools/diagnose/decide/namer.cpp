@@ -268,6 +268,7 @@ void drop(Engine& engine, const Naming& naming, int slot) {
   std::vector<int> fewer = engine.accepted();
   std::erase(fewer, slot);
   ModelState start = naming.nominal.state;
+  start.learned = engine.state().learned;
   for (const int kept : fewer) start.effects[kept] = engine.state().effects[kept];
   const Hypothesis from_here = engine.refine(fewer);
   const Hypothesis from_nominal = engine.refine_from(start, fewer);
@@ -354,6 +355,19 @@ void drop_unconfirmed(Engine& engine, Naming& naming) {
 
 double worth_beside(double first_gain) {
   return std::min(kShareOfFirst * first_gain, kOwnGain + kOwnShare * first_gain);
+}
+
+// Members that the others, or what was learned, have made superfluous.
+void drop_superfluous(Engine& engine, double threshold) {
+  for (;;) {
+    const Hypothesis whole = engine.refine(engine.accepted(), 3);
+    const auto least = std::min_element(whole.chi2.begin(), whole.chi2.end());
+    if (least == whole.chi2.end() || *least > threshold) return;
+    std::vector<int> fewer = whole.slots;
+    fewer.erase(fewer.begin() + (least - whole.chi2.begin()));
+    engine.accept(engine.refine(fewer));
+    engine.update_noise();
+  }
 }
 
 // Adds to the accepted effects as long as any is there. first_gain: the largest so far.
@@ -465,21 +479,7 @@ void add_effects(Engine& engine, Naming& out, double& first_gain, const std::fun
     engine.update_noise();
     engine.accept(engine.refine(engine.accepted(), kSettling));
     engine.update_noise();
-    // Members that the others have made superfluous.
-    bool removed = true;
-    while (removed && engine.accepted().size() > 1) {
-      removed = false;
-      const Hypothesis whole = engine.refine(engine.accepted(), 3);
-      for (std::size_t j = 0; j < whole.slots.size(); ++j) {
-        if (whole.chi2[j] > out.threshold) continue;
-        std::vector<int> fewer = whole.slots;
-        fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(j));
-        engine.accept(engine.refine(fewer));
-        engine.update_noise();
-        removed = true;
-        break;
-      }
-    }
+    if (engine.accepted().size() > 1) drop_superfluous(engine, out.threshold);
   }
 }
 
@@ -518,19 +518,9 @@ double chance_threshold(int candidates, double probability) {
   return low;
 }
 
-Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs) {
-  Naming out;
-  out.threshold = chance_threshold(static_cast<int>(engine.campaign().slots.size()), kFalseName);
-  out.ripples = find_ripples(engine.campaign(), out.threshold);
-  engine.fit_machine(jobs);
-  engine.update_noise();
-  for (int i = 0; i < 2; ++i) {
-    engine.accept(engine.refine({}, kSettling));
-    engine.update_noise();
-  }
-  out.sharp = {engine.state(), engine.campaign().noise, true};
-  out.nominal = engine.nominal_from(engine.state());
-  out.nominal_groups = score_groups(engine);
+namespace {
+// Returns the largest gain of one.
+double find_effects(Engine& engine, Naming& out, const std::function<bool()>& stop, int jobs) {
   double first_gain = 0.0;
   // What left-out experiments do not confirm may have stood before what they would.
   for (int round = 0; round < kRounds && !stop(); ++round) {
@@ -544,9 +534,31 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
   find_classes(engine, out, stop, jobs);
   find_intervals(engine, out);
   drop_doubtful(engine, out, stop, jobs);
-  if (stop()) return out;
+  return first_gain;
+}
+}  // namespace
 
-  if (out.unknown) return out;
+void name_anew(Engine& engine, Naming& naming, const std::function<bool()>& stop, int jobs) {
+  naming.unknown.reset();
+  drop_superfluous(engine, naming.threshold);
+  find_effects(engine, naming, stop, jobs);
+}
+
+Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs) {
+  Naming out;
+  out.threshold = chance_threshold(static_cast<int>(engine.campaign().slots.size()), kFalseName);
+  out.ripples = find_ripples(engine.campaign(), out.threshold);
+  engine.fit_machine(jobs);
+  engine.update_noise();
+  for (int i = 0; i < 2; ++i) {
+    engine.accept(engine.refine({}, kSettling));
+    engine.update_noise();
+  }
+  out.sharp = {engine.state(), engine.campaign().noise, true};
+  out.nominal = engine.nominal_from(engine.state());
+  out.nominal_groups = score_groups(engine);
+  const double first_gain = find_effects(engine, out, stop, jobs);
+  if (stop() || out.unknown) return out;
 
   // What is left: any cause? An effect that it makes superfluous was only its shadow.
   for (;;) {

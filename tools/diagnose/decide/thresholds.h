@@ -1,6 +1,8 @@
 // What decides whether residuals pass: each number with its unit and where it comes from.
 #pragma once
 
+#include <cstddef>
+
 namespace beltgrip::diagnose::thresholds {
 
 // Twice the log evidence of a step, kink or bump over nothing. Above the largest of 55 healthy
@@ -28,5 +30,27 @@ inline constexpr double kScatterRatio = 3.3;
 inline constexpr double kScatterTorque = 2.2;
 // The same over what rigs usually scatter by, however much replicates do.
 inline constexpr double kUnusualScatter = 4.0;
+
+// A function is learned where its variable was set at so many levels: the two outer ones lie
+// outside what the others cover, and three inner ones can be left out in turn.
+inline constexpr int kLevelsMin = 5;
+// Of the excess of each test that failed, at least, is gone with the function in the model: what is
+// static loses nearly all, a ripple or a resonance that happens to have a cell a few percent.
+inline constexpr double kHealed = 0.6;
+// Chosen, of a limit: a test that fails by less is not counted as failed by less.
+inline constexpr double kTrifle = 0.25;
+// Log predictive density of the levels left out, nats: odds of 20 to 1.
+inline constexpr double kLeftOutLevels = 3.0;
+// Nats within which two explanations are the same: odds of 20 to 1.
+inline constexpr double kSameNats = 3.0;
+// Nats by which a law may predict levels left out worse than the free function and still be named.
+inline constexpr double kLawWorse = 1.0;
+// Of the best cell's gain: what explains less is the shadow of that.
+inline constexpr double kNearBest = 0.5;
+// Chosen: of more functions than these no campaign of a dozen experiments tells; tried at most, for
+// each.
+inline constexpr std::size_t kTermsMax = 2, kTermsTried = 3;
+// No machine is off by more: Nm, share, N, share, share; the bounds of the effects that act there.
+inline constexpr double kLearnedBound[] = {20.0, 0.5, 3000.0, 0.08, 0.6};
 
 }  // namespace beltgrip::diagnose::thresholds

@@ -134,6 +134,19 @@ std::vector<double> add_laws(const CellScore& score, double beyond, std::vector<
   return out;
 }
 
+// Of a function over none: smooth ones and laws alike, the scatter averaged over on both sides.
+double averaged(const Parts& parts, const std::vector<CellScore>& scores, double none) {
+  std::vector<double> smooth, laws, without;
+  for (const Smooth& part : parts.smooth) smooth.push_back(part.log_evidence);
+  for (const Law& part : parts.laws) laws.push_back(part.log_evidence + part.log_prior);
+  for (const CellScore& each : scores) without.push_back(each.log_likelihood - none);
+  const auto n = static_cast<double>(scores.size());
+  const double of_laws = static_cast<double>(families().size() * kSizes.size()) * n;
+  return ln_sum({ln_sum(smooth) - std::log(static_cast<double>(smooth.size())),
+                 ln_sum(laws) - std::log(of_laws)}) -
+         std::log(2.0) - ln_sum(without) + std::log(n);
+}
+
 void mix(const Parts& parts, Cell& cell) {
   constexpr double kNegligible = -12.0;  // ln of a weight
   double top = -std::numeric_limits<double>::infinity();
@@ -180,6 +193,7 @@ void judge_cell(Cell& cell) {
   for (const Smooth& part : parts.smooth) smooth = std::max(smooth, part.log_evidence);
   cell.smooth_gain = 2.0 * smooth;
   cell.law_gain = 2.0 * law;
+  cell.log_evidence = averaged(parts, cell.scores, none);
   mix(parts, cell);
   const CellScore& fitted = cell.scores.front();
   const double taken =

@@ -13,7 +13,7 @@
 namespace beltgrip::diagnose {
 
 // Where a function acts.
-enum class Injection { kFriction, kRatio, kTorque, kTorqueGain, kClampForce };
+using Injection = estimator::LearnedPoint;
 struct InjectionRow {
   Injection injection;
   std::string_view acts_on;
@@ -51,7 +51,8 @@ struct Cell {
   // The function, in units of the row: the mean over laws and smooth functions by their evidence.
   KnotVector mean = KnotVector::Zero();
   KnotSquare covariance = KnotSquare::Zero();
-  double share = 0.0;  // of the misfit that it explains
+  double share = 0.0;         // of the misfit that it explains
+  double log_evidence = 0.0;  // over none, averaged over all that was assumed
 };
 
 // All cells at the engine's state, on top of what it has accepted; the best first.

@@ -25,6 +25,7 @@ constexpr double kLongStep = 0.05;   // in tolerances and usual sizes
 constexpr double kWorthwhile = 1.0;  // of the log likelihood
 constexpr double kSameStep = 1e-3;   // apart by less of their length: both fail
 constexpr double kCurveFault = 0.1;  // one sigma of curve_faults()
+constexpr int kSettled = 20;         // steps, where all else stays
 constexpr double kSizePrior = 3.0;   // one sigma of an effect's size, in usual sizes
 
 bool stop_used(const Campaign& campaign, int stop) {
@@ -100,6 +101,7 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model)
   out.nuisances = nuisances_of(model);
   out.slots = make_slots(out.runs);
   out.switched_on = slot_values(model, out.slots);
+  out.learned = daemon::learned_terms(model);
   out.torque_varies = torque_varies(out.runs);
   if (const auto ripple = model.effects.find("speed_ripple"); ripple != model.effects.end()) {
     out.known_ripples = ripple->second.parameters;
@@ -339,6 +341,7 @@ Nominal Engine::nominal_from(const ModelState& sharp) const {
 Hypothesis Engine::refine_from_afar(const std::vector<int>& slots) const {
   const std::vector<int> parameters = with_nuisances(slots);
   ModelState state = first_;
+  state.learned = state_.learned;
   const Whitening whitening = identity_whitening(campaign_);
   for (const Campaign& coarse : coarse_) {
     state = minimise(coarse, parameters, state, whitening, default_scatter(), 8, 0).state;
@@ -352,8 +355,9 @@ double Engine::ln_mu_reached() const {
   for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
     const ExperimentData& data = campaign_.runs[e];
     if (data.valid_count == 0) continue;
-    const Quantities q = evaluate(data, static_cast<int>(e), campaign_.variator, state_.nuisance,
-                                  Effects{&campaign_.slots, campaign_.switched_on});
+    const Quantities q = evaluate(
+        data, static_cast<int>(e), campaign_.variator, state_.nuisance,
+        Effects{&campaign_.slots, campaign_.switched_on, campaign_.learned, state_.learned});
     for (int k = 0; k < data.size(); ++k) {
       if (data.valid[static_cast<std::size_t>(k)]) {
         seen.push_back(std::abs(q.belt_torque[k]) / q.capacity[k]);
@@ -645,6 +649,12 @@ bool Engine::curve_is_possible(const ModelState& state) {
     for (const CurveFault& each : curve_faults(departure)) faults += each.slope * each.slope;
   }
   return faults <= kFaultMost * kFaultMost * kCurveFault * kCurveFault;
+}
+
+void Engine::learn(std::vector<estimator::LearnedTerm> terms) {
+  state_.learned = std::move(terms);
+  accept(refine(accepted_, kSettled));
+  update_noise();
 }
 
 void Engine::accept(const Hypothesis& hypothesis) {

@@ -92,6 +92,8 @@ class Engine {
   static bool curve_is_possible(const ModelState& state);
   // Makes the hypothesis the present state.
   void accept(const Hypothesis& hypothesis);
+  // Takes these functions instead of those it has, and fits the rest anew.
+  void learn(std::vector<estimator::LearnedTerm> terms);
   // By how much the accepted effects predict experiments that were left out of the fit better than
   // the same set without one of them: sum over experiments of the log predictive density.
   double left_out_gain(int without) const;

@@ -151,10 +151,11 @@ std::string torque_name(const Campaign& campaign) {
 
 // Both states' errors per experiment.
 Gain judge(const Campaign& campaign, const std::vector<ModelState>& before,
-           const std::vector<ModelState>& after) {
+           const std::vector<ModelState>& after, const std::vector<bool>& which = {}) {
   std::vector<SignalErrors> errors_before, errors_after, forward_before, forward_after;
   for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
     const int run = static_cast<int>(e);
+    if (!which.empty() && !which[e]) continue;
     errors_before.push_back(signal_errors(campaign, run, before[e]));
     errors_after.push_back(signal_errors(campaign, run, after[e]));
     ForwardErrors forward = forward_errors(campaign, run, before[e], after[e]);
@@ -392,19 +393,30 @@ std::map<std::string, SimulatedSignal> simulated_signals(const Campaign& campaig
   return out;
 }
 
-Gain left_out_gain(const Engine& engine, const Nominal& nominal, const ModelState& extended,
-                   const std::vector<int>& slots) {
-  // Both are fitted by the same measure: the noise that covers the nominal machine's misfit, or the
-  // sensors' own, correlations counted.
+namespace {
+// Every state is fitted by the same measure: the noise that covers the nominal machine's misfit, or
+// the sensors' own, correlations counted.
+std::vector<ModelState> fits_without_each(const Engine& engine, const Nominal& nominal,
+                                          const ModelState& state, const std::vector<int>& slots) {
   Campaign campaign = engine.campaign();
   campaign.noise = nominal.noise;
   const Whitening whitening =
       nominal.is_covered ? engine.whitening() : identity_whitening(campaign);
-  const auto left_out = [&](const ModelState& state, const std::vector<int>& with) {
-    return leave_one_out(engine, campaign, whitening, state, with).states;
-  };
-  const std::vector<ModelState> before = left_out(nominal.state, {});
-  const std::vector<ModelState> after = slots.empty() ? before : left_out(extended, slots);
+  return leave_one_out(engine, campaign, whitening, state, slots).states;
+}
+}  // namespace
+
+Gain left_out_gain(const Engine& engine, const Nominal& nominal,
+                   const std::vector<ModelState>& extended, const std::vector<bool>& which) {
+  return judge(engine.campaign(), fits_without_each(engine, nominal, nominal.state, {}), extended,
+               which);
+}
+
+Gain left_out_gain(const Engine& engine, const Nominal& nominal, const ModelState& extended,
+                   const std::vector<int>& slots) {
+  const std::vector<ModelState> before = fits_without_each(engine, nominal, nominal.state, {});
+  const std::vector<ModelState> after =
+      slots.empty() ? before : fits_without_each(engine, nominal, extended, slots);
   Gain out = judge(engine.campaign(), before, after);
   if (!slots.empty()) out.density = sum_over_experiments(engine.left_out_gains());
   return out;

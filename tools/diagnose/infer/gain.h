@@ -63,6 +63,9 @@ LeftOut leave_one_out(const Engine& engine, const ModelState& state, const std::
 // others.
 Gain left_out_gain(const Engine& engine, const Nominal& nominal, const ModelState& extended,
                    const std::vector<int>& slots);
+// The same with the machines that predict given, one per experiment; only those of `which` count.
+Gain left_out_gain(const Engine& engine, const Nominal& nominal,
+                   const std::vector<ModelState>& extended, const std::vector<bool>& which);
 // Experiments of another campaign, predicted by the two states.
 Gain held_out_gain(const Campaign& held_out, const ModelState& nominal, const ModelState& extended);
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "tools/diagnose/model/learned.h"
+
 namespace beltgrip::diagnose {
 namespace {
 
@@ -14,23 +16,25 @@ using Eigen::Index;
 constexpr double kVaried = 0.05;      // of its middle; less may be the channel's own noise
 constexpr double kMovesShare = 0.06;  // of the span: an experiment that moves it less has one value
 constexpr double kLevelShare = 0.03;  // of the span: means nearer than that are one level
-constexpr double kLowPass_s = 3.0;
 constexpr std::size_t kSamplesMin = 50;
 
+using estimator::LearnedVariable;
+
+template <LearnedVariable which>
+ArrayXd value_of(const ExperimentData& run, int) {
+  return recorded(run, which);
+}
+
 constexpr std::array kAll{
-    IndexVariable{"oil_temperature",
-                  [](const ExperimentData& r, int) -> ArrayXd {
-                    return r.temperature.present ? r.temperature.value : ArrayXd();
-                  }},
-    IndexVariable{"primary_speed",
-                  [](const ExperimentData& r, int) -> ArrayXd { return r.omega_p.slow; }},
+    IndexVariable{"oil_temperature", value_of<LearnedVariable::kOilTemperature>,
+                  LearnedVariable::kOilTemperature},
+    IndexVariable{"primary_speed", value_of<LearnedVariable::kPrimarySpeed>,
+                  LearnedVariable::kPrimarySpeed},
     IndexVariable{"secondary_pressure",
                   [](const ExperimentData& r, int) -> ArrayXd { return r.pressure.slow; }},
-    IndexVariable{"primary_pressure",
-                  [](const ExperimentData& r, int) -> ArrayXd {
-                    return r.pressure_p.present ? r.pressure_p.slow : ArrayXd();
-                  }},
-    IndexVariable{"torque", [](const ExperimentData& r, int) -> ArrayXd { return r.torque.slow; }},
+    IndexVariable{"primary_pressure", value_of<LearnedVariable::kPrimaryPressure>,
+                  LearnedVariable::kPrimaryPressure},
+    IndexVariable{"torque", value_of<LearnedVariable::kTorque>, LearnedVariable::kTorque},
     IndexVariable{"acceleration",
                   [](const ExperimentData& r, int) -> ArrayXd { return r.omega_p.slow_slope; }},
     IndexVariable{"pressure_rate",
@@ -41,20 +45,6 @@ constexpr std::array kAll{
                     return ArrayXd::Constant(r.size(), static_cast<double>(e));
                   }},
 };
-
-// Mean over a window about each sample, of what is finite.
-ArrayXd low_passed(const ArrayXd& in, double dt_s) {
-  const auto half = static_cast<Index>(0.5 * kLowPass_s / dt_s);
-  ArrayXd out = in;
-  double sum = 0.0;
-  Index first = 0, behind = 0;
-  for (Index k = 0; k < in.size(); ++k) {
-    for (; behind < std::min(in.size(), k + half + 1); ++behind) sum += in[behind];
-    for (; first < k - half; ++first) sum -= in[first];
-    out[k] = sum / static_cast<double>(behind - first);
-  }
-  return out;
-}
 
 std::vector<double> valid_values(const ExperimentData& run, const ArrayXd& in) {
   std::vector<double> out;

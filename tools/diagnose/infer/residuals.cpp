@@ -43,7 +43,8 @@ double robust_sigma(std::vector<double>& values) {
 Quantities quantities(const Campaign& campaign, const ExperimentData& data, int run,
                       const ModelState& state) {
   return evaluate(data, run, campaign.variator, state.nuisance,
-                  Effects{&campaign.slots, campaign.switched_on + state.effects});
+                  Effects{&campaign.slots, campaign.switched_on + state.effects, campaign.learned,
+                          state.learned});
 }
 
 std::array<CurveShape, kStops> shapes(const Eigen::VectorXd& nuisance, const Quantities& q) {

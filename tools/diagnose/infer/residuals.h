@@ -39,7 +39,8 @@ struct NoiseLevels {
 
 struct ModelState {
   Eigen::VectorXd nuisance;
-  Eigen::VectorXd effects;  // one per slot
+  Eigen::VectorXd effects;                      // one per slot
+  std::vector<estimator::LearnedTerm> learned;  // beside those of the model file
 };
 
 // Data and model of one diagnosis; everything that no hypothesis changes.
@@ -50,6 +51,7 @@ struct Campaign {
   std::vector<Slot> slots;
   Eigen::VectorXd switched_on;  // sizes that the model file gives; states come on top
   std::map<std::string, double> known_ripples;  // of the model file, by shaft
+  std::vector<estimator::LearnedTerm> learned;  // of the model file
   NoiseLevels noise;
   std::vector<double> slip_noise_share;  // per experiment: its noise of slip over noise.slip
   double slip_noise(int run) const {

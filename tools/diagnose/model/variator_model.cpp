@@ -8,6 +8,7 @@
 
 #include "tools/diagnose/model/curve_family.h"
 #include "tools/diagnose/model/effects/effect.h"
+#include "tools/diagnose/model/learned.h"
 
 namespace beltgrip::diagnose {
 
@@ -263,6 +264,8 @@ Quantities evaluate(const ExperimentData& run, int experiment,
       const double value = effects.value[static_cast<Eigen::Index>(i)];
       if (slot.row->stage == stage && value != 0.0) slot.row->apply(c, slot, value);
     }
+    for (const estimator::LearnedTerm& each : effects.learned) apply_learned(c, each, stage);
+    for (const estimator::LearnedTerm& each : effects.learned_too) apply_learned(c, each, stage);
   };
   apply(Stage::kMeasurement);
   c.force_N = variator.secondary_piston_area_m2 * c.pressure + variator.secondary_spring_force_N +

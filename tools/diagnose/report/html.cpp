@@ -1,6 +1,7 @@
 #include "tools/diagnose/report/html.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "tools/diagnose/report/json.h"
@@ -71,6 +72,55 @@ void add_findings(report::HtmlPage& page, const Diagnosis& d) {
   page.table({"effect", "equation", "size (95 %)", "probability", "these data cannot tell it from",
               "what would"},
              rows);
+}
+
+// In the unit of the function.
+const char* unit_of(const std::string& acts_on) {
+  if (acts_on == "torque") return "Nm";
+  return acts_on == "clamp_force" ? "N" : "share";
+}
+
+// The function with its 95 % band over what it follows.
+report::Chart picture_of(const LearnedFinding& learned) {
+  constexpr double kBand = 1.96;
+  report::Series mean{"learned", learned.knots, learned.values, true, false};
+  report::Series low{"95 % from", learned.knots, learned.values, true, true};
+  report::Series high{"95 % to", learned.knots, learned.values, true, true};
+  const std::size_t n = learned.knots.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    const double half = kBand * std::sqrt(std::max(0.0, learned.covariance[i * n + i]));
+    low.y[i] -= half;
+    high.y[i] += half;
+  }
+  return {learned.acts_on + " over " + joined(learned.depends_on),
+          joined(learned.depends_on),
+          learned.acts_on + ", " + unit_of(learned.acts_on),
+          {mean, low, high}};
+}
+
+void add_learned(report::HtmlPage& page, const Diagnosis& d) {
+  if (d.learned.empty()) return;
+  page.heading("What was learned without a name");
+  Rows rows;
+  std::vector<report::Chart> charts;
+  for (const LearnedFinding& each : d.learned) {
+    page.paragraph(sentence(each) + ".");
+    if (!each.aliases.empty()) {
+      page.paragraph("These data cannot tell it from " + joined(each.aliases) + ".");
+    }
+    charts.push_back(picture_of(each));
+    if (!each.at_left_out_values) continue;
+    rows.push_back({each.name, each.metric});
+    for (const std::string& cell :
+         {number(each.at_left_out_values->before), number(each.at_left_out_values->after),
+          range(each.at_left_out_values->low, each.at_left_out_values->high)}) {
+      rows.back().push_back(cell);
+    }
+  }
+  page.charts(charts);
+  if (rows.empty()) return;
+  page.paragraph("Errors at values of the variable that were left out of the fit, all of them:");
+  page.table({"learned", "signal, SI", "before", "after", "difference (95 %)"}, rows);
 }
 
 // p-values; what chance does once in a thousand tests counts as a failure.
@@ -209,6 +259,7 @@ std::string html_text(const Diagnosis& d, const Plots& plots) {
   }
   if (d.next_experiment) page.paragraph("Next experiment: " + d.next_experiment->text + ".");
   add_findings(page, d);
+  add_learned(page, d);
   add_errors(page, d);
   add_tables(page, d);
   const auto draw = [&](const char* heading, const std::vector<report::Chart>& charts) {

@@ -71,6 +71,48 @@ void write_next(text::JsonWriter& json, const std::optional<Recipe>& next) {
   json.begin_object().field("text", next->text).field("scenario", next->scenario).end_object();
 }
 
+void write_words(text::JsonWriter& json, const char* key, const std::vector<std::string>& words) {
+  json.key(key).begin_array();
+  for (const std::string& each : words) json.value(each);
+  json.end_array();
+}
+
+void write_change(text::JsonWriter& json, const BeforeAfter& change) {
+  json.field("before", change.before).field("after", change.after);
+  interval(json, change.low, change.high);
+}
+
+void write_learned(text::JsonWriter& json, const LearnedFinding& learned) {
+  json.begin_object().field("name", learned.name).field("acts_on", learned.acts_on);
+  write_words(json, "depends_on", learned.depends_on);
+  json.key("law");
+  learned.law.empty() ? json.null() : json.value(learned.law);
+  write_words(json, "laws", learned.laws);
+  write_words(json, "aliases", learned.aliases);
+  json.field("levels", learned.levels);
+  json.key("gain").begin_object();
+  for (const auto& [metric, change] : learned.gain) {
+    write_change(json.key(metric).begin_object(), change);
+    json.end_object();
+  }
+  json.end_object().key("gain_at_left_out_values");
+  if (learned.at_left_out_values) {
+    write_change(json.begin_object().field("metric", learned.metric), *learned.at_left_out_values);
+    json.end_object();
+  } else {
+    json.null();
+  }
+  json.key("box").begin_object();
+  for (const auto& [role, range] : learned.box) {
+    json.key(role).begin_array().value(range[0]).value(range[1]).end_array();
+  }
+  json.end_object().key("function").begin_array();
+  for (std::size_t i = 0; i < learned.knots.size(); ++i) {
+    json.begin_array().value(learned.knots[i]).value(learned.values[i]).end_array();
+  }
+  json.end_array().end_object();
+}
+
 std::string joined(const std::vector<std::string>& words) {
   std::string out;
   for (const std::string& each : words) out += (out.empty() ? "" : ", ") + each;
@@ -95,6 +137,19 @@ std::string sentence(const Unexplained& left) {
       return left.acts_on + " departs slowly within experiments and follows nothing recorded";
   }
   return {};
+}
+
+std::string sentence(const LearnedFinding& learned) {
+  const auto [least, most] = std::minmax_element(learned.values.begin(), learned.values.end());
+  std::string out = "a cause without a name on " + learned.acts_on + " that follows " +
+                    joined(learned.depends_on) + " (" + number(*least) + " to " + number(*most) +
+                    ", learned at " + std::to_string(learned.levels) + " levels";
+  for (const auto& [role, range] : learned.box) {
+    out += " of " + role + " from " + number(range[0]) + " to " + number(range[1]);
+  }
+  out += ")";
+  if (!learned.law.empty()) out += ", " + learned.law;
+  return out;
 }
 
 std::string figure_text(const Rerun& rerun, const RerunFigure& figure) {
@@ -182,7 +237,9 @@ std::string json_text(const Diagnosis& d) {
   json.end_array();
   write_unexplained(json, d.unexplained);
   json.field("scatter_base", d.scatter_from_replicates ? "replicates" : "prior");
-  json.key("learned").begin_array().end_array();
+  json.key("learned").begin_array();
+  for (const LearnedFinding& each : d.learned) write_learned(json, each);
+  json.end_array();
   json.key("not_identifiable").begin_array();
   for (const NotIdentifiable& each : d.not_identifiable) {
     json.begin_object().field("effect", each.effect);
@@ -286,13 +343,16 @@ std::string headline(const Diagnosis& d) {
   for (const Finding& finding : d.findings) {
     found += (found.empty() ? "" : " and ") + size_text(finding);
   }
+  for (const LearnedFinding& each : d.learned) {
+    found += (found.empty() ? "" : " and ") + sentence(each);
+  }
   if (d.verdict == Verdict::kUnexplained && d.unexplained) {
     return (found.empty() ? "Unexplained: " : "Beside " + found + " is left: ") +
            sentence(*d.unexplained) + ".";
   }
   if (d.verdict == Verdict::kExplained) {
-    return found + (d.findings.size() > 1 ? " explain" : " explains") + " what was wrong" +
-           gain_text(d) + ".";
+    return found + (d.findings.size() + d.learned.size() > 1 ? " explain" : " explains") +
+           " what was wrong" + gain_text(d) + ".";
   }
   if (d.verdict == Verdict::kNothingWrong) {
     return "Nothing stands out from noise and scatter in " + std::to_string(d.experiments) +
@@ -325,6 +385,17 @@ std::string plain_text(const Diagnosis& d) {
       out += "  these data cannot tell it from:";
       for (const std::string& alias : finding.aliases) out += " " + alias;
       out += "\n  what would: " + finding.separate_by + "\n";
+    }
+  }
+  for (const LearnedFinding& each : d.learned) {
+    out += "learned: " + sentence(each) + "\n";
+    if (!each.aliases.empty())
+      out += "  these data cannot tell it from: " + joined(each.aliases) + "\n";
+    if (const auto& change = each.at_left_out_values) {
+      out += "  " + each.metric + " at values of " + joined(each.depends_on) +
+             " that were left out: off by " + number(change->before) + " -> " +
+             number(change->after) + " [" + number(change->low) + ", " + number(change->high) +
+             "]\n";
     }
   }
   if (d.unexplained) out += "unexplained: " + sentence(*d.unexplained) + "\n";

@@ -11,6 +11,7 @@ std::string json_text(const Diagnosis& diagnosis);
 std::string verdict_line(const Diagnosis& diagnosis);
 // What is left unexplained, as a part of a sentence.
 std::string sentence(const Unexplained& left);
+std::string sentence(const LearnedFinding& learned);
 // What a reader has to know, in one sentence.
 std::string headline(const Diagnosis& diagnosis);
 std::string plain_text(const Diagnosis& diagnosis);

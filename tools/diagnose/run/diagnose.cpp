@@ -8,9 +8,11 @@
 #include "estimator/statistics/distributions.h"
 #include "estimator/statistics/interval.h"
 #include "tools/diagnose/decide/criticism.h"
+#include "tools/diagnose/decide/learn.h"
 #include "tools/diagnose/decide/namer.h"
 #include "tools/diagnose/decide/plausibility.h"
 #include "tools/diagnose/decide/recipe.h"
+#include "tools/diagnose/decide/thresholds.h"
 #include "tools/diagnose/infer/engine.h"
 #include "tools/diagnose/infer/gain.h"
 #include "tools/diagnose/infer/parallel.h"
@@ -20,10 +22,12 @@
 namespace beltgrip::diagnose {
 namespace {
 
-constexpr int kSamplesMin = 100;            // 10 s of usable data
-constexpr std::size_t kExperimentsMin = 3;  // from where on their scatter is known
-constexpr double kDetectable = 5.0;         // sigmas: found with 90 % and more
-constexpr double kRealistic = 3.0;          // in usual sizes: an effect is hardly ever larger
+constexpr int kSamplesMin = 100;             // 10 s of usable data
+constexpr std::size_t kExperimentsMin = 3;   // from where on their scatter is known
+constexpr std::size_t kLearningRunsMin = 6;  // fewer leave no level out
+constexpr int kRoundsMax = 2;                // of learning and naming
+constexpr double kDetectable = 5.0;          // sigmas: found with 90 % and more
+constexpr double kRealistic = 3.0;           // in usual sizes: an effect is hardly ever larger
 
 double quantile_975(double degrees) {
   double low = 0.0, high = 100.0;
@@ -72,8 +76,10 @@ class Run {
     progress(0.1, "fit");
     Engine engine(make_campaign(std::move(runs), request_.model));
     Naming naming = name_effects(engine, stop(), request_.jobs);
+    progress(0.6, "tests");
+    const Learning learning = criticise_and_learn(engine, naming);
     progress(0.8, "gain");
-    fill(engine, naming);
+    fill(engine, naming, learning);
     if (request_.with_plots) {
       answer_.plots = make_plots(engine.campaign(), naming.nominal.state, naming.hypothesis.state,
                                  request_.experiments);
@@ -137,7 +143,46 @@ class Run {
     }
   }
 
-  void fill(Engine& engine, const Naming& naming) {
+  static std::size_t used_runs(const Campaign& campaign) {
+    return static_cast<std::size_t>(
+        std::count_if(campaign.runs.begin(), campaign.runs.end(),
+                      [](const ExperimentData& run) { return run.valid_count > 0; }));
+  }
+
+  // What fails the tests is learned where it can be; with it the whole analysis anew, until nothing
+  // changes.
+  Learning criticise_and_learn(Engine& engine, Naming& naming) {
+    Learning out;
+    if (stop()()) return out;
+    out.left = criticise(engine, is_coarse_);
+    const bool sensible = !doubts_.impossible && used_runs(engine.campaign()) >= kLearningRunsMin;
+    for (int round = 0; round < kRoundsMax && sensible && !out.left.passed(); ++round) {
+      Learning more = learn(engine, out.left, is_coarse_, stop());
+      out.needs_levels = more.needs_levels;
+      if (more.terms.empty()) break;
+      out.left = std::move(more.left);
+      for (Learned& each : more.terms) out.terms.push_back(std::move(each));
+      const std::vector<int> before = engine.accepted();
+      name_anew(engine, naming, stop(), request_.jobs);
+      if (stop()() || engine.accepted() == before) break;
+      // Other effects: what was learned beside the old ones is learned beside these.
+      relearn(engine, out);
+      out.left = criticise(engine, is_coarse_);
+    }
+    return out;
+  }
+
+  static void relearn(Engine& engine, Learning& learning) {
+    for (Learned& each : learning.terms) {
+      // The function of this term last.
+      std::vector<estimator::LearnedTerm> functions = engine.state().learned;
+      std::rotate(functions.begin(), functions.begin() + 1, functions.end());
+      if (functions.size() > 1) engine.learn(std::move(functions));
+      each.fit = fit_further(engine, each.fit);
+    }
+  }
+
+  void fill(Engine& engine, const Naming& naming, const Learning& learning) {
     const Campaign& campaign = engine.campaign();
     const ModelState& extended = naming.hypothesis.state;
     out().complete = !stop()();
@@ -156,9 +201,7 @@ class Run {
       out().unexplained = doubts_.impossible;
       return;
     }
-    const auto used = static_cast<std::size_t>(
-        std::count_if(campaign.runs.begin(), campaign.runs.end(),
-                      [](const ExperimentData& run) { return run.valid_count > 0; }));
+    const std::size_t used = used_runs(campaign);
     if (used < kExperimentsMin) {
       out().notes.push_back(
           "fewer than three experiments: how they scatter is not known, and what "
@@ -178,6 +221,9 @@ class Run {
     const auto gain_over = [&](const Nominal& nominal) -> Gain {
       if (!request_.held_out.empty()) return held_out_gain(held_out, nominal.state, extended);
       if (campaign.runs.size() < 3) return {};
+      if (!learning.terms.empty()) {
+        return left_out_gain(engine, nominal, learning.terms.back().fit.folds, {});
+      }
       return left_out_gain(engine, nominal, extended, slots);
     };
     const Gain gain = gain_over(naming.nominal);
@@ -209,9 +255,11 @@ class Run {
     out().mu_max = gain.mu_max;
     for (const auto& [name, errors] : gain.forward) out().simulation[name].left_out = errors;
     fill_findings(engine, named ? naming.accepted : std::vector<Accepted>(), naming, gain);
-    judge(engine, naming, named);
-    propose(engine, naming);
+    fill_learned(engine, naming, learning, gain);
+    judge(engine, naming, learning, named);
+    propose(engine, naming, learning);
     answer_.extended = request_.model;
+    store_learned();
     const ModelState& stored = !named ? naming.nominal.state : extended;
     store_machine(stored.nuisance, answer_.extended);
     for (const Ripple& ripple : naming.ripples) {
@@ -223,9 +271,81 @@ class Run {
                   answer_.extended);
   }
 
+  void fill_learned(const Engine& engine, const Naming& naming, const Learning& learning,
+                    const Gain& gain) {
+    for (const Learned& each : learning.terms) {
+      const LearnedFit& fit = each.fit;
+      LearnedFinding found;
+      const std::string role = role_of(engine.campaign(), *fit.cell.abscissa.variable);
+      found.acts_on = fit.cell.injection->acts_on;
+      found.depends_on = {role};
+      found.name = found.acts_on + "_over_" + role;
+      found.aliases = each.aliases;
+      const std::vector<LawEvidence> laws = possible_laws(fit);
+      for (const LawEvidence& law : laws) found.laws.emplace_back(law.name);
+      if (const LawEvidence* law = named_law(fit, laws)) found.law = law->text;
+      found.levels = fit.cell.abscissa.levels;
+      found.box[role] = {fit.cell.abscissa.low, fit.cell.abscissa.high};
+      const double unit = fit.cell.injection->unit;
+      for (std::size_t i = 0; i < fit.term.count; ++i) {
+        found.knots.push_back(fit.term.knot[i]);
+        found.values.push_back(fit.term.value[i]);
+        for (std::size_t j = 0; j < fit.term.count; ++j) {
+          found.covariance.push_back(
+              unit * unit *
+              fit.cell.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)));
+        }
+      }
+      found.gain = gain.signals;
+      if (gain.mu_max) found.gain["mu_max"] = change_of(*gain.mu_max);
+      fill_left_out_values(left_out_gain(engine, naming.nominal, fit.folds, fit.is_inner), found);
+      out().learned.push_back(std::move(found));
+    }
+  }
+
+  static BeforeAfter change_of(const MuMaxError& error) {
+    return {error.before, error.after, error.low, error.high};
+  }
+
+  // Of what the cause acts on: mu_max, or the signal that shows it; else what there is.
+  static void fill_left_out_values(const Gain& gain, LearnedFinding& found) {
+    const bool is_friction = found.acts_on == "friction" || found.acts_on == "clamp_force";
+    if (is_friction && gain.mu_max) {
+      found.metric = "mu_max";
+      found.at_left_out_values = change_of(*gain.mu_max);
+      return;
+    }
+    const bool is_torque = found.acts_on == "torque" || found.acts_on == "torque_gain";
+    const auto shown = gain.signals.find(is_torque ? "secondary_torque" : "secondary_speed");
+    const auto used = shown != gain.signals.end() ? shown : gain.signals.begin();
+    if (used == gain.signals.end()) return;
+    found.metric = used->first;
+    found.at_left_out_values = used->second;
+  }
+
+  void store_learned() {
+    for (const LearnedFinding& each : out().learned) {
+      // A function of the same kind that the model has already stays beside it.
+      std::string name = each.name;
+      while (answer_.extended.learned.contains(name)) name += "_more";
+      daemon::ModelLearned& stored = answer_.extended.learned[name];
+      stored.acts_on = each.acts_on;
+      stored.depends_on = each.depends_on;
+      stored.knots = each.knots;
+      stored.values = each.values;
+      stored.covariance = each.covariance;
+      stored.box = each.box;
+      stored.law = each.law;
+    }
+  }
+
   // The tests of the residuals that are left decide.
-  void judge(const Engine& engine, const Naming& naming, bool named) {
-    const Criticism criticism = criticise(engine, is_coarse_);
+  void judge(const Engine& engine, const Naming& naming, const Learning& learning, bool named) {
+    const Criticism& criticism = learning.left;
+    if (criticism.tests.empty()) {
+      out().verdict = Verdict::kNone;
+      return;
+    }
     if (is_coarse_) {
       out().notes.emplace_back(
           "a pressure or torque moves in steps beyond its noise: lines and slow courses are not "
@@ -243,10 +363,10 @@ class Run {
       const EffectRow& row = *engine.campaign().slots[static_cast<std::size_t>(slot)].row;
       out().unexplained = Unexplained{std::string(row.acts_on), {std::string(row.depends_on)}};
     }
-    out().verdict = !out().complete          ? Verdict::kNone
-                    : out().unexplained      ? Verdict::kUnexplained
-                    : out().findings.empty() ? Verdict::kNothingWrong
-                                             : Verdict::kExplained;
+    out().verdict = !out().complete                                   ? Verdict::kNone
+                    : out().unexplained                               ? Verdict::kUnexplained
+                    : out().findings.empty() && out().learned.empty() ? Verdict::kNothingWrong
+                                                                      : Verdict::kExplained;
     if (!out().complete) out().unexplained.reset();
   }
 
@@ -410,7 +530,7 @@ class Run {
     }
   }
 
-  void propose(const Engine& engine, const Naming& naming) {
+  void propose(const Engine& engine, const Naming& naming, const Learning& learning) {
     const Campaign& campaign = engine.campaign();
     const ModelState& state = naming.hypothesis.state;
     const auto next = [&](std::string_view depends_on, const std::string& why) {
@@ -424,6 +544,12 @@ class Run {
     }
     if (const auto& unexplained = out().unexplained) {
       const Unexplained& left = *unexplained;
+      if (!learning.needs_levels.empty()) {
+        next(learning.needs_levels, "a further level of " + learning.needs_levels +
+                                        ", of which nothing is learned below " +
+                                        std::to_string(thresholds::kLevelsMin));
+        return;
+      }
       if (left.kind == MisfitKind::kFunction && !left.depends_on.empty()) {
         next(left.depends_on.front(), "a further level of " + left.depends_on.front());
       } else {

@@ -99,7 +99,7 @@ class Reader {
 
  private:
   void read_section(const TomlNode& section) {
-    const std::vector<std::string> names{"variator", "friction", "driveline", "effects"};
+    const std::vector<std::string> names{"variator", "friction", "driveline", "effects", "learned"};
     if (section.type != TomlType::kTable) {
       errors_.add(section.line, section.key, section.found(), "a section");
     } else if (section.key == "variator") {
@@ -110,9 +110,14 @@ class Reader {
       read_numbers(section, kDriveline, model_.driveline);
     } else if (section.key == "effects") {
       for (const TomlNode& effect : section.children) read_effect(effect);
+    } else if (section.key == "learned") {
+      for (const TomlNode& term : section.children) {
+        read_learned(term, model_.learned[term.key] = {}, errors_);
+      }
     } else {
       errors_.add(section.line, section.key, "an unknown section",
-                  "variator, friction, driveline or effects.ID" + nearest_hint(section.key, names));
+                  "variator, friction, driveline, effects.ID or learned.NAME" +
+                      nearest_hint(section.key, names));
     }
   }
 
@@ -230,6 +235,14 @@ std::string model_text(const ModelFile& model) {
     section(("effects." + id).c_str(), effect.parameters);
     if (!effect.role.empty()) out += "role = \"" + effect.role + "\"\n";
   }
+  for (const auto& [name, learned] : model.learned) out += learned_text(name, learned);
+  return out;
+}
+
+std::vector<estimator::LearnedTerm> learned_terms(const ModelFile& model) {
+  std::vector<estimator::LearnedTerm> out;
+  out.reserve(model.learned.size());
+  for (const auto& [name, learned] : model.learned) out.push_back(term_of(learned));
   return out;
 }
 
@@ -240,7 +253,7 @@ MachineEffects machine_effects(const ModelFile& model) {
     if (effect == model.effects.end()) continue;
     const auto found = effect->second.parameters.find(std::string(row.parameter));
     if (found == effect->second.parameters.end()) continue;
-    double MachineEffects::*const value = value_of(row, effect->second.role);
+    double MachineEffects::* const value = value_of(row, effect->second.role);
     if (value != nullptr) out.*value += found->second;
   }
   return out;

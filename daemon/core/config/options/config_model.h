@@ -1,6 +1,6 @@
 // The model file: what the simulation believes of the machine, and the effects switched on. TOML:
-// [variator] as in the configuration, [friction], [driveline], [effects.ID]. Start-up and tools
-// only.
+// [variator] as in the configuration, [friction], [driveline], [effects.ID], [learned.NAME].
+// Start-up and tools only.
 #pragma once
 
 #include <map>
@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "daemon/core/config/options/config_learned.h"
 #include "daemon/core/config/options/option.h"
 #include "daemon/core/config/toml/config_text.h"
 #include "estimator/physics/machine_effects.h"
@@ -26,6 +27,7 @@ struct ModelFile {
   std::map<std::string, double> friction;   // what the file gives of [friction]
   std::map<std::string, double> driveline;  // and of [driveline]
   std::map<std::string, ModelEffect> effects;
+  std::map<std::string, ModelLearned> learned;
   std::vector<std::string> variator_keys;  // what the file gives of [variator]
   std::vector<std::string> comments;       // written at the top, one line each; not read
 };
@@ -46,6 +48,9 @@ ModelFile read_model(const std::string& path, const ModelFile& base,
                      FileKind kind = FileKind::kAny);
 ModelFile parse_model(const std::string& text, const std::string& name, const ModelFile& base);
 std::string model_text(const ModelFile& model);
+
+// What was learned, without its names.
+std::vector<estimator::LearnedTerm> learned_terms(const ModelFile& model);
 
 // The effects as plain values.
 estimator::MachineEffects machine_effects(const ModelFile& model);

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "estimator/physics/learned_term.h"
 #include "estimator/physics/machine_effects.h"
 #include "tools/diagnose/model/variator_model.h"
 
@@ -70,6 +71,7 @@ std::vector<Slot> make_slots(const std::vector<ExperimentData>& runs);
 struct Effects {
   const std::vector<Slot>* slots = nullptr;
   Eigen::VectorXd value;
+  std::span<const estimator::LearnedTerm> learned, learned_too;  // what has no slot
 };
 
 }  // namespace beltgrip::diagnose

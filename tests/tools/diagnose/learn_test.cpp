@@ -1,0 +1,52 @@
+// What decides whether a learned function is kept, from tests given by hand.
+#include "tools/diagnose/decide/learn.h"
+
+#include <gtest/gtest.h>
+
+namespace beltgrip::diagnose {
+namespace {
+
+Criticism tests(std::vector<JudgedTest> all) {
+  Criticism out;
+  out.tests = std::move(all);
+  return out;
+}
+
+TEST(ExcessLeft, IsThatOfTheTestThatKeepsMost) {
+  const Criticism before =
+      tests({{"law_cell", 135.0, 35.0}, {"line", 10.0, 5.0}, {"whiteness", 1.0, 9.0}});
+  // 20 of 100 and 3 of 5 are left; what passed before does not count, and no test heals another.
+  EXPECT_DOUBLE_EQ(
+      excess_left(before,
+                  tests({{"law_cell", 55.0, 35.0}, {"line", 8.0, 5.0}, {"whiteness", 99.0, 9.0}})),
+      0.6);
+  EXPECT_DOUBLE_EQ(
+      excess_left(before,
+                  tests({{"law_cell", 0.0, 35.0}, {"line", 5.0, 5.0}, {"whiteness", 1.0, 9.0}})),
+      0.0);
+  EXPECT_DOUBLE_EQ(excess_left(before, before), 1.0);
+}
+
+// What failed by a hundredth of its limit and does so still does not stand against the rest.
+TEST(ExcessLeft, ATrifleIsNotAll) {
+  const Criticism before = tests({{"law_cell", 135.0, 35.0}, {"line", 5.05, 5.0}});
+  const Criticism after = tests({{"law_cell", 10.0, 35.0}, {"line", 5.05, 5.0}});
+  EXPECT_NEAR(excess_left(before, after), 0.04, 1e-9);
+}
+
+TEST(ExcessLeft, IsNoneWhereNothingFailed) {
+  const Criticism fine = tests({{"law_cell", 3.0, 35.0}});
+  EXPECT_EQ(excess_left(fine, tests({{"law_cell", 99.0, 35.0}})), 0.0);
+}
+
+// Nothing fails: nothing is learned, whatever the cells look like.
+TEST(Learn, ANeedlessFunctionIsNotLookedFor) {
+  Engine engine{Campaign{}};
+  const Criticism fine = tests({{"law_cell", 3.0, 35.0}, {"smooth_cell", 3.0, 35.0}});
+  const Learning learning = learn(engine, fine, false, [] { return false; });
+  EXPECT_TRUE(learning.terms.empty());
+  EXPECT_TRUE(learning.needs_levels.empty());
+}
+
+}  // namespace
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,70 @@
+// Torques before and behind the belt: their powers are compared where the shafts turn steadily
+// alone.
+#include "tools/diagnose/decide/plausibility.h"
+
+#include <gtest/gtest.h>
+
+namespace beltgrip::diagnose {
+namespace {
+
+constexpr int kSamples = 300;
+
+// Drives at 100 rad/s with 50 Nm against 20 Nm at 220 rad/s. Of every three samples two are sped up
+// by acceleration, where the torque behind the belt has what the inertia there makes of it.
+ExperimentData run_with(double acceleration_rad_s2, double behind_there_Nm) {
+  ExperimentData run;
+  run.name = "run1";
+  run.t_s = Eigen::ArrayXd::LinSpaced(kSamples, 0.0, 0.1 * (kSamples - 1));
+  run.valid.assign(kSamples, true);
+  run.valid_count = kSamples;
+  const auto constant = [](double value) {
+    return Eigen::ArrayXd(Eigen::ArrayXd::Constant(kSamples, value));
+  };
+  run.omega_p.value = constant(100.0);
+  run.omega_s.value = constant(220.0);
+  run.omega_p.slow_slope = constant(0.0);
+  run.torque.value = constant(50.0);
+  run.torque_s.value = constant(20.0);
+  run.torque_s.present = true;
+  for (int k = 0; k < kSamples; ++k) {
+    run.torque.value[k] += 0.1 * (k % 7);  // noise: neither channel stands still
+    run.torque_s.value[k] += 0.05 * (k % 5);
+    if (k % 3 == 0) continue;
+    run.omega_p.slow_slope[k] = acceleration_rad_s2;
+    run.torque_s.value[k] = behind_there_Nm;
+  }
+  return run;
+}
+
+std::string doubt_of(const ExperimentData& run) {
+  Doubts doubts;
+  check_torques({run}, doubts);
+  EXPECT_EQ(doubts.impossible.has_value(), !doubts.notes.empty());
+  return doubts.notes.empty() ? "" : doubts.notes.front();
+}
+
+TEST(CheckTorques, AgreeingTorquesRaiseNoDoubt) { EXPECT_EQ(doubt_of(run_with(0.0, 20.0)), ""); }
+
+TEST(CheckTorques, WhatSpeedingUpTakesIsNoContradiction) {
+  for (const double acceleration : {5.0, 20.0, -20.0}) {
+    EXPECT_EQ(doubt_of(run_with(acceleration, -60.0)), "") << acceleration;
+    EXPECT_EQ(doubt_of(run_with(acceleration, 200.0)), "") << acceleration;
+  }
+}
+
+TEST(CheckTorques, AtSteadySpeedItIs) {
+  for (const double acceleration : {0.0, 4.9, -4.9}) {
+    EXPECT_NE(doubt_of(run_with(acceleration, -60.0)).find("opposite sign"), std::string::npos);
+    EXPECT_NE(doubt_of(run_with(acceleration, 200.0)).find("power at the secondary shaft"),
+              std::string::npos);
+  }
+}
+
+TEST(CheckTorques, ATorqueThatIsNotRecordedSaysNothing) {
+  ExperimentData run = run_with(0.0, -60.0);
+  run.torque_s.present = false;
+  EXPECT_EQ(doubt_of(run), "");
+}
+
+}  // namespace
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,159 @@
+#include "tools/diagnose/decide/learn.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string_view>
+
+#include "tools/diagnose/decide/thresholds.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+using thresholds::kLearnedBound;
+
+bool scatter_fails(const Criticism& criticism) {
+  return std::any_of(criticism.tests.begin(), criticism.tests.end(), [](const JudgedTest& each) {
+    return !each.passed() && each.name.find("scatter") != std::string::npos;
+  });
+}
+
+bool stands_out(const Cell& cell, const Criticism& failed) {
+  using namespace thresholds;
+  if (cell.smooth_gain > failed.test("smooth_cell").limit) return true;
+  if (cell.law_gain > failed.test("law_cell").limit && cell.smooth_gain > kSmoothBeside) {
+    return true;
+  }
+  return scatter_fails(failed) && cell.gain() > kCellBesideScatter;
+}
+
+// The cells to try, the best first. What follows something that no model file can name, far better,
+// is none of them.
+std::vector<const Cell*> candidates(const Criticism& failed, Learning& out) {
+  std::vector<const Cell*> tried;
+  for (const Cell& cell : failed.cells) {
+    if (tried.size() >= thresholds::kTermsTried) break;
+    if (cell.gain() < thresholds::kNearBest * failed.cells.front().gain()) break;
+    if (!cell.abscissa.variable->learnable || !stands_out(cell, failed)) continue;
+    if (cell.abscissa.levels < thresholds::kLevelsMin) {
+      if (tried.empty() && out.needs_levels.empty()) {
+        out.needs_levels = cell.abscissa.variable->name;
+      }
+      continue;
+    }
+    // At each variable the point that explains most.
+    const bool again = std::any_of(tried.begin(), tried.end(), [&](const Cell* other) {
+      return other->abscissa.variable == cell.abscissa.variable;
+    });
+    if (!again) tried.push_back(&cell);
+  }
+  return tried;
+}
+
+bool is_possible(const LearnedFit& fit) {
+  const auto point = static_cast<std::size_t>(fit.cell.injection->injection);
+  const double most = *std::max_element(
+      fit.term.value.begin(), fit.term.value.begin() + static_cast<std::ptrdiff_t>(fit.term.count),
+      [](double a, double b) { return std::abs(a) < std::abs(b); });
+  return std::abs(most) < kLearnedBound[point];
+}
+
+std::vector<std::string> aliases_of(const Campaign& campaign, const Criticism& failed,
+                                    const Cell& best) {
+  std::vector<std::string> out;
+  for (const Cell& each : failed.cells) {
+    if (&each == &best || each.gain() < best.gain() - 2.0 * thresholds::kSameNats) continue;
+    out.push_back(std::string(each.injection->acts_on) + " over " +
+                  role_of(campaign, *each.abscissa.variable));
+  }
+  // Without the torque behind the belt nothing tells these from friction.
+  if (!campaign.has_balance && best.injection->injection == Injection::kFriction) {
+    for (const Injection same : {Injection::kTorqueGain, Injection::kClampForce}) {
+      out.push_back(std::string(estimator::kLearnedPoints[static_cast<std::size_t>(same)]) +
+                    " over " + role_of(campaign, *best.abscissa.variable));
+    }
+  }
+  return out;
+}
+
+struct Trial {
+  Engine engine;
+  Learned learned;
+  Criticism after;
+  double excess = 0.0;
+};
+
+// Nothing where the function is not kept.
+std::optional<Trial> tried(const Engine& engine, const Criticism& before, const Cell& cell,
+                           bool coarse) {
+  Trial out{engine, {}, {}, 0.0};
+  out.learned.fit = fit_learned(out.engine, *cell.injection, cell.abscissa);
+  const LearnedFit& fit = out.learned.fit;
+  if (fit.left_out_gain < thresholds::kLeftOutLevels || !is_possible(fit)) return {};
+  out.after = criticise(out.engine, coarse);
+  out.excess = excess_left(before, out.after);
+  if (out.excess > 1.0 - thresholds::kHealed) return {};
+  out.learned.aliases = aliases_of(engine.campaign(), before, cell);
+  return out;
+}
+
+}  // namespace
+
+std::string role_of(const Campaign& campaign, const IndexVariable& variable) {
+  if (std::string_view(variable.name) != "torque") return variable.name;
+  const auto used = std::find_if(campaign.runs.begin(), campaign.runs.end(),
+                                 [](const ExperimentData& run) { return run.valid_count > 0; });
+  return used != campaign.runs.end() && used->torque_is_engine ? "engine_torque" : "primary_torque";
+}
+
+std::vector<LawEvidence> possible_laws(const LearnedFit& fit) {
+  std::vector<LawEvidence> out = fit.laws;
+  std::sort(out.begin(), out.end(), [](const LawEvidence& a, const LawEvidence& b) {
+    return a.log_evidence > b.log_evidence;
+  });
+  if (out.empty()) return out;
+  const double least = out.front().log_evidence - thresholds::kSameNats;
+  std::erase_if(out, [&](const LawEvidence& each) { return each.log_evidence < least; });
+  return out;
+}
+
+const LawEvidence* named_law(const LearnedFit& fit, const std::vector<LawEvidence>& possible) {
+  const bool stands = possible.size() == 1 &&
+                      possible.front().left_out_gain >= fit.left_out_gain - thresholds::kLawWorse;
+  return stands ? &possible.front() : nullptr;
+}
+
+double excess_left(const Criticism& before, const Criticism& after) {
+  double most = 0.0;
+  for (const JudgedTest& each : before.tests) {
+    if (each.passed()) continue;
+    const JudgedTest& now = after.test(each.name);
+    // What hardly failed is healed by chance, or not.
+    const double failed_by = std::max(each.value - each.limit, thresholds::kTrifle * each.limit);
+    most = std::max(most, (now.value - now.limit) / failed_by);
+  }
+  return most;
+}
+
+Learning learn(Engine& engine, const Criticism& failed, bool coarse,
+               const std::function<bool()>& stop) {
+  Learning out;
+  out.left = failed;
+  for (std::size_t round = 0; round < thresholds::kTermsMax && !out.left.passed(); ++round) {
+    const Criticism before = out.left;
+    std::optional<Trial> best;
+    for (const Cell* cell : candidates(before, out)) {
+      if (stop()) return out;
+      std::optional<Trial> trial = tried(engine, before, *cell, coarse);
+      if (trial && (!best || trial->excess < best->excess)) best = std::move(trial);
+      if (best && best->after.passed()) break;
+    }
+    if (!best) break;
+    out.terms.push_back(std::move(best->learned));
+    out.left = std::move(best->after);
+    engine = std::move(best->engine);
+  }
+  return out;
+}
+
+}  // namespace beltgrip::diagnose

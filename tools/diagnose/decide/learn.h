@@ -1,0 +1,43 @@
+// Causes that have no name: where the tests of the residuals fail and no effect fits, a function of
+// a recorded variable is learned, and kept only where it is what heals them.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tools/diagnose/decide/criticism.h"
+#include "tools/diagnose/infer/learned_fit.h"
+
+namespace beltgrip::diagnose {
+
+struct Learned {
+  LearnedFit fit;
+  // Other cells, as "acts_on over role", that these data cannot tell from it.
+  std::vector<std::string> aliases;
+};
+
+struct Learning {
+  std::vector<Learned> terms;  // the engine's state has them, in this order
+  Criticism left;              // of the state with them
+  // What a cause seems to follow, which was set at too few levels to learn anything; empty: none.
+  std::string needs_levels;
+};
+
+// The role of a model file that an index variable is; the torque is the one that is recorded.
+std::string role_of(const Campaign& campaign, const IndexVariable& variable);
+
+// failed: of the engine's present state. What is not kept leaves no trace in the engine.
+Learning learn(Engine& engine, const Criticism& failed, bool coarse,
+               const std::function<bool()>& stop);
+
+// Laws within odds of 20 to 1 of the best, that first.
+std::vector<LawEvidence> possible_laws(const LearnedFit& fit);
+// The one law that stands alone and predicts levels left out as well as the free function; null:
+// none does.
+const LawEvidence* named_law(const LearnedFit& fit, const std::vector<LawEvidence>& possible);
+
+// Share of the failed tests' excess over their limits that is left, of the one that keeps most.
+double excess_left(const Criticism& before, const Criticism& after);
+
+}  // namespace beltgrip::diagnose
