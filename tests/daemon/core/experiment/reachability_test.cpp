@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace beltgrip::daemon {
@@ -207,6 +208,81 @@ TEST(Reachability, ThereIsLessRoomAtAHigherSpeed) {
   ASSERT_GT(crossing.slip_rate_1_s, 0.0);
   EXPECT_LT(peak_slip_max(crossing, SlipLimits{}, 25.0, 170.0, 0.0784),
             peak_slip_max(crossing, SlipLimits{}, 25.0, 130.0, 0.0784));
+}
+
+// Three slip rates, each with a steep and a flat top, with and without a silence; the excursions
+// are those held against the integration above.
+Crossing chosen(const RampPoint& p, const Reaction& r) {
+  Crossing best;
+  for (const double rate : {0.03, 0.025, 0.02}) {
+    Crossing tried;
+    for (const double silence_s : {0.0, std::max(r.stale_s, r.timeout_s)}) {
+      const double fall = silence_s > 0.0 ? p.fall_at_fault : p.fall;
+      for (const Excursion& each : {excursion(p, r, rate, fall, 0.003, silence_s + r.cycle_s),
+                                    excursion(p, r, rate, 0.05, 0.008, silence_s + r.cycle_s)}) {
+        tried.dearest.slip = std::max(tried.dearest.slip, each.slip);
+        tried.dearest.time_s = std::max(tried.dearest.time_s, each.time_s);
+        tried.dearest.area_s = std::max(tried.dearest.area_s, each.area_s);
+      }
+    }
+    tried.slip_rate_1_s = rate;
+    // Of the force that is missing at the top, w seconds' worth a second.
+    const double peak_N = p.torque_Nm * p.wedge_cosine / (2.0 * p.primary_radius_m * p.mu_expected);
+    const double w = p.torque_Nm * 1.05 / (p.inertia_kg_m2 * p.omega_p_rad_s);
+    tried.ramp_top_N_per_s = rate / w * peak_N / (r.dead_time_s + r.lag_s);
+    tried.peak_slip_max =
+        peak_slip_max(tried, {}, p.torque_Nm, p.omega_p_rad_s, p.primary_radius_m);
+    if (tried.peak_slip_max > p.peak_slip && tried.peak_slip_max > best.peak_slip_max) best = tried;
+  }
+  return best;
+}
+
+TEST(Reachability, TheSearchTakesTheRateWithMostRoom) {
+  int found = 0, none = 0;
+  double rates[3] = {};
+  for (const double torque : {8.0, 15.0, 25.0, 35.0, 45.0}) {
+    for (const double omega : {100.0, 140.0, 200.0, 300.0}) {
+      for (const double lag : {0.02, 0.1, 0.2}) {
+        for (const double at_fault : {0.1, 0.4}) {
+          RampPoint p = point(torque, omega);
+          p.fall_at_fault = at_fault;
+          Reaction r = reaction(lag);
+          r.stale_s = 0.04 + lag;  // longer or shorter than the time-out
+          CrossingSearch search(p, r, SlipLimits{});
+          int steps = 1;
+          while (!search.step()) ++steps;
+          EXPECT_EQ(steps, 12);
+          const Crossing wanted = chosen(p, r);
+          for (int i = 0; i < 2; ++i) {  // once done, it stays as it is
+            const Crossing& crossing = search.crossing();
+            EXPECT_EQ(crossing.slip_rate_1_s, wanted.slip_rate_1_s);
+            EXPECT_NEAR(crossing.ramp_top_N_per_s, wanted.ramp_top_N_per_s,
+                        1e-9 * wanted.ramp_top_N_per_s);
+            EXPECT_DOUBLE_EQ(crossing.peak_slip_max, wanted.peak_slip_max);
+            EXPECT_DOUBLE_EQ(crossing.dearest.area_s, wanted.dearest.area_s);
+            EXPECT_TRUE(search.step());
+          }
+          ++(wanted.slip_rate_1_s > 0.0 ? found : none);
+          for (const double rate : {0.03, 0.025, 0.02}) {
+            rates[std::lround(200.0 * rate) - 4] += wanted.slip_rate_1_s == rate ? 1.0 : 0.0;
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(found, 20);
+  EXPECT_GT(none, 5);
+  EXPECT_GT(rates[0] + rates[1], 0.0);
+  EXPECT_GT(rates[2], 0.0);
+}
+
+TEST(Reachability, WhatIsNotCaughtIsTooMuchInEveryRespect) {
+  RampPoint weak = point(50.0);
+  weak.own_force_N = 0.5 * peak_force_N(weak, weak.mu_least);
+  const Excursion lost = excursion(weak, reaction(0.1), 0.025, 0.8, 0.003, 0.06);
+  EXPECT_GT(lost.slip, 1e3);
+  EXPECT_GT(lost.time_s, 1e3);
+  EXPECT_GT(lost.area_s, 1e3);
 }
 
 }  // namespace
