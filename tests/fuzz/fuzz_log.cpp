@@ -70,14 +70,19 @@ std::vector<Frame> read(const MemoryFile& file, LogStats& stats) {
   return frames;
 }
 
-// The log with a blank before each line, where it begins like a candump log.
+// The log with a blank before each line, where every line begins as in a candump log: in others a
+// blank may mean something.
 std::string shifted(std::string_view log) {
   constexpr std::size_t kLongest = 30000;  // far from what is too long for a line
-  if (!log.starts_with('(') || log.size() > kLongest) return {};
-  std::string shifted = " ";
-  for (const char c : log) {
-    shifted += c;
-    if (c == '\n') shifted += ' ';
+  // The magic number of zstd begins with a bracket too.
+  if (log.size() > kLongest || log.starts_with("\x28\xB5")) return {};
+  std::string shifted;
+  while (!log.empty()) {
+    if (log[0] != '(') return {};
+    const std::size_t length = std::min(log.find('\n'), log.size() - 1) + 1;
+    shifted += ' ';
+    shifted += log.substr(0, length);
+    log.remove_prefix(length);
   }
   return shifted;
 }
