@@ -32,6 +32,7 @@ const std::array kLayers{
     LayerRule{"tools/sim/",
               {"can_dbc/", "estimator/physics/variator_geometry.h",
                "estimator/physics/parameters.h", "estimator/physics/machine_effects.h",
+               "estimator/physics/learned_term.h", "estimator/physics/learned_effects.h",
                "daemon/core/base/port.h", "daemon/core/base/mono_time.h", "tools/sim/"}},
     LayerRule{"tools/", {"can_dbc/", "estimator/", "daemon/", "tools/"}},
     LayerRule{"tests/", {"can_dbc/", "estimator/", "daemon/", "tools/", "tests/"}},

@@ -30,7 +30,7 @@ void take(const std::map<std::string, double>& section, const char* key, double&
 
 // What the model says replaces what the scenario has; what it does not say stays.
 void lay(const MachineEffects& model, MachineEffects& machine) {
-  const auto one = [&](double MachineEffects::*value) {
+  const auto one = [&](double MachineEffects::* value) {
     if (value != nullptr && model.*value != 0.0) machine.*value = model.*value;
   };
   for (const estimator::EffectRow& row : estimator::effect_rows()) {
@@ -63,6 +63,7 @@ void apply_model(const std::string& path, sim::RigScenario& scenario) {
   MachineEffects whole = daemon::whole_machine(rest);
   whole.centrifugal_N_s2 += model.variator.secondary_centrifugal_N_s2;
   lay(whole, scenario.effects);
+  scenario.learned = daemon::learned_terms(model);
 }
 
 void apply_model(const std::string& path, sim::VehicleScenario& scenario) {
@@ -93,6 +94,7 @@ void apply_model(const std::string& path, sim::VehicleScenario& scenario) {
   rest.driveline.erase("deformation_per_kN");
   rest.driveline.erase("loss_constant_Nm");
   lay(daemon::whole_machine(rest), scenario.effects);
+  scenario.learned = daemon::learned_terms(model);
 }
 
 }  // namespace beltgrip::cli

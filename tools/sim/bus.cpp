@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "can_dbc/text/unit_text.h"
+#include "tools/sim/learned_conditions.h"
 
 namespace beltgrip::sim {
 
@@ -17,7 +18,7 @@ constexpr std::string_view kCounterSuffix = "Counter", kCrcSuffix = "Crc";
 struct ChannelRow {
   std::string_view signal;  // name in the DBC
   double (*value)(const Signals&);
-  ChannelError SensorParameters::*error = nullptr;
+  ChannelError SensorParameters::* error = nullptr;
   bool noise_only = false;  // of that error
 };
 const ChannelRow kChannels[] = {
@@ -81,6 +82,7 @@ Bus::Bus(const can::Database& dbc, const BusStyle& style, const World& world, st
       step_s_(world.step_s),
       frame_delay_s_(world.sensors.frame_delay_s),
       frame_jitter_s_(world.sensors.frame_jitter_s) {
+  learned_ = world.learned;
   SensorParameters sensors = world.sensors;
   sensors.add(world.effects);
   add_channels(sensors, seed);
@@ -93,7 +95,13 @@ Bus::Bus(const can::Database& dbc, const BusStyle& style, const World& world, st
 
 void Bus::add_channels(const SensorParameters& sensors, std::uint64_t seed) {
   for (const ChannelRow& row : kChannels) {
-    Channel channel{std::string(row.signal), row.value, {}, 0.0, nullptr, Random(seed, row.signal)};
+    Channel channel{std::string(row.signal),
+                    row.value,
+                    {},
+                    0.0,
+                    nullptr,
+                    row.error == &SensorParameters::torque && !row.noise_only,
+                    Random(seed, row.signal)};
     if (row.noise_only) {
       channel.error.noise = (sensors.*row.error).noise;
     } else if (row.error != nullptr) {
@@ -175,6 +183,9 @@ double Bus::measure(Channel& channel, const FaultScript& faults, double t_s) {
   if (const FaultStep* fault = active(FaultKind::kSignalDelay)) delay_s += fault->size;
   const Signals& then = before(delay_s);
   double value = channel.value(then) * (1.0 + channel.error.gain);
+  if (channel.is_torque) {
+    value *= 1.0 + learned_at(learned_, estimator::LearnedPoint::kTorqueGain, conditions(then));
+  }
   if (channel.ripple != 0.0) value *= 1.0 + channel.ripple * std::sin(then.*channel.angle);
   value += channel.error.bias;
   // Drawn even where it is not used: a fault leaves the noise of the others as it is.

@@ -42,7 +42,8 @@ class Bus {
     double (*value)(const Signals&) = nullptr;
     ChannelError error;
     double ripple = 0.0;
-    double Signals::*angle = nullptr;
+    double Signals::* angle = nullptr;
+    bool is_torque = false;  // of the driving shaft
     Random random;
     double sent = 0.0;  // last value before faults
     double frozen = 0.0;
@@ -90,6 +91,7 @@ class Bus {
   std::size_t now_ = 0;
   bool begun_ = false;
   std::vector<Channel> channels_;
+  std::vector<estimator::LearnedTerm> learned_;
   std::pair<std::size_t, std::size_t> speeds_;  // channels of primary and secondary speed
   std::vector<Message> messages_;
   Random jitter_;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tools/sim/friction_factor.h"
+#include "tools/sim/learned_conditions.h"
 
 namespace beltgrip::sim {
 
@@ -52,7 +53,8 @@ double RigSimulation::pressure_Pa(double clamp_force_N) const {
 
 // Between the torque flange and the belt.
 double RigSimulation::loss_Nm(double acceleration_rad_s2) const {
-  const estimator::MachineEffects& e = scenario_.effects;
+  const estimator::MachineEffects e =
+      with_learned(scenario_.effects, scenario_.learned, conditions(signals_));
   return e.loss_constant_Nm + e.loss_per_kN_Nm * 1e-3 * belt_force_N_ +
          e.loss_per_rad_s_Nm * plant_.state().omega_p_rad_s + e.inertia_kg_m2 * acceleration_rad_s2;
 }
@@ -60,8 +62,11 @@ double RigSimulation::loss_Nm(double acceleration_rad_s2) const {
 // What else acts on force, ratio and friction, from the state before this step.
 void RigSimulation::act(bool begin) {
   constexpr double kCreepMax = 0.2;
-  const estimator::MachineEffects& e = scenario_.effects;
-  belt_force_N_ = clamping_.step(clamp_force_N_, signals_.omega_s_rad_s);
+  const estimator::LearnedConditions now = conditions(signals_);
+  const estimator::MachineEffects e = with_learned(scenario_.effects, scenario_.learned, now);
+  // The spring of the effects is in already.
+  belt_force_N_ = std::max(1.0, clamping_.step(clamp_force_N_, signals_.omega_s_rad_s) +
+                                    e.spring_N - scenario_.effects.spring_N);
   if (begin) reference_force_N_ = belt_force_N_;
   const double kN = 1e-3 * belt_force_N_;
   const bool low = scenario_.variator.ratio < 1.0;
@@ -75,7 +80,8 @@ void RigSimulation::act(bool begin) {
                        std::exp(low ? crept_ : -crept_);
   friction_factor_ =
       friction_factor(e, {signals_.oil_degC, signals_.omega_p_rad_s, belt_force_N_, low ? 1.0 : 0.0,
-                          seconds(), slip_energy_kJ_, scenario_.experiment});
+                          seconds(), slip_energy_kJ_, scenario_.experiment}) *
+      (1.0 + learned_at(scenario_.learned, estimator::LearnedPoint::kFriction, now));
   plant_.set_factors(ratio, friction_factor_);
 }
 

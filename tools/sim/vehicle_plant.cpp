@@ -54,6 +54,7 @@ VehiclePlant::VehiclePlant(const VehicleScenario& scenario)
     : variator_(scenario.variator),
       belt_(scenario.belt),
       effects_(scenario.effects),
+      learned_(scenario.learned),
       experiment_(scenario.experiment),
       body_(scenario.body),
       engine_inertia_kg_m2_(scenario.engine.inertia_kg_m2),
@@ -109,11 +110,15 @@ VehiclePlant::Held VehiclePlant::hold(const DrivelineInput& input) const {
       std::max(0.2, 1.0 + belt_.speed_per_ln * std::log(speed)) *
       std::pow(force, -belt_.load_exponent) *
       friction_factor(effects_, {input.oil_degC, state_.omega_p_rad_s, input.secondary_force_N,
-                                 low_share, input.time_s, input.slip_energy_kJ, experiment_});
+                                 low_share, input.time_s, input.slip_energy_kJ, experiment_}) *
+      (1.0 + learned_at(learned_, estimator::LearnedPoint::kFriction, input.conditions));
   const double kN = 1e-3 * input.secondary_force_N;
   const double end_stop =
       low_share * effects_.end_stop_low + (1.0 - low_share) * effects_.end_stop_overdrive;
-  held.ratio = state_.ratio * (1.0 + end_stop) * std::exp(low_share > 0.5 ? crept_ : -crept_) *
+  const double learned_ratio =
+      learned_at(learned_, estimator::LearnedPoint::kRatio, input.conditions);
+  held.ratio = state_.ratio * (1.0 + end_stop) * (1.0 + learned_ratio) *
+               std::exp(low_share > 0.5 ? crept_ : -crept_) *
                (1.0 - variator_.deformation_per_N * input.secondary_force_N -
                 effects_.deformation_per_kN * kN - effects_.deformation_per_kN2 * kN * kN -
                 (variator_.deformation_per_Nm + effects_.tilt_per_Nm) * output_.belt_torque_Nm);
@@ -155,7 +160,8 @@ VehiclePlant::Rates VehiclePlant::rates(const std::array<double, 3>& omega,
   const double loss =
       variator_.primary_loss_Nm + effects_.loss_constant_Nm +
       (variator_.primary_loss_Nm_per_N + 1e-3 * effects_.loss_per_kN_Nm) * input.secondary_force_N +
-      effects_.loss_per_rad_s_Nm * omega[1];
+      effects_.loss_per_rad_s_Nm * omega[1] +
+      learned_at(learned_, estimator::LearnedPoint::kTorque, input.conditions);
   const double tp = std::tanh(omega[1] / kCoulombWidth_rad_s);
   const double ts = std::tanh(omega[2] / kCoulombWidth_rad_s);
   const double speed_per_omega = body_.wheel_radius_m / body_.final_drive;

@@ -15,6 +15,7 @@
 
 #include <array>
 
+#include "estimator/physics/learned_effects.h"
 #include "tools/sim/friction_curve.h"
 #include "tools/sim/vehicle_parameters.h"
 
@@ -37,6 +38,7 @@ struct DrivelineInput {
   double oil_degC = 80.0;
   double wear = 0.0;  // share of the friction that is gone
   double time_s = 0.0, slip_energy_kJ = 0.0;
+  estimator::LearnedConditions conditions;
 };
 
 struct DrivelineOutput {
@@ -94,6 +96,7 @@ class VehiclePlant {
   VariatorParameters variator_;
   BeltParameters belt_;
   estimator::MachineEffects effects_;
+  std::vector<estimator::LearnedTerm> learned_;
   int experiment_;
   VehicleBody body_;
   double engine_inertia_kg_m2_;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "tools/sim/learned_conditions.h"
+
 namespace beltgrip::sim {
 
 namespace {
@@ -93,11 +95,17 @@ void VehicleSimulation::step() {
   const DrivelineState& state = plant_.state();
   const VariatorParameters& v = scenario_.variator;
   DrivelineInput input;
+  input.conditions = conditions(signals_);
+  input.conditions.primary_speed_rad_s = state.omega_p_rad_s;
   const double model_force_N =
       v.secondary_piston_area_m2 * p_s + v.secondary_spring_force_N +
       v.secondary_centrifugal_N_s2 * state.omega_s_rad_s * state.omega_s_rad_s;
   input.secondary_force_N =
       clamping_.step(play_.step(model_force_N, hydraulics.friction_force_N), state.omega_s_rad_s);
+  input.secondary_force_N =
+      std::max(1.0, input.secondary_force_N + learned_at(scenario_.learned,
+                                                         estimator::LearnedPoint::kClampForce,
+                                                         input.conditions));
   input.primary_force_N = v.primary_piston_area_m2 * p_p +
                           v.primary_centrifugal_N_s2 * state.omega_p_rad_s * state.omega_p_rad_s;
   const FaultStep* torque_step = faults_.active(FaultKind::kTorqueStep, t_s);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/physics/learned_term.h"
 #include "estimator/physics/machine_effects.h"
 #include "tools/sim/fault_script.h"
 #include "tools/sim/friction_curve.h"
@@ -85,7 +86,8 @@ struct World {
   std::vector<FaultStep> faults;
   // What the machine has beyond the above; a model file says it. No controller knows.
   estimator::MachineEffects effects;
-  int experiment = 0;  // its place among several, for wear
+  std::vector<estimator::LearnedTerm> learned;  // the same, what has no name
+  int experiment = 0;                           // its place among several, for wear
 };
 
 }  // namespace beltgrip::sim

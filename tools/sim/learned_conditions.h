@@ -1,0 +1,14 @@
+// What learned functions depend on, as it is in the simulated machine. Simulation only.
+#pragma once
+
+#include "estimator/physics/learned_effects.h"
+#include "tools/sim/simulation.h"
+
+namespace beltgrip::sim {
+
+inline estimator::LearnedConditions conditions(const Signals& now) {
+  const double torque_Nm = now.torque_p_Nm != 0.0 ? now.torque_p_Nm : now.torque_e_Nm;
+  return {now.oil_degC, now.omega_p_rad_s, now.primary_pressure_Pa, torque_Nm};
+}
+
+}  // namespace beltgrip::sim
