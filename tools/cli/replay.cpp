@@ -32,6 +32,8 @@ struct Options {
   std::string method;
   std::string interface;
   bool join = false;
+  bool as_recorded = false;
+  bool decide_anew = false;
   unsigned jobs = 0;
   std::string json;
   bool resume = false;
@@ -40,6 +42,11 @@ struct Options {
   std::string log_out;
   std::string bus;
   double speed = 1.0;
+
+  AsRecorded whether_as_recorded() const {
+    if (decide_anew) return AsRecorded::kNever;
+    return as_recorded ? AsRecorded::kAlways : AsRecorded::kWherePresent;
+  }
 };
 
 struct Task {
@@ -51,7 +58,8 @@ struct Task {
 void run_task(Task& task, const Options& options, const daemon::Config& config,
               const ReplayOutputs& outputs) {
   try {
-    task.result = replay(task.paths, options.interface, config, outputs);
+    task.result =
+        replay(task.paths, options.interface, config, outputs, options.whether_as_recorded());
   } catch (const Failure& failure) {
     task.failure = failure;
   } catch (const std::exception& error) {
@@ -213,6 +221,22 @@ void play_logs(const Options& options) {
                static_cast<unsigned long long>(timeline->counters().frames));
 }
 
+void check_as_recorded(const Options& options, const daemon::Config& config) {
+  if (options.as_recorded && options.decide_anew) {
+    throw Failure{kUsage, "replay: --as-recorded and --decide-anew exclude each other"};
+  }
+  if (!options.as_recorded) return;
+  if (config.control != daemon::Control::kCommand) {
+    throw Failure{kUsage,
+                  "replay: --as-recorded follows clamp requests, expected experiment.control = "
+                  "\"command\" in " +
+                      options.config};
+  }
+  for (const std::string& log : options.logs) {
+    if (log == "-") throw Failure{kUsage, "replay: --as-recorded reads a log twice, not '-'"};
+  }
+}
+
 void run(const Options& options) {
   end_streams_when_stopped(options.logs);
   if (!options.bus.empty()) return play_logs(options);
@@ -228,6 +252,7 @@ void run(const Options& options) {
     throw Failure{kUsage, "replay: --resume goes log by log, expected --json FILE and no --join"};
   }
   const daemon::Config config = load_configuration(options.config, options.method);
+  check_as_recorded(options, config);
   std::optional<OutputFile> json, trace, log_out;
   std::optional<ResumedLines> resumed;
   Inputs inputs(options.logs);
@@ -281,6 +306,9 @@ void run(const Options& options) {
           if (exit_code == kDone) exit_code = task.failure->exit_code;
           return;
         }
+        if (!options.quiet) {
+          for (const std::string& note : task.result->notes) text::complain(note);
+        }
         for (const std::string& warning : task.result->warnings) {
           text::warn(warning);
         }
@@ -318,6 +346,10 @@ void add_replay(command_line::Command app) {
       .one_of({"robust", "paper"});
   command.add_option("--interface", options->interface, "Frames of this interface only")
       .type_name("INTERFACE");
+  command.add_flag("--as-recorded", options->as_recorded,
+                   "Follow the log's clamp requests (default where it has BeltGripClamp frames)");
+  command.add_flag("--decide-anew", options->decide_anew,
+                   "Do not: decide as a daemon of now would when to ask");
   command.add_flag("--join", options->join, "The logs are one timeline, not separate runs");
   command.add_option("--jobs", options->jobs, "Logs at the same time (default: all processors)")
       .range(1, 1024);

@@ -13,6 +13,7 @@
 #include "daemon/io/reloader.h"
 #include "estimator/method/possible_friction.h"
 #include "tools/cli/failure.h"
+#include "tools/cli/recorded_log.h"
 #include "tools/cli/table_hint.h"
 #include "tools/ports/log_timeline.h"
 #include "tools/ports/record_port.h"
@@ -186,11 +187,10 @@ std::string reason_text(estimator::StopReason reason) {
   return text::snake_case(daemon::stop_reason_name(reason));
 }
 
-std::unique_ptr<ports::LogTimeline> open_timeline(const std::vector<std::string>& paths,
-                                                  const std::string& interface,
-                                                  const daemon::FrameIdentifiers& own,
-                                                  const std::string& further_interface,
-                                                  std::vector<daemon::WantedFrames> wanted) {
+std::unique_ptr<ports::LogTimeline> open_timeline(
+    const std::vector<std::string>& paths, const std::string& interface,
+    const std::optional<daemon::FrameIdentifiers>& own, const std::string& further_interface,
+    std::vector<daemon::WantedFrames> wanted) {
   std::vector<std::unique_ptr<can::LogReader>> readers;
   for (const std::string& path : paths) {
     try {
@@ -203,9 +203,9 @@ std::unique_ptr<ports::LogTimeline> open_timeline(const std::vector<std::string>
   selection.interface = interface;
   selection.further_interface = further_interface;
   selection.wanted = std::move(wanted);
-  for (std::size_t i = 0; i < daemon::kOwnMessageCount; ++i) {
+  for (std::size_t i = 0; own && i < daemon::kOwnMessageCount; ++i) {
     selection.ignored.push_back(
-        {daemon::own_identifier(own, static_cast<daemon::OwnMessage>(i)), false});
+        {daemon::own_identifier(*own, static_cast<daemon::OwnMessage>(i)), false});
   }
   return std::make_unique<ports::LogTimeline>(std::move(readers), std::move(selection));
 }
@@ -296,6 +296,26 @@ ReplayResult replay_record(const std::string& path, const daemon::Config& config
   return result;
 }
 
+std::string followed_text(const RecordedLog& recorded) {
+  const std::string count = std::to_string(recorded.requests.size());
+  return "as recorded: experiments follow the " + count + " clamp requests of the log, " +
+         std::to_string(recorded.cut) + " more lack their beginning (--decide-anew follows none)";
+}
+
+// What to follow; nothing: the pipeline decides itself when to ask.
+std::optional<daemon::RecordedRequests> to_follow(const std::vector<std::string>& paths,
+                                                  const std::string& interface,
+                                                  const daemon::Config& config,
+                                                  AsRecorded as_recorded, ReplayResult& result) {
+  if (config.control != daemon::Control::kCommand || as_recorded == AsRecorded::kNever) return {};
+  std::optional<RecordedLog> recorded = recorded_requests(paths, interface, config);
+  if (!recorded && as_recorded == AsRecorded::kAlways) recorded.emplace();
+  if (!recorded) return {};
+  result.requests_followed = recorded->requests.size();
+  result.notes.push_back(result.log + ": " + followed_text(*recorded));
+  return daemon::RecordedRequests(std::move(recorded->requests));
+}
+
 }  // namespace
 
 void run_daemon(daemon::Port& port, const daemon::Config& config, ReplayResult& result,
@@ -305,7 +325,8 @@ void run_daemon(daemon::Port& port, const daemon::Config& config, ReplayResult& 
 }
 
 ReplayResult replay(const std::vector<std::string>& paths, const std::string& interface,
-                    const daemon::Config& config, const ReplayOutputs& outputs) {
+                    const daemon::Config& config, const ReplayOutputs& outputs,
+                    AsRecorded as_recorded) {
   ReplayResult result;
   result.log = joined(paths);
   const std::string further = further_interface(config);
@@ -334,7 +355,12 @@ ReplayResult replay(const std::vector<std::string>& paths, const std::string& in
   const can::LogStats head = timeline->stats();
   if (head.frames == 0 || port.empty()) throw no_frames(result, head, interface);
 
-  run_daemon(port, config, result, outputs);
+  if (auto recorded = to_follow(paths, interface, config, as_recorded, result)) {
+    daemon::Pipeline pipeline(config, *std::move(recorded));
+    run_pipeline(port, pipeline, config, estimator::StopReason::kTraceEnd, result, outputs);
+  } else {
+    run_daemon(port, config, result, outputs);
+  }
 
   const can::LogStats stats = timeline->stats();
   const ports::TimelineCounters& counters = timeline->counters();
@@ -464,7 +490,13 @@ std::string summary_line(const ReplayResult& result) {
       .field("lines_bad", result.lines_bad)
       .key("duration_s")
       .raw(text::seconds_text(result.duration_ns))
-      .end_object();
+      .key("requests_followed");
+  if (result.requests_followed) {
+    json.value(*result.requests_followed);
+  } else {
+    json.null();
+  }
+  json.end_object();
   return json.take() + "\n";
 }
 

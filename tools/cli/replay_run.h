@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,11 +26,14 @@ struct ReplayResult {
   std::vector<std::string> lost;     // with each: the roles that were lost as it ended; empty: none
   std::vector<std::string> assumed;  // keys that nobody stated and a result rests on
   std::vector<std::string> warnings;  // one line each
+  std::vector<std::string> notes;     // the same, of what is as it should be
   std::uint64_t frames = 0;           // in the log
   std::uint64_t frames_decoded = 0;
   std::uint64_t frames_bad = 0;
   std::uint64_t lines_bad = 0;
   std::int64_t duration_ns = 0;
+  // Clamp requests of the log that were followed; none: it was decided anew when to ask.
+  std::optional<std::size_t> requests_followed;
   std::string unusable;  // what was wrong with the inputs in the end; empty: nothing
   // How long each daemon::Inhibit kept an experiment from beginning while the driver's feet did
   // not, triggers "coast_down" and "steady".
@@ -43,20 +47,23 @@ struct ReplayOutputs {
   std::function<void(const ReplayResult&)> on_result;  // at each, then the last
 };
 
-// The logs as one timeline without BeltGrip's own frames; those of an interface named as the
-// further bus's are of that bus, all others of the first. wanted: FrameSelection. Throws
-// Failure 66.
-std::unique_ptr<ports::LogTimeline> open_timeline(const std::vector<std::string>& paths,
-                                                  const std::string& interface,
-                                                  const daemon::FrameIdentifiers& own,
-                                                  const std::string& further_interface = "",
-                                                  std::vector<daemon::WantedFrames> wanted = {});
+// The logs as one timeline, without BeltGrip's own frames where `own` is given; those of an
+// interface named as the further bus's are of that bus, all others of the first. wanted:
+// FrameSelection. Throws Failure 66.
+std::unique_ptr<ports::LogTimeline> open_timeline(
+    const std::vector<std::string>& paths, const std::string& interface,
+    const std::optional<daemon::FrameIdentifiers>& own, const std::string& further_interface = "",
+    std::vector<daemon::WantedFrames> wanted = {});
 // Empty where the configuration has one bus.
 std::string further_interface(const daemon::Config& config);
 
+// With control "command": whether it follows the clamp requests that the logs have.
+enum class AsRecorded : std::uint8_t { kWherePresent, kAlways, kNever };
+
 // Throws Failure: 66 a log is missing, 65 it has no readable frame.
 ReplayResult replay(const std::vector<std::string>& paths, const std::string& interface,
-                    const daemon::Config& config, const ReplayOutputs& outputs);
+                    const daemon::Config& config, const ReplayOutputs& outputs,
+                    AsRecorded as_recorded = AsRecorded::kWherePresent);
 
 // The daemon's loop on this port until it closes; the results go into `result`.
 void run_daemon(daemon::Port& port, const daemon::Config& config, ReplayResult& result,

@@ -250,12 +250,18 @@ std::optional<Role> ClampRequest::untrue_speed(const Now& now, double drift) con
   return std::nullopt;
 }
 
-void ClampRequest::lower(const Now& now, double floor_N) noexcept {
+// The force that the ramp has come to, not below the floor.
+double ClampRequest::lowered_N(const Now& now, double floor_N) noexcept {
   const double step_s = static_cast<double>(now.t - last_) * kSecondsPerTick;
   far_ = far_ && peak_is_far(law_, std::abs(now.mu_star), slip_.rate_1_s());
   const double wanted_N_per_s =
       far_ ? law_.rate_max_N_per_s
            : ramp_near_N_per_s(law_, std::abs(now.mu_star), slip_.rate_1_s());
+  return std::max(force_N_ - wanted_N_per_s * step_s, std::min(force_N_, floor_N + kFloorNoise_N));
+}
+
+void ClampRequest::go_to(const Now& now, double floor_N, double force_N) noexcept {
+  const double step_s = static_cast<double>(now.t - last_) * kSecondsPerTick;
   const double before_N = force_N_;
   const bool rode = rides_;
   rides_ = force_N_ <= floor_N + kFloorNoise_N;
@@ -263,25 +269,31 @@ void ClampRequest::lower(const Now& now, double floor_N) noexcept {
     rides_since_ = now.t;
     floor_first_N_ = floor_N;
   }
-  force_N_ =
-      std::max(force_N_ - wanted_N_per_s * step_s, std::min(force_N_, floor_N + kFloorNoise_N));
+  force_N_ = force_N;
   rate_N_per_s_ = step_s > 0.0 ? (before_N - force_N_) / step_s : 0.0;
   const Asked& before = asked(0);
-  if (now.t - before.t < kCoursePeriod) return;
-  const double over_s = static_cast<double>(now.t - before.t) * kSecondsPerTick;
-  asked_[asked_count_ % kAsked] = {now.t, force_N_, (before.force_N - force_N_) / over_s};
-  ++asked_count_;
+  if (now.t - before.t >= kCoursePeriod) {
+    const double over_s = static_cast<double>(now.t - before.t) * kSecondsPerTick;
+    asked_[asked_count_ % kAsked] = {now.t, force_N_, (before.force_N - force_N_) / over_s};
+    ++asked_count_;
+  }
+  last_ = now.t;
+  off_N_ = std::abs(now.clamp_force_N - force_N_);
+  if (off_N_ <= follow_band_N()) off_since_ = now.t;
+  followed_ = now.t - off_since_ <= kFollowTime;
 }
 
 void ClampRequest::step(const Now& now, double floor_N) noexcept {
   if (!standing_) return;
   follow_belt(now);
   if (!stop_) stop_ = judge(now, floor_N);
-  lower(now, floor_N);
-  last_ = now.t;
-  off_N_ = std::abs(now.clamp_force_N - force_N_);
-  if (off_N_ <= follow_band_N()) off_since_ = now.t;
-  followed_ = now.t - off_since_ <= kFollowTime;
+  go_to(now, floor_N, lowered_N(now, floor_N));
+}
+
+void ClampRequest::follow(const Now& now, double floor_N, double force_N) noexcept {
+  follow_belt(now);
+  if (!stop_) stop_ = judge(now, floor_N);
+  go_to(now, floor_N, force_N);
 }
 
 // A force that follows is behind by what the request fell within the actuator's answer.

@@ -68,6 +68,8 @@ class ClampRequest {
   void begin(const Now& now, const RequestPlan& plan, double floor_N) noexcept;
   // Every sample while it stands and the inputs are usable.
   void step(const Now& now, double floor_N) noexcept;
+  // Instead, where another has asked: its force.
+  void follow(const Now& now, double floor_N, double force_N) noexcept;
   // And while they are not: the force stays.
   void hold(MonoTime t) noexcept { last_ = t; }
   // Also without a request: the cool-down begins.
@@ -110,7 +112,8 @@ class ClampRequest {
   Stop judge_course(const Now& now) const noexcept;
   std::optional<Role> untrue_speed(const Now& now, double drift) const noexcept;
   void follow_belt(const Now& now) noexcept;
-  void lower(const Now& now, double floor_N) noexcept;
+  double lowered_N(const Now& now, double floor_N) noexcept;
+  void go_to(const Now& now, double floor_N, double force_N) noexcept;
   double answer_s() const noexcept {
     return settings_.actuator_dead_time_s + settings_.actuator_lag_s;
   }

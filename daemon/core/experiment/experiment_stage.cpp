@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "daemon/core/base/limits.h"
 #include "daemon/core/experiment/stop_of.h"
@@ -40,8 +41,12 @@ bool delays(const FaultSet& faults) noexcept {
 
 }  // namespace
 
-ExperimentStage::ExperimentStage(const Config& config)
-    : config_(config), arming_(config), request_(config) {}
+ExperimentStage::ExperimentStage(const Config& config, std::optional<RecordedRequests> recorded)
+    : config_(config),
+      arming_(config),
+      request_(config),
+      by_record_(recorded.has_value()),
+      recorded_(std::move(recorded).value_or(RecordedRequests({}))) {}
 
 bool ExperimentStage::runs() const noexcept { return in_experiment(state_); }
 
@@ -66,6 +71,7 @@ Conditions ExperimentStage::read_conditions(const InputMonitor& channels) const 
 bool ExperimentStage::arm(const Now& now, const KnownFriction& known,
                           double friction_as_read) noexcept {
   new_result_ = false;
+  if (by_record_) recorded_.step(now.t);
   const InputMonitor& channels = now.input.channels();
   if (by_conditions()) {
     conditions_ = read_conditions(channels);
@@ -88,11 +94,12 @@ bool ExperimentStage::arm(const Now& now, const KnownFriction& known,
       arming.watched = !commands() || state_ != State::kSettling || channels.standstill_shows();
       arming.conditions = conditions_;
       arming_.step(arming);
+      would_ask_ = arming_.triggered() && (would_ask_ || (arming_.settled() && arming_.cleared()));
     }
   }
   const bool announced_before = announced_.has_value();
-  const bool ready = commands() && by_conditions() && state_ == State::kSettling &&
-                     arming_.settled() && arming_.cleared();
+  const bool ready = asks() && by_conditions() && state_ == State::kSettling && arming_.settled() &&
+                     arming_.cleared();
   if (!ready) {
     announced_.reset();
   } else if (!announced_) {
@@ -217,7 +224,12 @@ RoleSet ExperimentStage::step_request(const Now& now) noexcept {
     withdraw(arming_.ended_by(conditions_));
     withdraw_for_bus(now);
     if (now.input.sample().usable && now.estimate.curve().usable) {
-      request_.step(request_now(now), arming_.floor_N(now.input.sample().omega_s_rad_s));
+      const double floor_N = arming_.floor_N(now.input.sample().omega_s_rad_s);
+      if (!by_record_) {
+        request_.step(request_now(now), floor_N);
+      } else if (follows_on()) {
+        request_.follow(request_now(now), floor_N, recorded_.force_N());
+      }
       backup_stop_ = {request_.backup_stop(), request_.cause()};
       if (backup_stop_.reason == StopReason::kInputFrozen && backup_stop_.cause.role) {
         still.set(static_cast<std::size_t>(*backup_stop_.cause.role));
@@ -227,11 +239,55 @@ RoleSet ExperimentStage::step_request(const Now& now) noexcept {
     } else {
       request_.hold(now.t);
     }
+    if (by_record_) go_by_record(now.estimate.curve(), still);
   }
   if (state_ == State::kReleasing && !refused_) judge_release(now, still);
   clamp_refused_ = false;
   return still;
 }
+
+// --- the request of a record ------------------------------------------------------------------
+
+// The request of the experiment under way stands in the record, still.
+bool ExperimentStage::follows_on() const noexcept { return recorded_.standing() == followed_; }
+
+// The record says when the request ends, and why. What is judged here lends its words where it
+// comes to the same.
+void ExperimentStage::go_by_record(const estimator::CurveEstimate& curve, RoleSet& still) noexcept {
+  // A controller withdraws its permission for what the driver does, and that is then seen first.
+  Conditions permitted = conditions_;
+  permitted.permitted = true;
+  const std::array<Stop, 4> judged{stop_of(curve), withdrawn_, backup_stop_,
+                                   arming_.ended_by(permitted)};
+  backup_stop_ = withdrawn_ = {};
+  if (follows_on() || followed_->reason != StopReason::kInputFrozen) still.reset();
+  if (follows_on() || followed_->reason == StopReason::kNone) return;
+  Stop why{followed_->reason, {}};
+  for (const Stop& each : judged) {
+    if (each.reason != why.reason) continue;
+    why = each;
+    break;
+  }
+  (followed_->outcome == Outcome::kAborted ? withdrawn_ : backup_stop_) = why;
+}
+
+// It says when one begins, too. Where it has none, what would be refused is refused, but not what
+// would have been asked for: the log's daemon knew better.
+void ExperimentStage::guard_by_record(Guards& guards) const noexcept {
+  const bool begins = recorded_.begins() && recorded_.standing() != followed_;
+  guards.faulted = false;
+  guards.cooled = guards.cooled || recorded_.near();
+  if (state_ == State::kRamping) {
+    guards.triggered = follows_on();
+  } else if (!runs()) {
+    guards.triggered = guards.triggered || begins;
+    guards.settled =
+        begins || (guards.settled && !arming_.cleared() && !recorded_.near() && !would_ask_);
+    guards.cleared = begins;
+  }
+}
+
+// --- the request's force -----------------------------------------------------------------------
 
 // Does the force follow, and is it the force that does not, or its reading?
 void ExperimentStage::judge_following(const Now& now, RoleSet& still) noexcept {
@@ -286,7 +342,7 @@ Guards ExperimentStage::guards(const Now& now) const noexcept {
   guards.bus_up = now.input.buses().needed_up();
   guards.triggered = triggered(now);
   guards.settled = !by_conditions() || arming_.settled();
-  if (commands() && arming_.cleared()) {
+  if (asks() && arming_.cleared()) {
     guards.settled = guards.settled && announced_ && now.t - *announced_ >= limits::kAnnounced &&
                      now.inactive_told;
   }
@@ -304,6 +360,7 @@ Guards ExperimentStage::guards(const Now& now) const noexcept {
   }
   guards.cooled = request_.cooled();
   guards.faulted = forbids(now.faults);
+  if (by_record_) guard_by_record(guards);
   return guards;
 }
 
@@ -372,6 +429,7 @@ void ExperimentStage::start(const Now& now) noexcept {
   const VariatorSample& sample = now.input.sample();
   if (commands()) {
     request_.begin(request_now(now), arming_.plan(), arming_.floor_N(sample.omega_s_rad_s));
+    if (by_record_) followed_ = recorded_.standing();
   }
   own_force_N_ = now.estimate.measured_force_N();
   omega_s_start_rad_s_ = sample.omega_s_rad_s;

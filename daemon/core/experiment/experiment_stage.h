@@ -15,6 +15,7 @@
 #include "daemon/core/experiment/arming.h"
 #include "daemon/core/experiment/clamp_request.h"
 #include "daemon/core/experiment/experiment.h"
+#include "daemon/core/experiment/recorded_requests.h"
 #include "daemon/core/guard/safety_monitor.h"
 #include "daemon/core/input/input_stage.h"
 
@@ -24,8 +25,8 @@ using RoleSet = std::bitset<kRoleCount>;
 
 class ExperimentStage {
  public:
-  // config outlives it.
-  explicit ExperimentStage(const Config& config);
+  // config outlives it. recorded: it follows these requests and asks for nothing itself.
+  ExperimentStage(const Config& config, std::optional<RecordedRequests> recorded);
 
   // One sample, as the other stages have it.
   struct Now {
@@ -66,6 +67,8 @@ class ExperimentStage {
   State state() const noexcept { return state_; }
   bool runs() const noexcept;
   bool commands() const noexcept { return config_.control == Control::kCommand; }
+  // Clamp frames may leave at all.
+  bool asks() const noexcept { return commands() && !by_record_; }
   bool by_conditions() const noexcept {  // trigger "coast_down" or "steady"
     return config_.trigger == Trigger::kCoastDown || config_.trigger == Trigger::kSteady;
   }
@@ -102,6 +105,9 @@ class ExperimentStage {
   void withdraw_for_bus(const Now& now) noexcept;
   void judge_following(const Now& now, RoleSet& still) noexcept;
   void judge_release(const Now& now, RoleSet& still) noexcept;
+  bool follows_on() const noexcept;
+  void go_by_record(const estimator::CurveEstimate& curve, RoleSet& still) noexcept;
+  void guard_by_record(Guards& guards) const noexcept;
   Guards guards(const Now& now) const noexcept;
   Action apply(const Transition& transition, const Now& now) noexcept;
   void start(const Now& now) noexcept;
@@ -114,6 +120,10 @@ class ExperimentStage {
   const Config& config_;
   Arming arming_;
   ClampRequest request_;
+  bool by_record_;
+  RecordedRequests recorded_;
+  bool would_ask_ = false;                     // were it not for recorded_, since the trigger holds
+  const RecordedRequest* followed_ = nullptr;  // of recorded_: the last that an experiment took up
   Conditions conditions_;
   State state_ = State::kInhibited;
   bool macro_slip_stop_ = false;

@@ -78,7 +78,7 @@ double Pipeline::Parts::acting_force_N() const noexcept {
 // Its verdict holds for what leaves, whatever the experiment makes of it.
 void Pipeline::Parts::judge_safety(const ExperimentStage::Now& now) noexcept {
   permitted = false;
-  if (!experiment.commands()) return;
+  if (!experiment.asks()) return;
   const InputMonitor& channels = input.channels();
   const estimator::VariatorSample& sample = input.sample();
   SafetySignals signals;
@@ -176,7 +176,7 @@ Publication Pipeline::Parts::publication() const noexcept {
   const ExperimentResult& result = experiment.result();
   const double request_force_N = permitted_force_N();
   Publication now;
-  now.command = experiment.commands();
+  now.command = experiment.asks();
   now.clamp = {request_force_N > 0.0, request_force_N};
   now.in_experiment = experiment.runs();
   now.new_result = estimate_changed;

@@ -14,6 +14,7 @@
 #include "daemon/core/base/port.h"
 #include "daemon/core/config/options/config.h"
 #include "daemon/core/experiment/experiment.h"
+#include "daemon/core/experiment/recorded_requests.h"
 #include "daemon/core/input/input_monitor.h"
 #include "daemon/core/loop/sample_report.h"
 #include "estimator/belt/belt_history.h"
@@ -52,6 +53,9 @@ struct Pulse {
 class Pipeline {
  public:
   explicit Pipeline(const Config& config);
+  // Replay with control "command": experiments begin and end with the requests of the log. This one
+  // sends no clamp frame.
+  Pipeline(const Config& config, RecordedRequests recorded);
   ~Pipeline();
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;

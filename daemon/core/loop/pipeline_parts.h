@@ -13,7 +13,7 @@
 namespace beltgrip::daemon {
 
 struct Pipeline::Parts {
-  explicit Parts(const Config& config);
+  explicit Parts(const Config& config, std::optional<RecordedRequests> recorded = {});
 
   void go_on_from(const Parts& before, bool keeps_results) noexcept;
   ExperimentStage::Now now(MonoTime t) noexcept;

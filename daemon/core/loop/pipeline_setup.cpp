@@ -2,6 +2,7 @@
 #include "daemon/core/loop/pipeline_setup.h"
 
 #include <cmath>
+#include <utility>
 
 #include "daemon/core/loop/pipeline_parts.h"
 #include "estimator/physics/assumed_constants.h"
@@ -29,17 +30,19 @@ Config as_read(Config config) {
   return config;
 }
 
-Pipeline::Parts::Parts(const Config& given)
+Pipeline::Parts::Parts(const Config& given, std::optional<RecordedRequests> recorded)
     : config(as_read(given)),
       input(config),
       estimate(config),
       evaluation(config),
       known(config),
-      experiment(config),
+      experiment(config, std::move(recorded)),
       safety(safety_limits(config)),
       output(config, sample_period(config)) {}
 
 Pipeline::Pipeline(const Config& config) : parts_(std::make_unique<Parts>(config)) {}
+Pipeline::Pipeline(const Config& config, RecordedRequests recorded)
+    : parts_(std::make_unique<Parts>(config, std::move(recorded))) {}
 Pipeline::~Pipeline() = default;
 
 }  // namespace beltgrip::daemon
