@@ -42,6 +42,8 @@ void ClampRequest::step(const Now& now, double) noexcept {
   }
 }
 
+void ClampRequest::follow(const Now& now, double floor_N, double) noexcept { step(now, floor_N); }
+
 void ClampRequest::end(MonoTime t) noexcept {
   standing_ = false;
   ended_ = t;
