@@ -18,6 +18,7 @@
 #include "tools/ports/log_timeline.h"
 #include "tools/ports/record_port.h"
 #include "tools/ports/replay_port.h"
+#include "tools/reasons/reasons.h"
 #include "tools/text/json_writer.h"
 #include "tools/text/seconds.h"
 #include "tools/text/snake_case.h"
@@ -513,6 +514,19 @@ std::string inhibits_text(const ReplayResult& result) {
   return why;
 }
 
+// Of each of them what it means and what to do, as tools/NO_RESULT.md has it.
+std::string inhibit_words(const ReplayResult& result) {
+  std::string text;
+  for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
+    if (result.inhibited_s[i] < kShownInhibit_s) continue;
+    const daemon::Named<daemon::Inhibit>& inhibit = daemon::kInhibits[i];
+    const reasons::Words& words = reasons::words_of(inhibit.value);
+    text += "    " + std::string(inhibit.name) + ": " + std::string(words.means) +
+            "; to do: " + std::string(words.remedy) + "\n";
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string no_experiment(const ReplayResult& result) {
@@ -559,6 +573,7 @@ std::string end_text(const ReplayResult& result) {
   } else if (!why.empty()) {
     out += "  neither pedal pressed, and no experiment for: " + why + "\n";
   }
+  out += inhibit_words(result);
   if (!result.assumed.empty()) {
     out += "  assumed, as the configuration leaves them out: ";
     for (const std::string& key : result.assumed) {

@@ -204,6 +204,17 @@ TEST_F(ReplayAsRecorded, AsksForNothingItself) {
   EXPECT_GT(clamp_frames("--decide-anew"), 1000);
 }
 
+// What stood in the way is told in the words of tools/NO_RESULT.md.
+TEST_F(ReplayAsRecorded, TheEndTellsWhatEachInhibitMeansAndWhatToDo) {
+  const RunResult run =
+      replay({path("twice/trace.log"), "--config", path("twice/resting.toml"), "--decide-anew"});
+  EXPECT_NE(
+      run.out.find("    cool-down: too little time or distance since the last request; to do: "
+                   "wait: `cooldown_s`, `cooldown_m`\n"),
+      std::string::npos)
+      << run.out;
+}
+
 TEST_F(ReplayAsRecorded, WhatDoesNotFitIsSaid) {
   const std::string log = path("twice/trace.log"), config = path("twice/beltgrip.toml");
   EXPECT_EQ(replay({log, "--config", config, "--as-recorded", "--decide-anew"}).status, 64);
