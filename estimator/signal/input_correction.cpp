@@ -40,7 +40,7 @@ double InputCorrection::Delay::step(double value) noexcept {
 }
 
 InputCorrection::InputCorrection(const MachineEffects& effects, const VariatorParameters& variator,
-                                 double sample_rate_hz)
+                                 double sample_rate_hz, std::span<const LearnedTerm> learned)
     : effects_(effects),
       variator_(variator),
       rate_hz_(sample_rate_hz),
@@ -51,7 +51,13 @@ InputCorrection::InputCorrection(const MachineEffects& effects, const VariatorPa
       delays_{Delay(latency_s_ - effects.primary_speed_delay_s, sample_rate_hz),
               Delay(latency_s_ - effects.secondary_speed_delay_s, sample_rate_hz),
               Delay(latency_s_ - effects.pressure_delay_s + effects.lag_delay_s, sample_rate_hz),
-              Delay(latency_s_ - effects.torque_delay_s, sample_rate_hz)} {}
+              Delay(latency_s_ - effects.torque_delay_s, sample_rate_hz)} {
+  const auto is_friction = [](const LearnedTerm& each) {
+    return each.point == LearnedPoint::kFriction;
+  };
+  learned_.assign(learned.begin(), learned.end());
+  learned_.erase(std::remove_if(learned_.begin(), learned_.end(), is_friction), learned_.end());
+}
 
 void InputCorrection::begin(const VariatorSample& measured) noexcept {
   delays_[0].reset(measured.omega_p_rad_s);
@@ -63,15 +69,21 @@ void InputCorrection::begin(const VariatorSample& measured) noexcept {
   acceleration_ = 0.0;
 }
 
-const VariatorSample& InputCorrection::correct(const VariatorSample& measured) noexcept {
+const VariatorSample& InputCorrection::correct(const VariatorSample& measured,
+                                               LearnedConditions now) noexcept {
   out_ = measured;
   force_error_N_ = 0.0;
-  if (!measured.usable) {
+  now.primary_speed_rad_s = measured.omega_p_rad_s;
+  now.torque_Nm = measured.torque_Nm;
+  for (const LearnedTerm& each : learned_) {
+    out_.usable = out_.usable && each.covers(condition(now, each.variable));
+  }
+  if (!out_.usable) {
     started_ = false;
     return out_;
   }
   if (!started_) begin(measured);
-  const MachineEffects& e = effects_;
+  const MachineEffects e = with_learned(effects_, learned_, now);
 
   const double omega_p = delays_[0].step(measured.omega_p_rad_s) / (1.0 + e.primary_speed_scale);
   const double omega_s = delays_[1].step(measured.omega_s_rad_s) / (1.0 + e.secondary_speed_scale);

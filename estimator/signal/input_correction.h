@@ -6,13 +6,18 @@
 //   p     = such that A p + spring + c w_s^2 is the force on the belt: offset, gain, lag, further
 //           forces and the play of the cylinder counted
 //   w_s   = such that w_s / (w_p r_g0) is 1 - slip: scales, end stop, deformation and tilt counted
+// What was learned without a name is one of these, as large as its function says at the moment.
+// Beyond the box in which a function was learned there is no corrected sample: it is not usable.
+// What changes the friction is no error of the inputs.
 // A channel that comes late makes all others wait for it: the corrected sample is as old as the
 // largest delay of the model (latency_s), and so is every decision on it.
 #pragma once
 
 #include <array>
+#include <span>
 #include <vector>
 
+#include "estimator/physics/learned_effects.h"
 #include "estimator/physics/machine_effects.h"
 #include "estimator/physics/parameters.h"
 #include "estimator/physics/variator_sample.h"
@@ -22,9 +27,11 @@ namespace beltgrip::estimator {
 class InputCorrection {
  public:
   InputCorrection(const MachineEffects& effects, const VariatorParameters& variator,
-                  double sample_rate_hz);
+                  double sample_rate_hz, std::span<const LearnedTerm> learned = {});
   // Unusable samples pass as they are and begin the histories anew.
-  const VariatorSample& correct(const VariatorSample& measured) noexcept;
+  // now: what the sample does not tell of what functions depend on.
+  const VariatorSample& correct(const VariatorSample& measured,
+                                LearnedConditions now = {}) noexcept;
   // Force on the belt less the force as measured, at the last sample: what a force in the
   // transmission's own measure lacks.
   double force_error_N() const noexcept { return force_error_N_; }
@@ -47,6 +54,7 @@ class InputCorrection {
   void begin(const VariatorSample& measured) noexcept;
 
   MachineEffects effects_;
+  std::vector<LearnedTerm> learned_;  // none of the friction
   VariatorParameters variator_;
   double rate_hz_;
   double keep_;  // of the lag, per sample

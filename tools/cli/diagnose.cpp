@@ -72,6 +72,7 @@ std::vector<daemon::ExperimentResult> estimate(const std::string& path,
 daemon::Config told(daemon::Config config, const daemon::ModelFile& model) {
   config.variator = model.variator;
   config.corrected = daemon::whole_machine(model);
+  config.learned = daemon::learned_terms(model);
   return config;
 }
 

@@ -16,7 +16,9 @@ class EstimateStage {
 
   // only_watches: no experiment runs. What would have stopped it (a ratio that is no end stop's,
   // torque that changes its sign) then starts the method afresh.
-  void step(const estimator::VariatorSample& sample, bool only_watches) noexcept;
+  // now: what a learned function depends on beside the sample.
+  void step(const estimator::VariatorSample& sample, const estimator::LearnedConditions& now,
+            bool only_watches) noexcept;
   void reset() noexcept { method_->reset(); }  // the curve of the last sample stays
   // Once per sample after the last step of an experiment, until it returns true: then peak().
   bool conclude() noexcept { return method_->conclude(); }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace beltgrip::daemon {
 
@@ -61,6 +62,19 @@ Stop InputStage::lost(MonoTime t) const noexcept {
   if (const Stop gone = monitor_.lost(t)) return gone;
   if (samples_lost_) return {StopReason::kInputs, {.what = "samples were taken too late"}};
   return {};
+}
+
+estimator::LearnedConditions InputStage::learned_conditions() const noexcept {
+  const double unknown = std::numeric_limits<double>::quiet_NaN();
+  const auto newest = [&](Role role) {
+    bool fresh = true;
+    const double value = monitor_.value_or(role, unknown, fresh);
+    return fresh ? value : unknown;
+  };
+  estimator::LearnedConditions out;
+  out.oil_temperature_degC = newest(Role::kOilTemperature);
+  out.primary_pressure_Pa = newest(Role::kPrimaryPressure);
+  return out;
 }
 
 bool InputStage::starved(MonoTime t) const noexcept {

@@ -11,6 +11,7 @@
 #include "daemon/core/input/bus_watch.h"
 #include "daemon/core/input/input_monitor.h"
 #include "daemon/core/input/sampler.h"
+#include "estimator/physics/learned_effects.h"
 
 namespace beltgrip::daemon {
 
@@ -42,6 +43,8 @@ class InputStage {
   const InputMonitor& channels() const noexcept { return monitor_; }
   const BusWatch& buses() const noexcept { return buses_; }
   const estimator::VariatorSample& sample() const noexcept { return sampler_.newest(); }
+  // What a learned function depends on beside the sample.
+  estimator::LearnedConditions learned_conditions() const noexcept;
   bool samples_lost() const noexcept { return samples_lost_; }  // before this one
   // A required channel is lost, or samples are.
   bool any_lost() const noexcept { return samples_lost_ || monitor_.any_lost(); }

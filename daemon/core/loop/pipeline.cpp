@@ -128,7 +128,7 @@ const SampleReport& Pipeline::on_sample(MonoTime t, Outbox& outbox) noexcept {
     parts.output.announce();
   }
   parts.take_action(parts.experiment.begin(now));
-  parts.estimate.step(sample, !parts.experiment.runs());
+  parts.estimate.step(sample, parts.input.learned_conditions(), !parts.experiment.runs());
   parts.experiment.count(now);
   if (const RoleSet still = parts.experiment.step_request(now); still.any()) {
     for (std::size_t i = 0; i < kRoleCount; ++i) {

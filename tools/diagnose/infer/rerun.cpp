@@ -54,10 +54,22 @@ std::optional<daemon::ExperimentResult> estimate(const SignalTable& table, daemo
     readers.emplace_back(*channel);
   }
 
+  // What a learned function may depend on; only those need it.
+  const auto beside = [&](Role role) {
+    return table[role].t_s.size() < 2 ? std::nullopt : std::optional<Reader>(table[role]);
+  };
+  std::optional<Reader> oil = beside(Role::kOilTemperature);
+  std::optional<Reader> pressure_p = beside(Role::kPrimaryPressure);
+  const auto read_of = [](std::optional<Reader>& reader, double t_s) {
+    return reader ? reader->at(t_s).value_or(std::nan("")) : std::nan("");
+  };
+
   config.estimator.torque_is_engine = torque_is_engine;
   const double rate_hz = config.estimator.sample_rate_hz;
   std::optional<estimator::InputCorrection> correction;
-  if (config.corrected) correction.emplace(*config.corrected, config.variator, rate_hz);
+  if (config.corrected) {
+    correction.emplace(*config.corrected, config.variator, rate_hz, config.learned);
+  }
   const auto method =
       estimator::make_slip_curve_estimator(config.estimator, config.variator, config.sensors);
   method->reset();
@@ -78,8 +90,11 @@ std::optional<daemon::ExperimentResult> estimate(const SignalTable& table, daemo
     sample.omega_s_rad_s = value[1];
     sample.secondary_pressure_Pa = value[2];
     sample.torque_Nm = value[3];
+    estimator::LearnedConditions now;
+    now.oil_temperature_degC = read_of(oil, t_s);
+    now.primary_pressure_Pa = read_of(pressure_p, t_s);
     const estimator::CurveEstimate& curve =
-        method->step(correction ? correction->correct(sample) : sample);
+        method->step(correction ? correction->correct(sample, now) : sample);
     if (i == 0) out.start = sample.t_ns;
     out.end = sample.t_ns;
     out.stopped = curve.stop != estimator::StopReason::kNone;

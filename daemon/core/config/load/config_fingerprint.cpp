@@ -46,6 +46,14 @@ std::string config_fingerprint(const Config& config) {
               number_text((*config.corrected).*key.value) + ';';
     }
   }
+  for (const estimator::LearnedTerm& each : config.learned) {
+    text += "learned " + std::to_string(static_cast<int>(each.point)) + ' ' +
+            std::to_string(static_cast<int>(each.variable));
+    for (std::size_t i = 0; i < each.count; ++i) {
+      text += ' ' + number_text(each.knot[i]) + '=' + number_text(each.value[i]);
+    }
+    text += ';';
+  }
   for (const RoleBinding& role : config.roles) {
     if (!sensor_of(role.role)) continue;  // nothing is measured from it
     text += std::string(role_name(role.role)) + '=' + role.message_name + '.' + role.signal_name +

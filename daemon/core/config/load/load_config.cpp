@@ -269,6 +269,7 @@ void Loader::read_model_file() {
     config_.variator = model.variator;
     model_keys_ = model.variator_keys;
     config_.corrected = whole_machine(model);
+    config_.learned = learned_terms(model);
   } catch (const ModelError& error) {
     result_.errors.push_back({error.missing_file ? kNoInput : kConfiguration, error.text});
   }

@@ -15,6 +15,7 @@
 #include "can_dbc/text/unit_text.h"
 #include "daemon/core/base/own_identifiers.h"
 #include "estimator/physics/assumed_constants.h"
+#include "estimator/physics/learned_term.h"
 #include "estimator/physics/machine_effects.h"
 #include "estimator/physics/parameters.h"
 
@@ -145,6 +146,7 @@ struct Config {
   estimator::EstimatorSettings estimator;
   std::string model;                                   // path as in the file; empty: none
   std::optional<estimator::MachineEffects> corrected;  // what the model says to take out of inputs
+  std::vector<estimator::LearnedTerm> learned;         // the same, what has no name
   Trigger trigger = Trigger::kCoastDown;
   Control control = Control::kObserve;
   ExperimentSettings experiment;
