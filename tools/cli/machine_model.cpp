@@ -30,7 +30,7 @@ void take(const std::map<std::string, double>& section, const char* key, double&
 
 // What the model says replaces what the scenario has; what it does not say stays.
 void lay(const MachineEffects& model, MachineEffects& machine) {
-  const auto one = [&](double MachineEffects::* value) {
+  const auto one = [&](double MachineEffects::*value) {
     if (value != nullptr && model.*value != 0.0) machine.*value = model.*value;
   };
   for (const estimator::EffectRow& row : estimator::effect_rows()) {

@@ -18,7 +18,7 @@ constexpr std::string_view kCounterSuffix = "Counter", kCrcSuffix = "Crc";
 struct ChannelRow {
   std::string_view signal;  // name in the DBC
   double (*value)(const Signals&);
-  ChannelError SensorParameters::* error = nullptr;
+  ChannelError SensorParameters::*error = nullptr;
   bool noise_only = false;  // of that error
 };
 const ChannelRow kChannels[] = {

@@ -42,7 +42,7 @@ class Bus {
     double (*value)(const Signals&) = nullptr;
     ChannelError error;
     double ripple = 0.0;
-    double Signals::* angle = nullptr;
+    double Signals::*angle = nullptr;
     bool is_torque = false;  // of the driving shaft
     Random random;
     double sent = 0.0;  // last value before faults

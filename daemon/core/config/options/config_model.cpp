@@ -253,7 +253,7 @@ MachineEffects machine_effects(const ModelFile& model) {
     if (effect == model.effects.end()) continue;
     const auto found = effect->second.parameters.find(std::string(row.parameter));
     if (found == effect->second.parameters.end()) continue;
-    double MachineEffects::* const value = value_of(row, effect->second.role);
+    double MachineEffects::*const value = value_of(row, effect->second.role);
     if (value != nullptr) out.*value += found->second;
   }
   return out;
