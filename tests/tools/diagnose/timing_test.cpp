@@ -54,7 +54,7 @@ TEST(Timing, TheAccelerationOfALateSpeedIsLateToo) {
   }
   ASSERT_NE(late.sum(), 0.0);
   const auto largest = [&](const Eigen::VectorXd& effects) {
-    const Quantities q = evaluate(run, 0, variator, machine, {&slots, effects});
+    const Quantities q = evaluate(run, 0, variator, machine, {&slots, effects, {}, {}});
     double balance_Nm = 0.0, slip = 0.0;
     for (int k = 20; k + 20 < run.size(); ++k) {  // the ends have neighbours on one side only
       if (!run.valid[static_cast<std::size_t>(k)]) continue;

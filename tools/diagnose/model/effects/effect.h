@@ -71,7 +71,7 @@ std::vector<Slot> make_slots(const std::vector<ExperimentData>& runs);
 struct Effects {
   const std::vector<Slot>* slots = nullptr;
   Eigen::VectorXd value;
-  std::span<const estimator::LearnedTerm> learned = {}, learned_too = {};  // what has no slot
+  std::span<const estimator::LearnedTerm> learned, learned_too;  // what has no slot
 };
 
 }  // namespace beltgrip::diagnose
