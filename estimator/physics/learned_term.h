@@ -50,7 +50,7 @@ constexpr std::optional<LearnedVariable> learned_variable(std::string_view role)
 
 // Values at knots, straight in between; the box is from the first knot to the last.
 struct LearnedTerm {
-  static constexpr std::size_t kKnotsMax = 64;
+  static constexpr std::size_t kKnotsMax = 64;  // chosen: three times what diagnose writes
 
   LearnedPoint point = LearnedPoint::kFriction;
   LearnedVariable variable = LearnedVariable::kOilTemperature;

@@ -13,7 +13,7 @@ namespace beltgrip::diagnose {
 struct IndexVariable {
   const char* name;                                                    // the role, or what it is
   Eigen::ArrayXd (*value)(const ExperimentData& run, int experiment);  // empty: not recorded
-  std::optional<estimator::LearnedVariable> learnable = {};            // NOLINT: g++ asks for it
+  std::optional<estimator::LearnedVariable> learnable = std::nullopt;
 };
 
 std::span<const IndexVariable> index_variables();
