@@ -24,9 +24,11 @@
 #include "daemon/core/loop/loop.h"
 #include "daemon/core/loop/pipeline.h"
 #include "daemon/core/loop/reload.h"
+#include "daemon/core/observe/carried_window.h"
 #include "daemon/core/observe/event.h"
 #include "daemon/core/observe/observation.h"
 #include "daemon/io/bus_claim.h"
+#include "daemon/io/carried_keeper.h"
 #include "daemon/io/flight_recorder.h"
 #include "daemon/io/history_keeper.h"
 #include "daemon/io/housekeeper.h"
@@ -199,16 +201,19 @@ std::string pulse(const Observation& seen) {
 // All who look at each sample.
 class Sinks final : public SampleSink {
  public:
-  Sinks(EventSink& events, ObservationSink& observations)
-      : events_(events), observations_(observations) {}
+  Sinks(EventSink& events, ObservationSink& observations, bool commands, CarriedRing& carried)
+      : events_(events), observations_(observations), watch_(commands), carried_(carried) {}
   void on_report(const SampleReport& report) noexcept override {
     events_.on_report(report);
     observations_.on_report(report);
+    if (const CarriedWindow* window = watch_.step(report)) carried_.push(*window);
   }
 
  private:
   EventSink& events_;
   ObservationSink& observations_;
+  CarriedWatch watch_;
+  CarriedRing& carried_;
 };
 
 // The last lines of the log.
@@ -274,7 +279,8 @@ int run(const Arguments& arguments) {
   LoopMeters meters;
   LatestSlot<Observation> slot;
   ObservationSink observation_sink(pipeline, meters, slot);
-  Sinks sinks(event_sink, observation_sink);
+  CarriedRing carried_ring;
+  Sinks sinks(event_sink, observation_sink, config.control == Control::kCommand, carried_ring);
   std::unique_ptr<RecordRings> record_rings;
   std::unique_ptr<RecordTap> tap;
   if (!arguments.record.empty()) {
@@ -292,7 +298,8 @@ int run(const Arguments& arguments) {
     warning ? log.warning(line) : log.info(line);
   };
   std::unique_ptr<HistoryKeeper> history;
-  if (const std::string folder = state_folder(config, arguments.config); !folder.empty()) {
+  const std::string folder = state_folder(config, arguments.config);
+  if (!folder.empty()) {
     history = std::make_unique<HistoryKeeper>(folder, config_fingerprint(config), say, unix_time_s);
     const estimator::LearnedFriction learned = history->open();
     if (tap != nullptr) tap->learned(bus.port->now(), learned);
@@ -300,6 +307,7 @@ int run(const Arguments& arguments) {
   } else {
     log.info("no state directory: results are not kept");
   }
+  CarriedKeeper carried(folder, config, say);
   HistoryRings rings;
   ReloadSlot reload_slot;
   log.info(prepare_real_time());
@@ -316,16 +324,25 @@ int run(const Arguments& arguments) {
   Requests requests(request_fd, reloader, log, service);
   bool observed = false;
   MonoTime pulse_at = 0;
+  const auto take_carried = [&] {
+    CarriedWindow window;
+    while (carried_ring.pop(window)) carried.take(window, unix_time_s());
+    carried.turn(unix_time_s());
+  };
   const auto on_turn = [&] {
     const MonoTime now = steady_ns();
-    if (requests.turn(now) && history != nullptr) {
-      rings.learned.push(history->change_fingerprint(config_fingerprint(reloader.running())));
+    take_carried();
+    if (requests.turn(now)) {
+      carried.change(reloader.running());
+      if (history != nullptr) {
+        rings.learned.push(history->change_fingerprint(config_fingerprint(reloader.running())));
+      }
     }
     recorder_messages();
     observed = slot.take() || observed;
     const Observation* newest = observed ? &slot.latest() : nullptr;
     service.turn(now, newest);
-    status.turn(reloader.running(), now, newest);
+    status.turn(reloader.running(), now, newest, carried.bounds());
     if (newest == nullptr || now < pulse_at) return;
     log.debug(pulse(*newest));
     pulse_at = now + kSecond;
@@ -344,6 +361,7 @@ int run(const Arguments& arguments) {
                                      {.history = &rings, .reload = &reload_slot});
 
   housekeeper.stop();
+  take_carried();
   if (recorder != nullptr) recorder->stop();
   recorder_messages();
   service.stopping();

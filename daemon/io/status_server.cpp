@@ -15,6 +15,7 @@
 #include "daemon/core/experiment/arming.h"
 #include "daemon/core/observe/event.h"
 #include "daemon/core/publish/names.h"
+#include "daemon/io/carried_keeper.h"
 
 namespace beltgrip::daemon {
 
@@ -101,7 +102,8 @@ Json names(std::uint32_t bits, const std::array<Named<Enum>, kCount>& all) {
 
 }  // namespace
 
-std::string status_json(const Config& config, MonoTime now, const Observation& observation) {
+std::string status_json(const Config& config, MonoTime now, const Observation& observation,
+                        const CarriedBounds& carried) {
   const SampleReport& report = observation.report;
   const estimator::CurveEstimate& curve = report.curve;
   const bool usable = curve.usable && report.sample.usable;
@@ -120,6 +122,7 @@ std::string status_json(const Config& config, MonoTime now, const Observation& o
       {"faults", names(report.faults, kFaults)},
       {"inhibits", names(report.inhibits, kInhibits)},
       {"result", result(now, report.result)},
+      {"carried", carried_json(carried)},
       {"signals", signals(now, observation)},
       {"counters",
        {{"frames", observation.pipeline.frames},
@@ -164,13 +167,14 @@ StatusServer::~StatusServer() {
   if (!path_.empty()) unlink(path_.c_str());
 }
 
-void StatusServer::turn(const Config& config, MonoTime now, const Observation* newest) {
+void StatusServer::turn(const Config& config, MonoTime now, const Observation* newest,
+                        const CarriedBounds& carried) {
   if (socket_ < 0 || newest == nullptr) return;
   for (int answered = 0; answered < kWaitingMost; ++answered) {
     const int peer = accept4(socket_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (peer < 0) return;
     // It fits into the socket's buffer, or the reader gets what fits.
-    const std::string text = status_json(config, now, *newest);
+    const std::string text = status_json(config, now, *newest, carried);
     ::send(peer, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     close(peer);
   }

@@ -5,13 +5,15 @@
 #include <string>
 
 #include "daemon/core/config/options/config.h"
+#include "daemon/core/observe/carried_record.h"
 #include "daemon/core/observe/observation.h"
 
 namespace beltgrip::daemon {
 
 // Absent things are null; times in s, latencies in us, everything else in SI with the unit beside
 // it.
-std::string status_json(const Config& config, MonoTime now, const Observation& observation);
+std::string status_json(const Config& config, MonoTime now, const Observation& observation,
+                        const CarriedBounds& carried = {});
 
 class StatusServer {
  public:
@@ -21,7 +23,8 @@ class StatusServer {
   StatusServer(const StatusServer&) = delete;
   StatusServer& operator=(const StatusServer&) = delete;
   // Answers all who wait. newest is nullptr before the first sample: then they wait on.
-  void turn(const Config& config, MonoTime now, const Observation* newest);
+  void turn(const Config& config, MonoTime now, const Observation* newest,
+            const CarriedBounds& carried = {});
 
  private:
   std::string path_;

@@ -17,6 +17,12 @@ inline constexpr std::size_t kBeltGroups = 4;
 constexpr std::size_t belt_group(Direction direction, EndStop end_stop) noexcept {
   return (direction == Direction::kDrive ? 0U : 2U) + (end_stop == EndStop::kOverdrive ? 0U : 1U);
 }
+constexpr Direction direction_of(std::size_t group) noexcept {
+  return group < 2 ? Direction::kDrive : Direction::kOverrun;
+}
+constexpr EndStop end_stop_of(std::size_t group) noexcept {
+  return group % 2 == 0 ? EndStop::kOverdrive : EndStop::kLow;
+}
 
 struct BeltMemory {
   struct Value {

@@ -11,11 +11,14 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "daemon/core/publish/names.h"
+#include "daemon/io/carried_keeper.h"
 #include "daemon/io/history_db.h"
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"
@@ -63,9 +66,10 @@ struct History {
   std::string path;
   std::vector<HistoryRow> rows;
   std::int64_t damaged = 0;
-  std::string fingerprint;     // of the last row: its configuration is the one that counts
-  std::size_t comparable = 0;  // rows under it
-  std::vector<Group> groups;   // that hold a value
+  std::string fingerprint;          // of the last row: its configuration is the one that counts
+  std::size_t comparable = 0;       // rows under it
+  std::vector<Group> groups;        // that hold a value
+  daemon::CarriedBounds carried{};  // under it
 };
 
 // history.db in the folder, or in the only one of its folders that has one: the service gives each
@@ -101,6 +105,19 @@ std::string path_of(const Options& options) {
   return fs::is_directory(path, ignored) ? in_folder(path) : path;
 }
 
+// What was carried without slip, beside the history: under the configuration of its last
+// experiment, or the newest where there is none.
+daemon::CarriedBounds carried_beside(const History& history) {
+  const std::string beside = std::filesystem::path(history.path).parent_path().string();
+  const std::string folder = beside.empty() ? "." : beside;
+  const std::string fingerprint = history.rows.empty() ? "" : history.rows.back().fingerprint;
+  const auto found = daemon::read_carried(folder, fingerprint);
+  if (const auto* bounds = std::get_if<daemon::CarriedBounds>(&found)) return *bounds;
+  text::warn(folder + "/" + daemon::kCarriedFile + ": found no record of what was carried (" +
+             std::get<std::string>(found) + ")");
+  return {};
+}
+
 History read(const Options& options) {
   History history;
   history.path = path_of(options);
@@ -131,6 +148,7 @@ History read(const Options& options) {
   if (history.damaged > 0) {
     text::warn(history.path + ": " + std::to_string(history.damaged) + " rows damaged or missing");
   }
+  history.carried = carried_beside(history);
   return history;
 }
 
@@ -264,6 +282,12 @@ std::string json_lines(const History& history) {
     }
     out += json.end_object().take() + '\n';
   }
+  for (const auto& one : daemon::carried_json(history.carried)) {
+    nlohmann::ordered_json line{{"type", "carried"}};
+    line.update(one);
+    line["time_utc"] = one.at("time_s").is_number() ? utc(one.at("time_s").get<double>()) : "-";
+    out += line.dump() + '\n';
+  }
   json.begin_object().field("type", "summary").field("file", history.path);
   json.field("experiments", history.rows.size()).field("damaged", history.damaged);
   json.field("fingerprint", history.fingerprint).field("comparable", history.comparable);
@@ -298,8 +322,22 @@ std::string or_dash(double value, bool given, const char* pattern) {
   return given && std::isfinite(value) ? format(pattern, value) : "-";
 }
 
+std::string carried_lines(const History& history) {
+  std::string out;
+  for (std::size_t group = 0; group < history.carried.size(); ++group) {
+    const daemon::CarriedBound& bound = history.carried[group];
+    if (bound.known()) {
+      out += daemon::group_text(group) + ", " + utc(bound.time_s) + ": " +
+             daemon::carried_text(bound) + '\n';
+    } else if (bound.refused_mu_star > 0.0) {
+      out += daemon::group_text(group) + ": " + daemon::refused_text(bound) + '\n';
+    }
+  }
+  return out;
+}
+
 std::string table(const History& history) {
-  if (history.rows.empty()) return history.path + ": no experiment yet\n";
+  if (history.rows.empty()) return history.path + ": no experiment yet\n" + carried_lines(history);
   std::string out = format("%5s  %-20s  %-12s  %-11s  %-7s  %-9s  %8s  %7s  %6s  %5s  %4s  %s\n",
                            "id", "time (UTC)", "outcome", "stop", "torque", "ratio", "mu_max",
                            "std", "slip %", "Nm", "oil", "notes");
@@ -350,7 +388,7 @@ std::string table(const History& history) {
     out += format("%zu experiments under other configurations are not compared\n",
                   history.rows.size() - history.comparable);
   }
-  return out;
+  return out + carried_lines(history);
 }
 
 // A folder that is removed with what is in it.
@@ -415,7 +453,9 @@ void run(const Options& options) {
   History history = options.from.empty() ? read(options) : read_logs(options, exit_code);
   judge(history);
   // SQLite's files beside it belong to it.
-  Inputs inputs{options.config, history.path, history.path + "-wal", history.path + "-shm"};
+  Inputs inputs{
+      options.config, history.path, history.path + "-wal", history.path + "-shm",
+      (std::filesystem::path(history.path).parent_path() / daemon::kCarriedFile).string()};
   inputs.add(options.from);
   std::optional<OutputFile> json_file, csv_file;
   if (!options.json.empty()) json_file.emplace(options.json, inputs);

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "daemon/core/config/load/config_fingerprint.h"
+#include "daemon/io/carried_keeper.h"
 #include "daemon/io/history_keeper.h"
 #include "tools/cli/failure.h"
 #include "tools/cli/replay_run.h"
@@ -22,9 +23,25 @@ struct Dated {
   daemon::ExperimentResult result;
 };
 
-std::vector<Dated> results_of(const std::vector<std::string>& logs, const daemon::Config& config,
-                              std::vector<std::string>& unusable) {
-  std::vector<Dated> all;
+struct DatedWindow {
+  double time_s = 0.0;
+  daemon::CarriedWindow window;
+};
+
+struct Replayed {
+  std::vector<Dated> results;
+  std::vector<DatedWindow> carried;
+};
+
+// In the order of their times.
+void sort_by_time(auto& all) {
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& left, const auto& right) { return left.time_s < right.time_s; });
+}
+
+Replayed results_of(const std::vector<std::string>& logs, const daemon::Config& config,
+                    std::vector<std::string>& unusable) {
+  Replayed all;
   double undated_s = 0.0;  // where the undated logs so far have come to
   for (const std::string& log : logs) {
     ReplayResult replayed;
@@ -36,17 +53,22 @@ std::vector<Dated> results_of(const std::vector<std::string>& logs, const daemon
     }
     for (const std::string& warning : replayed.warnings) text::warn(warning);
     double last_s = undated_s;
+    const auto time_of = [&](daemon::MonoTime end) {
+      const double end_s = static_cast<double>(end) / double{daemon::kSecond};
+      if (end_s >= kEarliestDate_s) return end_s;
+      last_s = std::max(last_s, undated_s + end_s);
+      return undated_s + end_s;
+    };
     for (const daemon::ExperimentResult& result : replayed.experiments) {
-      const double end_s = static_cast<double>(result.end) / double{daemon::kSecond};
-      const bool dated = end_s >= kEarliestDate_s;
-      all.push_back({dated ? end_s : undated_s + end_s, result});
-      if (!dated) last_s = std::max(last_s, undated_s + end_s);
+      all.results.push_back({time_of(result.end), result});
+    }
+    for (const daemon::CarriedWindow& window : replayed.carried_windows) {
+      all.carried.push_back({time_of(window.end), window});
     }
     undated_s = last_s;
   }
-  std::stable_sort(all.begin(), all.end(), [](const Dated& left, const Dated& right) {
-    return left.time_s < right.time_s;
-  });
+  sort_by_time(all.results);
+  sort_by_time(all.carried);
   return all;
 }
 
@@ -68,22 +90,24 @@ std::vector<std::string> fill_history(const std::string& folder,
                                       const std::vector<std::string>& logs,
                                       const daemon::Config& config) {
   std::vector<std::string> unusable;
-  const std::vector<Dated> results = results_of(logs, config, unusable);
+  const Replayed replayed = results_of(logs, config, unusable);
+  const std::vector<Dated>& results = replayed.results;
   const std::string fingerprint = config_fingerprint(config);
   const std::set<double> kept = kept_in(folder, fingerprint);
   double now_s = 0.0;
-  daemon::HistoryKeeper keeper(
-      folder, fingerprint,
-      [](bool warning, const std::string& line) {
-        if (warning) text::warn(line);
-      },
-      [&] { return now_s; });
+  const auto say = [](bool warning, const std::string& line) {
+    if (warning) text::warn(line);
+  };
+  daemon::HistoryKeeper keeper(folder, fingerprint, say, [&] { return now_s; });
   keeper.open();
   for (const Dated& each : results) {
     if (kept.contains(each.time_s)) continue;
     now_s = each.time_s;
     keeper.take(each.result);
   }
+  daemon::CarriedKeeper carried(folder, config, say);
+  for (const DatedWindow& each : replayed.carried) carried.take(each.window, each.time_s);
+  if (!carried.write()) throw Failure{kCannotWrite, folder + ": what was carried is not written"};
   const std::set<double> now_kept = kept_in(folder, fingerprint);
   for (const Dated& each : results) {
     if (now_kept.contains(each.time_s)) continue;

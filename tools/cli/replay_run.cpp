@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 
@@ -10,6 +11,7 @@
 #include "daemon/core/loop/loop.h"
 #include "daemon/core/publish/names.h"
 #include "daemon/core/publish/own_frames.h"
+#include "daemon/io/carried_keeper.h"
 #include "daemon/io/reloader.h"
 #include "estimator/method/possible_friction.h"
 #include "tools/cli/failure.h"
@@ -40,7 +42,8 @@ class Sink final : public daemon::SampleSink {
         trace_(outputs.trace),
         also_(outputs.also),
         on_result_(outputs.on_result),
-        period_s_(1.0 / config.estimator.sample_rate_hz) {
+        period_s_(1.0 / config.estimator.sample_rate_hz),
+        watch_(config.control == daemon::Control::kCommand) {
     for (int phase = 0; phase < 4; ++phase) {
       phases_[phase] = daemon::phase_name(static_cast<estimator::Phase>(phase));
     }
@@ -57,6 +60,9 @@ class Sink final : public daemon::SampleSink {
       result_.experiments.push_back(report.result);
       result_.lost.push_back(lost_now());
       if (on_result_) on_result_(result_);
+    }
+    if (const daemon::CarriedWindow* window = watch_.step(report)) {
+      result_.carried_windows.push_back(*window);
     }
     count_inhibits(report, 1);
     if (also_ != nullptr) also_->on_report(report);
@@ -128,6 +134,7 @@ class Sink final : public daemon::SampleSink {
   daemon::SampleSink* also_;
   std::function<void(const ReplayResult&)> on_result_;
   double period_s_;
+  daemon::CarriedWatch watch_;
   std::string phases_[4];
   std::string row_;
 };
@@ -242,6 +249,11 @@ void run_pipeline(daemon::Port& port, daemon::Pipeline& pipeline, const daemon::
   result.frames_decoded = pipeline.counters().frames_decoded;
   result.frames_bad = pipeline.counters().frames_bad;
   result.unusable = why_unusable(pipeline, config);
+  daemon::CarriedRecord record(config);
+  for (const daemon::CarriedWindow& window : result.carried_windows) {
+    record.take(window, static_cast<double>(window.end) / double{daemon::kSecond});
+  }
+  result.carried = record.bounds();
 }
 
 // What the flight recorder wrote; 0: a log. It is read twice, which a pipe cannot be.
@@ -497,11 +509,27 @@ std::string summary_line(const ReplayResult& result) {
   } else {
     json.null();
   }
+  json.key("carried").raw(daemon::carried_json(result.carried).dump());
   json.end_object();
   return json.take() + "\n";
 }
 
 namespace {
+
+// What the belt carried without slip, a line for each direction and end stop.
+std::string carried_lines(const ReplayResult& result) {
+  std::string text;
+  for (std::size_t group = 0; group < result.carried.size(); ++group) {
+    const daemon::CarriedBound& bound = result.carried[group];
+    if (bound.known()) {
+      text += "  " + daemon::group_text(group) + format(", at %.1f s: ", bound.time_s) +
+              daemon::carried_text(bound) + "\n";
+    } else if (bound.refused_mu_star > 0.0) {
+      text += "  " + daemon::group_text(group) + ": " + daemon::refused_text(bound) + "\n";
+    }
+  }
+  return text;
+}
 
 // What kept experiments from beginning, and how long; empty: nothing for long.
 std::string inhibits_text(const ReplayResult& result) {
@@ -574,6 +602,7 @@ std::string end_text(const ReplayResult& result) {
     out += "  neither pedal pressed, and no experiment for: " + why + "\n";
   }
   out += inhibit_words(result);
+  out += carried_lines(result);
   if (!result.assumed.empty()) {
     out += "  assumed, as the configuration leaves them out: ";
     for (const std::string& key : result.assumed) {

@@ -16,6 +16,7 @@
 #include "daemon/core/experiment/arming.h"
 #include "daemon/core/loop/loop.h"
 #include "daemon/core/loop/pipeline.h"
+#include "daemon/core/observe/carried_record.h"
 #include "tools/ports/log_timeline.h"
 
 namespace beltgrip::cli {
@@ -35,6 +36,9 @@ struct ReplayResult {
   // Clamp requests of the log that were followed; none: it was decided anew when to ask.
   std::optional<std::size_t> requests_followed;
   std::string unusable;  // what was wrong with the inputs in the end; empty: nothing
+  // What was carried without slip.
+  std::vector<daemon::CarriedWindow> carried_windows;
+  daemon::CarriedBounds carried{};
   // How long each daemon::Inhibit kept an experiment from beginning while the driver's feet did
   // not, triggers "coast_down" and "steady".
   std::array<double, daemon::kInhibitCount> inhibited_s{};

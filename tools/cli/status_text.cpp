@@ -47,6 +47,22 @@ std::string result_text(const Json& result) {
   return outcome_text(result) + ", " + number(result.at("age_s"), "%.0f s ago");
 }
 
+// Of one direction and end stop, from "carried".
+std::string carried_text(const Json& one) {
+  if (!one.at("mu_max_lower_bound").is_number()) {
+    return "mu* " + number(one.at("impossible_mu_star"), "%.3f") +
+           " is read where the belt holds: more than any belt has";
+  }
+  std::string text = "mu_max at least " + number(one.at("mu_max_lower_bound"), "%.4f") +
+                     ", carried without slip at " + number(one.at("torque_Nm"), "%.0f Nm") + ", " +
+                     number(one.at("clamp_force_N"), "%.0f N");
+  if (const Json& share = one.at("reserve_share"); share.is_number()) {
+    text += "; of the force " + number(share.get<double>() * 100.0, "%.0f %%") +
+            " and more was reserve";
+  }
+  return text;
+}
+
 // A label's value between quotes.
 std::string quoted(const std::string& text) {
   std::string out = "\"";
@@ -98,6 +114,10 @@ std::string status_text(const Json& status) {
   line("faults", list(status.at("faults")));
   line("inhibits", list(status.at("inhibits")));
   line("last result", result_text(status.at("result")));
+  for (const auto& one : status.at("carried")) {
+    line(one.at("direction").get<std::string>() + ", " + one.at("ratio").get<std::string>(),
+         carried_text(one));
+  }
   for (const auto& [role, signal] : status.at("signals").items()) {
     line(role, number(signal.at("value"), "%.6g") + " " + signal.at("unit").get<std::string>() +
                    ", " + signal.at("quality").get<std::string>() + ", " +
@@ -136,6 +156,17 @@ std::string status_metrics(const Json& status, const std::string& interface) {
     metrics.head("result_age_seconds", "gauge", "Time since the last result");
     metrics.sample(result.at("age_s"));
   }
+  const auto carried = [&](const char* name, const char* key, const char* help) {
+    metrics.head(name, "gauge", help);
+    for (const auto& one : status.at("carried")) {
+      metrics.sample(one.at(key), "direction=" + quoted(one.at("direction").get<std::string>()) +
+                                      ",ratio=" + quoted(one.at("ratio").get<std::string>()));
+    }
+  };
+  carried("carried_mu_max_lower_bound", "mu_max_lower_bound",
+          "What mu_max is at least, as so much was carried without slip");
+  carried("carried_reserve_share", "reserve_share",
+          "Share of the clamping force that was reserve against it, at least");
   metrics.head("macro_slip_stop", "gauge", "1 while the flag is set");
   metrics.sample(status.at("macro_slip_stop").get<bool>() ? 1 : 0);
   metrics.head("state", "gauge", "1 for the state of the experiment");

@@ -8,9 +8,8 @@ namespace beltgrip::daemon {
 namespace {
 
 constexpr double kPedalReleased = 0.02;
-constexpr double kPedalMoved = 0.05;      // in an experiment: the driver wants something
-constexpr double kOilBand_K = 1.0;        // in an experiment: below what it may begin with
-constexpr double kRatioTolerance = 0.03;  // slip and deformation of a clamped belt stay below this
+constexpr double kPedalMoved = 0.05;  // in an experiment: the driver wants something
+constexpr double kOilBand_K = 1.0;    // in an experiment: below what it may begin with
 constexpr Duration kSampleLeast = kMillisecond;
 constexpr double kKnownMargin = 1.05;  // the belt may have run in since its last value
 constexpr double kPeakSlipOverdrive = 0.020;

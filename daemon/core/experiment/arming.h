@@ -105,6 +105,7 @@ class Arming {
   static constexpr Duration kPatience = 8 * kSecond;  // after kSettle
   static constexpr Duration kClearancePeriod = 100 * kMillisecond;
   static constexpr double kRatioDrift = 0.01;
+  static constexpr double kRatioTolerance = 0.03;  // a clamped belt slips and deforms by less
   static constexpr double kTorqueDrift = 0.25;
   static constexpr double kTorqueDrift_Nm = 4.0;
   // Of the way from own_percent to peak_percent: on a tanh curve the own force is then at 90 % of

@@ -77,6 +77,12 @@ estimator::LearnedConditions InputStage::learned_conditions() const noexcept {
   return out;
 }
 
+bool InputStage::torque_is_the_belts() const noexcept {
+  bool fresh = !any_lost() && !monitor_.suspect();
+  const bool closed = monitor_.value_or(Role::kLockupClosed, 1.0, fresh) > 0.5;
+  return fresh && closed;
+}
+
 bool InputStage::starved(MonoTime t) const noexcept {
   const Duration slowest = std::max(sampler_.delay().value_or(0), sample_period_);
   return t - last_usable_ > InputMonitor::stale_after(slowest);

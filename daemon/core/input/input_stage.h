@@ -43,11 +43,13 @@ class InputStage {
   const InputMonitor& channels() const noexcept { return monitor_; }
   const BusWatch& buses() const noexcept { return buses_; }
   const estimator::VariatorSample& sample() const noexcept { return sampler_.newest(); }
-  // What a learned function depends on beside the sample.
+  // What else is known of the machine: what a learned function depends on beside the sample.
   estimator::LearnedConditions learned_conditions() const noexcept;
   bool samples_lost() const noexcept { return samples_lost_; }  // before this one
   // A required channel is lost, or samples are.
   bool any_lost() const noexcept { return samples_lost_ || monitor_.any_lost(); }
+  // No input is in doubt, and the lock-up is closed, as far as a role says.
+  bool torque_is_the_belts() const noexcept;
   // Nothing, where no channel is lost and no sample: the caller may know more.
   Stop lost(MonoTime t) const noexcept;
   // Every input comes, but for as long as makes one stale no sample could be made of them: a

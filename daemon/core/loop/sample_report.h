@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "daemon/core/base/faults.h"
@@ -24,8 +25,11 @@ struct SampleReport {
   ExperimentResult result;               // the last one; outcome kNone before the first
   std::uint32_t faults = 0;              // fault_bit()s of faults.h
   std::uint32_t foreign_identifier = 0;  // the last one that a foreign sender used
-  std::optional<Role> frozen;    // with fault InputFrozen: which input it is, where that is known
-  std::uint32_t inhibits = 0;    // inhibit_bit()s of arming.h, triggers "coast_down" and "steady"
+  std::optional<Role> frozen;  // with fault InputFrozen: which input it is, where that is known
+  std::uint32_t inhibits = 0;  // inhibit_bit()s of arming.h, triggers "coast_down" and "steady"
+  // Every input is as it should be, and the lock-up closed, as far as a role says.
+  bool torque_is_the_belts = false;
+  double oil_degC = std::numeric_limits<double>::quiet_NaN();  // no number: not known
   double request_force_N = 0.0;  // as asked for with this sample; 0: no request stands
   double ramp_N_per_s = 0.0;     // of the request that stands
 };

@@ -116,6 +116,53 @@ TEST_F(History, FromLogs) {
   EXPECT_EQ(opened.db->read().rows.size(), 10U);
 }
 
+// What the belt carried, beside its experiments or without any: kept, and not counted twice.
+TEST_F(History, ShowsWhatWasCarriedWithoutSlip) {
+  const std::string drive = place.path("drive");
+  ASSERT_EQ(beltgrip({"simulate", "--scenario", "cruise-drive-torque", "--duration", "8",
+                      "--out-dir", drive})
+                .status,
+            0);
+  const auto carried = [&](const std::vector<std::string>& words) {
+    const RunResult result = beltgrip(words);
+    EXPECT_EQ(result.status, 0) << result.err;
+    std::istringstream in(result.out);
+    nlohmann::json found;
+    for (std::string line; std::getline(in, line);) {
+      const auto json = nlohmann::json::parse(line);
+      if (json.at("type") == "carried") found = json;
+    }
+    return found;
+  };
+  const std::string config = drive + "/beltgrip.toml";
+  const std::vector<std::string> fill{
+      "history", place.path("car"), "--from", drive + "/trace.log", "--config",
+      config,    "--json",          "-"};
+  const nlohmann::json first = carried(fill);
+  ASSERT_FALSE(first.is_null());
+  EXPECT_EQ(first.at("direction"), "drive");
+  EXPECT_EQ(first.at("ratio"), "overdrive");
+  EXPECT_GT(first.at("mu_max_lower_bound"), 0.03);
+  EXPECT_LT(first.at("mu_max_lower_bound"), 0.105) << "the simulated belt's mu_max";
+  EXPECT_GE(first.at("held_s"), 4.0);
+  EXPECT_EQ(carried(fill), first) << "the same log again";
+  const std::string file = place.read("car/carried.json");
+  EXPECT_EQ(carried({"history", place.path("car"), "--json", "-"}), first) << "kept";
+  const RunResult table = beltgrip({"history", place.path("car")});
+  EXPECT_NE(table.out.find("no experiment yet\ndrive, overdrive, "), std::string::npos)
+      << table.out;
+  EXPECT_NE(table.out.find("a lower bound, no value\n"), std::string::npos) << table.out;
+  // Its file is no place for an answer.
+  EXPECT_EQ(
+      beltgrip({"history", place.path("car"), "--json", place.path("car/carried.json")}).status,
+      64);
+  EXPECT_EQ(place.read("car/carried.json"), file);
+  place.write("car/carried.json", "{");
+  const RunResult damaged = beltgrip({"history", place.path("car")});
+  EXPECT_EQ(damaged.status, 0);
+  EXPECT_EQ(lines(damaged.err), 1) << damaged.err;
+}
+
 TEST_F(History, FromLogsNeedsAConfigurationAndAFolder) {
   place.write("a.txt", "mine");
   for (const std::vector<std::string>& words :

@@ -97,6 +97,37 @@ class StatusCommand : public testing::Test {
   Workplace place_;
 };
 
+TEST_F(StatusCommand, SaysWhatWasCarriedWithoutSlip) {
+  daemon::CarriedBounds bounds{};
+  bounds[0].mu_star = 0.08;
+  bounds[0].mu_max_least = 0.07;
+  bounds[0].torque_Nm = 64.0;
+  bounds[0].clamp_force_N = 5000.0;
+  bounds[0].force_N_s = 100.0;
+  bounds[0].used_N_s = 6.0;
+  bounds[3].refused_mu_star = 0.4;
+  const std::string json = daemon::status_json({}, 0, observed(), bounds);
+  const Server server(place_.path("status.sock"), {json});
+  const std::string words = beltgrip(command({})).out;
+  EXPECT_NE(
+      words.find("drive, overdrive mu_max at least 0.0700, carried without slip at 64 Nm, 5000 "
+                 "N; of the force 25 % and more was reserve\n"),
+      std::string::npos)
+      << words;
+  EXPECT_NE(
+      words.find("overrun, low     mu* 0.400 is read where the belt holds: more than any belt "
+                 "has\n"),
+      std::string::npos)
+      << words;
+  EXPECT_EQ(beltgrip(command({"--prometheus", place_.path("out.prom")})).status, 0);
+  const std::string metrics = place_.read("out.prom");
+  EXPECT_NE(
+      metrics.find("beltgrip_carried_mu_max_lower_bound{interface=\"vcan0\",direction=\"drive\","
+                   "ratio=\"overdrive\"} 0.07\n"),
+      std::string::npos)
+      << metrics;
+}
+
 TEST_F(StatusCommand, SaysItInWordsAndAsJson) {
   const Server server(place_.path("status.sock"), {answer_with_result()});
   const std::string words = beltgrip(command({})).out;
