@@ -263,22 +263,32 @@ class Utf16Source : public PackedSource {
 
 void ByteSource::end_with(int descriptor) { stop_descriptor.store(descriptor); }
 
-std::unique_ptr<ByteSource> ByteSource::open(const std::string& path) {
-  auto plain = std::make_unique<PlainSource>(path);
-  std::string start(4, '\0');
+std::string ByteSource::front(std::size_t most) {
+  std::string bytes(most, '\0');
   std::size_t have = 0;
-  while (have < start.size()) {
-    const std::size_t count = plain->read({start.data() + have, start.size() - have});
+  while (have < most) {
+    const std::size_t count = read({bytes.data() + have, most - have});
     if (count == 0) break;
     have += count;
   }
-  if (have == 0 && !plain->fault().empty()) throw LogOpenError{path + ": " + plain->fault()};
-  start.resize(have);
+  bytes.resize(have);
+  return bytes;
+}
+
+std::unique_ptr<ByteSource> ByteSource::with_front(std::unique_ptr<ByteSource> source,
+                                                   std::string front) {
+  return std::make_unique<PeekedSource>(std::move(source), std::move(front));
+}
+
+std::unique_ptr<ByteSource> ByteSource::open(const std::string& path) {
+  auto plain = std::make_unique<PlainSource>(path);
+  std::string start = plain->front(4);
+  if (start.empty() && !plain->fault().empty()) throw LogOpenError{path + ": " + plain->fault()};
   const std::string_view magic = start;
   const bool gzip = magic.starts_with("\x1F\x8B");
   const bool zstd = magic.starts_with("\x28\xB5\x2F\xFD");
   const bool utf16 = magic.starts_with("\xFF\xFE") || magic.starts_with("\xFE\xFF");
-  auto source = std::make_unique<PeekedSource>(std::move(plain), std::move(start));
+  auto source = with_front(std::move(plain), std::move(start));
   if (gzip) return std::make_unique<GzipSource>(std::move(source));
   if (zstd) return std::make_unique<ZstdSource>(std::move(source));
   if (utf16) return std::make_unique<Utf16Source>(std::move(source));

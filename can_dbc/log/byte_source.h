@@ -20,6 +20,12 @@ class ByteSource {
   // True if read() has something (or the end) within that time.
   virtual bool ready(int timeout_ms) = 0;
 
+  // The next bytes, at most `most`; fewer only at the end. They are taken: with_front() gives them
+  // back.
+  std::string front(std::size_t most);
+  static std::unique_ptr<ByteSource> with_front(std::unique_ptr<ByteSource> source,
+                                                std::string front);
+
   // "-" is standard input. Throws LogOpenError (can_log.h).
   static std::unique_ptr<ByteSource> open(const std::string& path);
   // Every source that is opened from now on ends with a fault once this descriptor is readable.

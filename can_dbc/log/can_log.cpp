@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cstring>
 
+#include "can_dbc/log/binary.h"
 #include "can_dbc/log/byte_source.h"
 #include "can_dbc/log/format.h"
 
@@ -156,31 +157,34 @@ bool holds_carriage_return(std::string_view line) {
 
 struct BinaryFormat {
   std::string_view magic;
+  std::unique_ptr<BinaryParser> (*make)(std::unique_ptr<ByteSource>);
+};
+constexpr std::size_t kMagicMost = 8;
+constexpr std::array<BinaryFormat, 5> kBinaryFormats{{{"\x0A\x0D\x0D\x0A", make_pcapng_parser},
+                                                      {"\xA1\xB2\xC3\xD4", make_pcap_parser},
+                                                      {"\xD4\xC3\xB2\xA1", make_pcap_parser},
+                                                      {"\xA1\xB2\x3C\x4D", make_pcap_parser},
+                                                      {"\x4D\x3C\xB2\xA1", make_pcap_parser}}};
+
+struct RefusedFormat {
+  std::string_view magic;
   const char* reason;
 };
-constexpr std::array<BinaryFormat, 6> kBinaryFormats{
+constexpr std::array<RefusedFormat, 5> kRefusedFormats{
     {{"LOGG", "a Vector .blf log, which is not read; export it as .asc"},
      {"MDF     ", "an MDF measurement, which is not read; export it as .asc or .csv"},
      {"UnFinMF ", "an MDF measurement, which is not read; export it as .asc or .csv"},
      {"BZh", "packed with bzip2, which is not read; pack with gzip or zstd"},
      {"\xFD"
       "7zXZ",
-      "packed with xz, which is not read; pack with gzip or zstd"},
-     {"\x0A\x0D\x0D\x0A", "a pcapng capture, which is not read; export it as a candump log"}}};
-
-// Whatever the format: no line may say more than one of these.
-bool is_of_two_kinds(const CanFrame& frame) {
-  return static_cast<int>(frame.remote) + static_cast<int>(frame.error) +
-             static_cast<int>(frame.fd) >
-         1;
-}
+      "packed with xz, which is not read; pack with gzip or zstd"}}};
 
 class TextLogReader : public LogReader {
  public:
   TextLogReader(std::unique_ptr<ByteSource> source, bool notes)
       : lines_(std::move(source)), notes_(notes) {
     const Sample sample = lines_.sample();
-    for (const BinaryFormat& format : kBinaryFormats) {
+    for (const RefusedFormat& format : kRefusedFormats) {
       if (!lines_.peek().starts_with(format.magic)) continue;
       stats_.lines = 1;
       report(format.reason);
@@ -227,7 +231,7 @@ class TextLogReader : public LogReader {
       switch (parser_->parse(line, record)) {
         case LineKind::kFrame:
           if (is_of_two_kinds(record.frame)) {
-            report("a frame of two kinds: remote, error and CAN FD exclude each other");
+            report(kTwoKinds);
             break;
           }
           record.note = {};
@@ -248,12 +252,7 @@ class TextLogReader : public LogReader {
     return false;
   }
 
-  void report(std::string reason) {
-    ++stats_.lines_bad;
-    if (stats_.first_bad.size() < kBadLinesKept) {
-      stats_.first_bad.push_back({stats_.lines, std::move(reason)});
-    }
-  }
+  void report(std::string reason) { count_bad(stats_, {stats_.lines, 0, std::move(reason)}); }
 
   LineBuffer lines_;
   bool notes_;
@@ -295,8 +294,31 @@ void append_frame(std::string& text, const CanFrame& frame) {
 
 }  // namespace
 
+bool is_of_two_kinds(const CanFrame& frame) {
+  return static_cast<int>(frame.remote) + static_cast<int>(frame.error) +
+             static_cast<int>(frame.fd) >
+         1;
+}
+
+void count_bad(LogStats& stats, BadLine bad) {
+  ++stats.lines_bad;
+  if (stats.first_bad.size() < kBadLinesKept) stats.first_bad.push_back(std::move(bad));
+}
+
+std::string BadLine::place() const {
+  return line > 0 ? std::to_string(line) : "byte " + std::to_string(byte);
+}
+
 std::unique_ptr<LogReader> LogReader::open(const std::string& path, bool notes) {
-  return std::make_unique<TextLogReader>(ByteSource::open(path), notes);
+  auto source = ByteSource::open(path);
+  std::string front = source->front(kMagicMost);
+  for (const BinaryFormat& format : kBinaryFormats) {
+    if (!std::string_view(front).starts_with(format.magic)) continue;
+    return make_binary_reader(
+        format.make(ByteSource::with_front(std::move(source), std::move(front))));
+  }
+  return std::make_unique<TextLogReader>(
+      ByteSource::with_front(std::move(source), std::move(front)), notes);
 }
 
 std::string frame_text(const CanFrame& frame) {

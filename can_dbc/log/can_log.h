@@ -1,5 +1,6 @@
 // Streaming readers of CAN logs and the candump writer. Memory flat in the length of the log; one
-// line at a time. A broken line is counted and reported with its number, never fatal. Tools only.
+// line, or record of a binary log, at a time. A broken one is counted and reported with its place,
+// never fatal. Tools only.
 #pragma once
 
 #include <cstdint>
@@ -22,12 +23,15 @@ struct LogRecord {
 };
 
 struct BadLine {
-  std::uint64_t line = 0;  // 1-based
+  std::uint64_t line = 0;  // 1-based; 0 in a binary log
+  std::uint64_t byte = 0;  // binary log: offset of the record in the (unpacked) file
   std::string reason;
+  std::string place() const;  // "17", "byte 4096"
 };
 
 struct LogStats {
-  std::uint64_t lines = 0;
+  bool binary = false;
+  std::uint64_t lines = 0;  // binary log: records
   std::uint64_t frames = 0;
   std::uint64_t lines_bad = 0;     // neither a frame nor a comment nor empty
   std::vector<BadLine> first_bad;  // at most 10, the first ones

@@ -43,4 +43,10 @@ std::unique_ptr<LineParser> make_asc_parser();
 std::unique_ptr<LineParser> make_trc_parser();
 std::unique_ptr<LineParser> make_csv_parser(const Sample& sample);
 
+// Whatever the format: no line or record may say more than one of these.
+bool is_of_two_kinds(const CanFrame& frame);
+inline constexpr const char* kTwoKinds =
+    "a frame of two kinds: remote, error and CAN FD exclude each other";
+void count_bad(LogStats& stats, BadLine bad);
+
 }  // namespace beltgrip::can

@@ -96,7 +96,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   require(stats.frames == frames.size() && stats.frames + stats.lines_bad <= stats.lines);
   require(stats.first_bad.size() == std::min<std::uint64_t>(stats.lines_bad, 10));
   for (const BadLine& bad : stats.first_bad) {
-    require(bad.line >= 1 && bad.line <= stats.lines && !bad.reason.empty());
+    require(!bad.reason.empty());
+    require(stats.binary ? bad.line == 0 : bad.line >= 1 && bad.line <= stats.lines);
+    // Packed input has more bytes than these.
+    const bool packed = size >= 2 && ((data[0] == 0x1F && data[1] == 0x8B) || data[0] == 0x28);
+    require(packed || bad.byte <= size);
   }
 
   if (const std::string slow = shifted({reinterpret_cast<const char*>(data), size});

@@ -24,10 +24,10 @@
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"
 #include "tools/cli/log_table.h"
+#include "tools/cli/log_trouble.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
 #include "tools/cli/stop_signals.h"
-#include "tools/cli/table_hint.h"
 #include "tools/ports/replay_port.h"
 #include "tools/text/terminal.h"
 
@@ -93,14 +93,12 @@ void look_at_log(const std::string& path, const daemon::Config& config, check::R
   const auto timeline = open_timeline({path}, "", config.identifiers, further_interface(config));
   ports::ReplayPort port(*timeline, {});
   if (port.empty()) {
-    throw Failure{kBadInput, path + ": no readable frame in " +
-                                 std::to_string(timeline->stats().lines) + " lines" +
-                                 table_hint(path)};
+    throw Failure{kBadInput, no_frame_text(path, timeline->stats())};
   }
   look(port, config, watch, {}, seen);
   const can::LogStats stats = timeline->stats();
   if (stats.lines_bad > 0) {
-    text::warn(path + ": " + std::to_string(stats.lines_bad) + " unreadable lines");
+    text::warn(path + ": " + unreadable_text(stats));
   }
 }
 

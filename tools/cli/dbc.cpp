@@ -13,6 +13,7 @@
 #include "tools/cli/dbc_file.h"
 #include "tools/cli/dbc_json.h"
 #include "tools/cli/failure.h"
+#include "tools/cli/log_trouble.h"
 #include "tools/cli/output_file.h"
 #include "tools/text/terminal.h"
 
@@ -138,10 +139,7 @@ void add_decode(command_line::Command dbc) {
       .type_name("FILE")
       .required()
       .allow_extra_args(false);
-  command
-      .add_option("LOG", options->log_paths,
-                  "candump, .asc, .trc or .csv logs, plain, .gz or .zst; - is standard input")
-      .type_name("");
+  command.add_option("LOG", options->log_paths, kLogKinds).type_name("");
   command
       .add_option("--text", options->text_path,
                   "write one line a frame to this file, - for standard output (the default)")

@@ -18,6 +18,7 @@
 #include "tools/cli/dbc_file.h"
 #include "tools/cli/decoded_frame.h"
 #include "tools/cli/failure.h"
+#include "tools/cli/log_trouble.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/stop_signals.h"
 #include "tools/text/short_number.h"
@@ -242,7 +243,7 @@ void decode_log(Decoder& decoder, const DecodeOptions& options, const std::strin
 
   const can::LogStats& stats = log->stats();
   for (const can::BadLine& bad : stats.first_bad) {
-    text::print(stderr, log_path + ":" + std::to_string(bad.line) + ": " + bad.reason + "\n");
+    text::print(stderr, bad_line_text(log_path, bad) + "\n");
   }
   const bool all = options.messages.empty() && options.signals.empty();
   std::fprintf(stderr,
@@ -251,7 +252,7 @@ void decode_log(Decoder& decoder, const DecodeOptions& options, const std::strin
                can::printable(log_path).c_str(), stats.frames, decoded, in_time - decoded,
                all ? "that no DBC names" : "not asked for or that no DBC names", stats.lines_bad);
   if (stats.frames == 0) {
-    throw Failure{kBadInput, log_path + ": no readable frame in it, expected a CAN log"};
+    throw Failure{kBadInput, no_frame_text(log_path, stats)};
   }
   if (decoded == 0) {
     throw Failure{kBadInput,

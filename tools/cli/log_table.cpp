@@ -5,6 +5,7 @@
 
 #include "daemon/core/input/input_monitor.h"
 #include "tools/cli/failure.h"
+#include "tools/cli/log_trouble.h"
 #include "tools/cli/replay_run.h"
 
 namespace beltgrip::cli {
@@ -48,10 +49,9 @@ diagnose::SignalTable read_log(const std::string& path, const daemon::Config& co
     if (count > 0) table.notes.push_back(path + ": " + std::to_string(count) + " " + what);
   };
   if (!first_ns) {
-    throw Failure{kBadInput,
-                  path + ": no readable frame in " + std::to_string(stats.lines) + " lines"};
+    throw Failure{kBadInput, no_frame_text(path, stats)};
   }
-  note(stats.lines_bad, "unreadable lines");
+  if (stats.lines_bad > 0) table.notes.push_back(path + ": " + unreadable_text(stats));
   note(bad, "frames whose length or kind is not the DBC's, ignored");
   note(timeline->counters().clock_steps, "steps of the log's clock, taken out");
   diagnose::close_gaps(table);

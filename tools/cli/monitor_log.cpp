@@ -7,11 +7,11 @@
 #include <chrono>
 #include <memory>
 
+#include "tools/cli/log_trouble.h"
 #include "tools/cli/monitor.h"
 #include "tools/cli/monitor_screen.h"
 #include "tools/cli/replay_run.h"
 #include "tools/cli/stop_signals.h"
-#include "tools/cli/table_hint.h"
 #include "tools/monitor/change_lines.h"
 #include "tools/monitor/log_player.h"
 #include "tools/text/terminal.h"
@@ -41,9 +41,7 @@ std::unique_ptr<ports::LogTimeline> open_log(const MonitorRequest& request) {
 
 [[noreturn]] void fail_without_frames(const MonitorRequest& request,
                                       const ports::LogTimeline& log) {
-  throw Failure{kBadInput, request.source + ": no readable frame in " +
-                               std::to_string(log.stats().lines) + " lines" +
-                               table_hint(request.source)};
+  throw Failure{kBadInput, no_frame_text(request.source, log.stats())};
 }
 
 double end_of(const MonitorRequest& request) {

@@ -16,6 +16,7 @@
 #include "tools/cli/bus.h"
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"
+#include "tools/cli/log_trouble.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
 #include "tools/cli/resumed_lines.h"
@@ -335,9 +336,7 @@ void add_replay(command_line::Command app) {
   const command_line::Command command =
       app.add_subcommand("replay", "Run the daemon's pipeline over logs, the stamps are the clock");
   auto options = std::make_shared<Options>();
-  command.add_option("LOG", options->logs, "candump logs, also .gz and .zst; '-': standard input")
-      .type_name("")
-      .required();
+  command.add_option("LOG", options->logs, kLogKinds).type_name("").required();
   command
       .add_option("--config", options->config, "BeltGrip's configuration; required without --bus")
       .type_name("FILE");

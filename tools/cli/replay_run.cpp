@@ -15,8 +15,8 @@
 #include "daemon/io/reloader.h"
 #include "estimator/method/possible_friction.h"
 #include "tools/cli/failure.h"
+#include "tools/cli/log_trouble.h"
 #include "tools/cli/recorded_log.h"
-#include "tools/cli/table_hint.h"
 #include "tools/ports/log_timeline.h"
 #include "tools/ports/record_port.h"
 #include "tools/ports/replay_port.h"
@@ -148,12 +148,10 @@ std::string joined(const std::vector<std::string>& paths) {
 void describe_troubles(const can::LogStats& stats, const ports::TimelineCounters& counters,
                        ReplayResult& result) {
   for (std::size_t i = 0; i < stats.first_bad.size() && i < kBadLinesShown; ++i) {
-    result.warnings.push_back(result.log + ":" + std::to_string(stats.first_bad[i].line) + ": " +
-                              stats.first_bad[i].reason);
+    result.warnings.push_back(bad_line_text(result.log, stats.first_bad[i]));
   }
   if (stats.lines_bad > kBadLinesShown) {
-    result.warnings.push_back(result.log + ": " + std::to_string(stats.lines_bad) +
-                              " unreadable lines in all");
+    result.warnings.push_back(result.log + ": " + unreadable_text(stats) + " in all");
   }
   if (counters.frames_bad > 0) {
     result.warnings.push_back(result.log + ": " + std::to_string(counters.frames_bad) +
@@ -172,12 +170,7 @@ Failure no_frames(const ReplayResult& result, const can::LogStats& stats,
     return {kBadInput, result.log + ": no frame of interface " + interface + " among " +
                            std::to_string(stats.frames)};
   }
-  std::string text =
-      result.log + ": no readable frame in " + std::to_string(stats.lines) + " lines";
-  if (!stats.first_bad.empty()) {
-    text += ", line " + std::to_string(stats.first_bad[0].line) + ": " + stats.first_bad[0].reason;
-  }
-  return {kBadInput, text + table_hint(result.log)};
+  return {kBadInput, no_frame_text(result.log, stats)};
 }
 
 std::string format(const char* pattern, auto... arguments) {

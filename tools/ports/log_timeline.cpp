@@ -131,6 +131,7 @@ can::LogStats LogTimeline::stats() const {
   can::LogStats sum;
   for (const auto& source : sources_) {
     const can::LogStats& stats = source->stats();
+    sum.binary = sum.binary || stats.binary;
     sum.lines += stats.lines;
     sum.frames += stats.frames;
     sum.lines_bad += stats.lines_bad;

@@ -1,4 +1,4 @@
-#include "tools/cli/table_hint.h"
+#include "tools/cli/log_trouble.h"
 
 #include <algorithm>
 #include <cctype>
@@ -45,8 +45,7 @@ bool is_time(std::string cell) {
          cell.starts_with("time");
 }
 
-}  // namespace
-
+// "; it looks like a table of ..."; empty where the beginning of the file does not look like one.
 std::string table_hint(const std::string& path) {
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none)) return {};  // a pipe cannot be read twice
@@ -59,11 +58,32 @@ std::string table_hint(const std::string& path) {
       if (!is_head(cells)) continue;
       const bool timed = std::any_of(cells.begin(), cells.end(), is_time);
       return "; it looks like a table of " + std::to_string(cells.size()) + " signals" +
-             (timed ? "" : " without a time column") +
-             ": expected a CAN log (candump -L, .asc, .trc, .blf, .mf4)";
+             (timed ? "" : " without a time column") + ": expected a " + kLogKinds;
     }
   }
   return {};
+}
+
+const char* unit_of(const can::LogStats& stats) { return stats.binary ? " records" : " lines"; }
+
+}  // namespace
+
+std::string no_frame_text(const std::string& path, const can::LogStats& stats) {
+  std::string text =
+      path + ": no readable frame in " + std::to_string(stats.lines) + unit_of(stats);
+  if (!stats.first_bad.empty()) {
+    const can::BadLine& first = stats.first_bad.front();
+    text += (first.line > 0 ? ", line " : ", ") + first.place() + ": " + first.reason;
+  }
+  return stats.binary ? text : text + table_hint(path);
+}
+
+std::string bad_line_text(const std::string& path, const can::BadLine& bad) {
+  return path + (bad.line > 0 ? ":" : ": ") + bad.place() + ": " + bad.reason;
+}
+
+std::string unreadable_text(const can::LogStats& stats) {
+  return std::to_string(stats.lines_bad) + " unreadable" + unit_of(stats);
 }
 
 }  // namespace beltgrip::cli

@@ -1,0 +1,23 @@
+// What is said of a log that cannot be read, or not all of it. Tools only.
+#pragma once
+
+#include <string>
+
+#include "can_dbc/log/can_log.h"
+
+namespace beltgrip::cli {
+
+// What a LOG may be, for help.
+inline constexpr const char* kLogKinds =
+    "CAN log (candump, .asc, .trc, .csv, .pcapng; .gz, .zst; - for standard input)";
+
+// "LOG: no readable frame in 3 lines, line 1: what is wrong with it", and the hint where one fits.
+std::string no_frame_text(const std::string& path, const can::LogStats& stats);
+
+// "LOG:17: reason", "LOG: byte 4096: reason" for a binary log.
+std::string bad_line_text(const std::string& path, const can::BadLine& bad);
+
+// "3 unreadable lines", "3 unreadable records" of a binary log.
+std::string unreadable_text(const can::LogStats& stats);
+
+}  // namespace beltgrip::cli
