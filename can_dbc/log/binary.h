@@ -63,6 +63,8 @@ class BinaryInput {
   // False where fewer are left; then all of them are passed.
   bool skip(std::uint64_t size);
   bool at_end() { return !peek(1); }
+  // What take() can give without reading on.
+  std::size_t buffered() const { return end_ - begin_; }
   // How many bytes were taken or skipped.
   std::uint64_t position() const { return position_; }
   const std::string& fault() const { return source_->fault(); }
@@ -115,6 +117,7 @@ class BinaryParser {
   std::uint64_t byte_ = 0;
 };
 
+std::unique_ptr<BinaryParser> make_blf_parser(std::unique_ptr<ByteSource> source);
 std::unique_ptr<BinaryParser> make_pcap_parser(std::unique_ptr<ByteSource> source);
 std::unique_ptr<BinaryParser> make_pcapng_parser(std::unique_ptr<ByteSource> source);
 

@@ -160,7 +160,8 @@ struct BinaryFormat {
   std::unique_ptr<BinaryParser> (*make)(std::unique_ptr<ByteSource>);
 };
 constexpr std::size_t kMagicMost = 8;
-constexpr std::array<BinaryFormat, 5> kBinaryFormats{{{"\x0A\x0D\x0D\x0A", make_pcapng_parser},
+constexpr std::array<BinaryFormat, 6> kBinaryFormats{{{"LOGG", make_blf_parser},
+                                                      {"\x0A\x0D\x0D\x0A", make_pcapng_parser},
                                                       {"\xA1\xB2\xC3\xD4", make_pcap_parser},
                                                       {"\xD4\xC3\xB2\xA1", make_pcap_parser},
                                                       {"\xA1\xB2\x3C\x4D", make_pcap_parser},
@@ -170,9 +171,8 @@ struct RefusedFormat {
   std::string_view magic;
   const char* reason;
 };
-constexpr std::array<RefusedFormat, 5> kRefusedFormats{
-    {{"LOGG", "a Vector .blf log, which is not read; export it as .asc"},
-     {"MDF     ", "an MDF measurement, which is not read; export it as .asc or .csv"},
+constexpr std::array<RefusedFormat, 4> kRefusedFormats{
+    {{"MDF     ", "an MDF measurement, which is not read; export it as .asc or .csv"},
      {"UnFinMF ", "an MDF measurement, which is not read; export it as .asc or .csv"},
      {"BZh", "packed with bzip2, which is not read; pack with gzip or zstd"},
      {"\xFD"
