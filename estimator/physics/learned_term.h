@@ -52,11 +52,15 @@ constexpr std::optional<LearnedVariable> learned_variable(std::string_view role)
 struct LearnedTerm {
   static constexpr std::size_t kKnotsMax = 64;  // chosen: three times what diagnose writes
 
+  // Of files, cut where it is longer; ends with a zero.
+  using Name = std::array<char, 32>;
+
   LearnedPoint point = LearnedPoint::kFriction;
   LearnedVariable variable = LearnedVariable::kOilTemperature;
   std::size_t count = 0;                  // of knots, at least two where it is one at all
   std::array<double, kKnotsMax> knot{};   // rising
   std::array<double, kKnotsMax> value{};  // in the unit of the point
+  Name name{};
 
   // Whether the variable lies where the function was learned; NaN does not.
   bool covers(double x) const noexcept {

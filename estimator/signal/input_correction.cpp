@@ -75,8 +75,13 @@ const VariatorSample& InputCorrection::correct(const VariatorSample& measured,
   force_error_N_ = 0.0;
   now.primary_speed_rad_s = measured.omega_p_rad_s;
   now.torque_Nm = measured.torque_Nm;
+  uncovered_ = nullptr;
   for (const LearnedTerm& each : learned_) {
-    out_.usable = out_.usable && each.covers(condition(now, each.variable));
+    const double at = condition(now, each.variable);
+    if (!out_.usable || each.covers(at)) continue;
+    out_.usable = false;
+    uncovered_ = &each;
+    uncovered_at_ = at;
   }
   if (!out_.usable) {
     started_ = false;

@@ -32,6 +32,9 @@ class InputCorrection {
   // now: what the sample does not tell of what functions depend on.
   const VariatorSample& correct(const VariatorSample& measured,
                                 LearnedConditions now = {}) noexcept;
+  // The term whose box did not hold the last sample, which is then not usable; nullptr: none.
+  const LearnedTerm* uncovered() const noexcept { return uncovered_; }
+  double uncovered_at() const noexcept { return uncovered_at_; }  // no number: not known
   // Force on the belt less the force as measured, at the last sample: what a force in the
   // transmission's own measure lacks.
   double force_error_N() const noexcept { return force_error_N_; }
@@ -60,6 +63,8 @@ class InputCorrection {
   double keep_;  // of the lag, per sample
   double latency_s_;
   std::array<Delay, 4> delays_;  // omega_p, omega_s, pressure, torque
+  const LearnedTerm* uncovered_ = nullptr;
+  double uncovered_at_ = 0.0;
   VariatorSample out_;
   double acting_Pa_ = 0.0, input_Pa_ = 0.0;
   double play_N_ = 0.0;

@@ -14,6 +14,7 @@
 #include "daemon/io/carried_keeper.h"
 #include "daemon/io/reloader.h"
 #include "estimator/method/possible_friction.h"
+#include "estimator/physics/units.h"
 #include "tools/cli/failure.h"
 #include "tools/cli/log_trouble.h"
 #include "tools/cli/recorded_log.h"
@@ -97,6 +98,7 @@ class Sink final : public daemon::SampleSink {
  private:
   void count_inhibits(const daemon::SampleReport& report, std::int64_t samples) noexcept {
     if (report.in_experiment || (report.inhibits & kFeet) != 0) return;
+    result_.beyond.take(report.beyond);
     for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
       if ((report.inhibits >> i & 1) == 0) continue;
       result_.inhibited_s[i] += static_cast<double>(samples) * period_s_;
@@ -418,6 +420,13 @@ std::string why_no_value(const daemon::ExperimentResult& e, const std::string& l
   if (e.peak.contradictory)
     return "its points lie on no one friction curve; is the piston area, the spring or the "
            "centrifugal term wrong?";
+  if (e.beyond) {
+    const double share = static_cast<double>(e.beyond.samples) /
+                         static_cast<double>(std::max(e.samples, e.beyond.samples));
+    return daemon::beyond_text(e.beyond) +
+           format(", in %.0f %% of the experiment; to do: ", estimator::kPercent * share) +
+           std::string(reasons::words_of(daemon::Inhibit::kModel).remedy);
+  }
   switch (e.stop_reason) {
     case estimator::StopReason::kRatio:
       return "speeds and torque do not fit the ratio at the end stop; is a speed or the sign of "
@@ -542,7 +551,9 @@ std::string inhibit_words(const ReplayResult& result) {
     if (result.inhibited_s[i] < kShownInhibit_s) continue;
     const daemon::Named<daemon::Inhibit>& inhibit = daemon::kInhibits[i];
     const reasons::Words& words = reasons::words_of(inhibit.value);
+    const bool beyond = inhibit.value == daemon::Inhibit::kModel && result.beyond;
     text += "    " + std::string(inhibit.name) + ": " + std::string(words.means) +
+            (beyond ? ": " + daemon::beyond_text(result.beyond) : "") +
             "; to do: " + std::string(words.remedy) + "\n";
   }
   return text;

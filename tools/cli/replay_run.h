@@ -35,7 +35,8 @@ struct ReplayResult {
   std::int64_t duration_ns = 0;
   // Clamp requests of the log that were followed; none: it was decided anew when to ask.
   std::optional<std::size_t> requests_followed;
-  std::string unusable;  // what was wrong with the inputs in the end; empty: nothing
+  std::string unusable;      // what was wrong with the inputs in the end; empty: nothing
+  daemon::BeyondBox beyond;  // while no experiment ran and the driver's feet did not forbid one
   // What was carried without slip.
   std::vector<daemon::CarriedWindow> carried_windows;
   daemon::CarriedBounds carried{};

@@ -69,6 +69,12 @@ constexpr std::array<InhibitRow, daemon::kInhibitCount> kInhibitWords{{
      {"at a lower speed there is more room to cross the peak; it begins by itself, 9 s after the "
       "trigger at the latest",
       "nothing"}},
+    {Inhibit::kModel,
+     {"a quantity lies outside the box in which a term of the model file was learned "
+      "(`[learned.NAME]`)",
+      "drive inside the box; let `beltgrip diagnose` learn from drives that reach further; or "
+      "leave "
+      "`[estimator] model` out"}},
 }};
 
 struct FaultRow {

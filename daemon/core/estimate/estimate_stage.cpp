@@ -6,7 +6,8 @@ namespace beltgrip::daemon {
 
 EstimateStage::EstimateStage(const Config& config)
     : method_(
-          estimator::make_slip_curve_estimator(config.estimator, config.variator, config.sensors)) {
+          estimator::make_slip_curve_estimator(config.estimator, config.variator, config.sensors)),
+      torque_is_engine_(config.estimator.torque_is_engine) {
   if (config.corrected) {
     correction_.emplace(*config.corrected, config.variator, config.estimator.sample_rate_hz,
                         config.learned);
@@ -22,6 +23,32 @@ void EstimateStage::step(const estimator::VariatorSample& sample,
     curve_ = {};
     curve_.t_ns = sample.t_ns;
   }
+}
+
+BeyondBox EstimateStage::beyond() const noexcept {
+  const estimator::LearnedTerm* term = correction_ ? correction_->uncovered() : nullptr;
+  if (term == nullptr) return {};
+  BeyondBox beyond;
+  beyond.term = term->name;
+  switch (term->variable) {
+    case estimator::LearnedVariable::kOilTemperature:
+      beyond.role = Role::kOilTemperature;
+      break;
+    case estimator::LearnedVariable::kPrimarySpeed:
+      beyond.role = Role::kPrimarySpeed;
+      break;
+    case estimator::LearnedVariable::kPrimaryPressure:
+      beyond.role = Role::kPrimaryPressure;
+      break;
+    case estimator::LearnedVariable::kTorque:
+      beyond.role = torque_is_engine_ ? Role::kEngineTorque : Role::kPrimaryTorque;
+      break;
+  }
+  beyond.figure = correction_->uncovered_at();
+  beyond.least = term->knot[0];
+  beyond.most = term->knot[term->count - 1];
+  beyond.samples = 1;
+  return beyond;
 }
 
 }  // namespace beltgrip::daemon

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "daemon/core/config/options/config.h"
+#include "daemon/core/estimate/beyond_box.h"
 #include "estimator/method/slip_curve_estimator.h"
 #include "estimator/signal/input_correction.h"
 
@@ -25,6 +26,8 @@ class EstimateStage {
   const estimator::PeakEstimate& peak() const noexcept { return method_->peak(); }
 
   const estimator::CurveEstimate& curve() const noexcept { return curve_; }
+  // Why there is no curve at the last sample, where a learned term does not reach so far.
+  BeyondBox beyond() const noexcept;
   // The clamp force in the transmission's own measure, which requests are made in.
   double measured_force_N() const noexcept {
     return curve_.clamp_force_N - (correction_ ? correction_->force_error_N() : 0.0);
@@ -33,6 +36,7 @@ class EstimateStage {
  private:
   std::optional<estimator::InputCorrection> correction_;  // where the configuration names a model
   std::unique_ptr<estimator::SlipCurveEstimator> method_;
+  bool torque_is_engine_;
   estimator::CurveEstimate curve_;
 };
 

@@ -79,7 +79,8 @@ std::uint32_t Arming::preconditions(const Now& now) const noexcept {
     if (set) out |= inhibit_bit(which);
   };
   inhibit(now.faulted, Inhibit::kFault);
-  inhibit(!now.usable || !now.conditions.fresh, Inhibit::kInputs);
+  inhibit(now.beyond_box, Inhibit::kModel);
+  inhibit((!now.usable && !now.beyond_box) || !now.conditions.fresh, Inhibit::kInputs);
   if (out != 0) return out;
   const Conditions& c = now.conditions;
   const bool coast = trigger_ == Trigger::kCoastDown;

@@ -46,9 +46,10 @@ enum class Inhibit : std::uint8_t {
   kGrip,         // friction has fallen so far that the own force hardly holds the belt
   kForce,        // the controller's own force still rises or falls
   kQuiet,        // a speed that stood still would not show
-  kWait          // further on the crossing has more room
+  kWait,         // further on the crossing has more room
+  kModel         // a learned term of the model file does not reach so far
 };
-inline constexpr std::size_t kInhibitCount = 18;
+inline constexpr std::size_t kInhibitCount = 19;
 inline constexpr std::array<Named<Inhibit>, kInhibitCount> kInhibits{
     {{Inhibit::kInputs, "inputs"},
      {Inhibit::kFault, "fault"},
@@ -67,7 +68,8 @@ inline constexpr std::array<Named<Inhibit>, kInhibitCount> kInhibits{
      {Inhibit::kGrip, "grip"},
      {Inhibit::kForce, "own force"},
      {Inhibit::kQuiet, "quiet"},
-     {Inhibit::kWait, "wait"}}};
+     {Inhibit::kWait, "wait"},
+     {Inhibit::kModel, "model"}}};
 static_assert(in_wire_order(kInhibits));
 
 constexpr std::uint32_t inhibit_bit(Inhibit inhibit) {
@@ -117,7 +119,8 @@ class Arming {
 
   struct Now {
     MonoTime t = 0;
-    bool usable = false;  // sample and curve
+    bool usable = false;      // sample and curve
+    bool beyond_box = false;  // of a learned term: why there is no curve
     bool cooled = true;
     bool faulted = false;
     double omega_p_rad_s = 0.0;

@@ -48,6 +48,7 @@
 #include <limits>
 
 #include "daemon/core/base/mono_time.h"
+#include "daemon/core/estimate/beyond_box.h"
 #include "daemon/core/input/stop_cause.h"
 #include "estimator/method/slip_curve_estimator.h"
 
@@ -75,6 +76,7 @@ struct ExperimentResult {
   StopCause cause;  // beside it
   estimator::PeakEstimate peak;
   bool slipped = false;             // with less friction than was known, and gave no value
+  BeyondBox beyond;                 // of a learned term, how many of its samples and how far
   double sigma_stop_percent = 0.0;  // magnitude
   std::int64_t samples = 0;         // from start to stop
   estimator::Direction direction = estimator::Direction::kDrive;

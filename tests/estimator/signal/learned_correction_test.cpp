@@ -92,6 +92,11 @@ TEST(LearnedCorrection, FollowsWhatTheSampleHas) {
   VariatorSample fast = sample();
   fast.omega_p_rad_s = 151.0;
   EXPECT_FALSE(correction.correct(fast).usable);
+  ASSERT_NE(correction.uncovered(), nullptr);
+  EXPECT_EQ(correction.uncovered()->variable, LearnedVariable::kPrimarySpeed);
+  EXPECT_EQ(correction.uncovered_at(), 151.0);
+  EXPECT_TRUE(correction.correct(sample()).usable);
+  EXPECT_EQ(correction.uncovered(), nullptr);
 }
 
 }  // namespace

@@ -206,6 +206,39 @@ TEST_F(Replay, TextSaysWhyThereIsNoValue) {
   }
 }
 
+// Outside the box of a learned term no sample can be corrected: the term, its variable, its box and
+// what to do are told, whether an experiment ran or none could begin.
+TEST_F(Replay, ALearnedTermThatDoesNotReachSoFarIsNamed) {
+  const auto model = [&](const char* knots) {
+    place_->write("model.toml",
+                  "[learned.drag]\nacts_on = \"torque\"\ndepends_on = "
+                  "[\"primary_speed\"]\nknots = " +
+                      std::string(knots) + "\nvalues = [0.0, 0.0]\n");
+    place_->write("with_model.toml",
+                  "include = [\"beltgrip.toml\"]\n[estimator]\nmodel = \"model.toml\"\n");
+    return beltgrip({"replay", path("trace.log"), "--config", path("with_model.toml")});
+  };
+  const RunResult inside = model("[1, 1000]");
+  EXPECT_NE(inside.out.find("mu_max 0."), std::string::npos) << inside.out << inside.err;
+  const RunResult beyond = model("[10, 20]");
+  EXPECT_EQ(beyond.status, 0) << beyond.err;
+  EXPECT_EQ(beyond.out.find("mu_max 0."), std::string::npos) << beyond.out;
+  EXPECT_NE(beyond.out.find("no value: primary_speed at "), std::string::npos) << beyond.out;
+  EXPECT_NE(beyond.out.find(" lies outside the box of [learned.drag] of the model file, 10 .. 20 "
+                            "rad/s, in 100 % of the experiment; to do: drive inside the box"),
+            std::string::npos)
+      << beyond.out;
+  // No experiment at all.
+  place_->write("coast.toml",
+                "include = [\"with_model.toml\"]\n[experiment]\ntrigger = \"steady\"\n");
+  const RunResult none = beltgrip({"replay", path("trace.log"), "--config", path("coast.toml")});
+  EXPECT_NE(none.out.find("kept away by model "), std::string::npos) << none.out;
+  EXPECT_NE(none.out.find("    model: a quantity lies outside the box in which a term of the model "
+                          "file was learned (`[learned.NAME]`): primary_speed at "),
+            std::string::npos)
+      << none.out;
+}
+
 TEST_F(Replay, TextNamesTheInputThatWasLost) {
   std::istringstream log(trace());
   std::string kept, line;

@@ -174,8 +174,9 @@ std::string learned_text(const std::string& name, const ModelLearned& learned) {
   return out;
 }
 
-LearnedTerm term_of(const ModelLearned& learned) {
+LearnedTerm term_of(const std::string& name, const ModelLearned& learned) {
   LearnedTerm out;
+  std::copy_n(name.begin(), std::min(name.size(), out.name.size() - 1), out.name.begin());
   const auto& points = estimator::kLearnedPoints;
   const auto point = std::find(points.begin(), points.end(), learned.acts_on);
   out.point = static_cast<estimator::LearnedPoint>(point - points.begin());

@@ -26,6 +26,6 @@ struct ModelLearned {
 bool read_learned(const TomlNode& section, ModelLearned& into, ConfigErrors& errors);
 std::string learned_text(const std::string& name, const ModelLearned& learned);
 
-estimator::LearnedTerm term_of(const ModelLearned& learned);
+estimator::LearnedTerm term_of(const std::string& name, const ModelLearned& learned);
 
 }  // namespace beltgrip::daemon

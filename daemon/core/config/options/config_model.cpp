@@ -242,7 +242,7 @@ std::string model_text(const ModelFile& model) {
 std::vector<estimator::LearnedTerm> learned_terms(const ModelFile& model) {
   std::vector<estimator::LearnedTerm> out;
   out.reserve(model.learned.size());
-  for (const auto& [name, learned] : model.learned) out.push_back(term_of(learned));
+  for (const auto& [name, learned] : model.learned) out.push_back(term_of(name, learned));
   return out;
 }
 

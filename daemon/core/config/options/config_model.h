@@ -49,7 +49,7 @@ ModelFile read_model(const std::string& path, const ModelFile& base,
 ModelFile parse_model(const std::string& text, const std::string& name, const ModelFile& base);
 std::string model_text(const ModelFile& model);
 
-// What was learned, without its names.
+// What was learned without a name of its own among the effects.
 std::vector<estimator::LearnedTerm> learned_terms(const ModelFile& model);
 
 // The effects as plain values.
