@@ -118,6 +118,9 @@ class BinaryParser {
 };
 
 std::unique_ptr<BinaryParser> make_blf_parser(std::unique_ptr<ByteSource> source);
+// `path`: where the source came from; read in place where it can be.
+std::unique_ptr<BinaryParser> make_mdf_parser(std::unique_ptr<ByteSource> source,
+                                              const std::string& path);
 std::unique_ptr<BinaryParser> make_pcap_parser(std::unique_ptr<ByteSource> source);
 std::unique_ptr<BinaryParser> make_pcapng_parser(std::unique_ptr<ByteSource> source);
 

@@ -157,24 +157,34 @@ bool holds_carriage_return(std::string_view line) {
 
 struct BinaryFormat {
   std::string_view magic;
-  std::unique_ptr<BinaryParser> (*make)(std::unique_ptr<ByteSource>);
+  std::unique_ptr<BinaryParser> (*make)(std::unique_ptr<ByteSource>, const std::string& path);
+};
+using Source = std::unique_ptr<ByteSource>;
+constexpr auto kBlf = [](Source source, const std::string&) {
+  return make_blf_parser(std::move(source));
+};
+constexpr auto kPcap = [](Source source, const std::string&) {
+  return make_pcap_parser(std::move(source));
+};
+constexpr auto kPcapng = [](Source source, const std::string&) {
+  return make_pcapng_parser(std::move(source));
 };
 constexpr std::size_t kMagicMost = 8;
-constexpr std::array<BinaryFormat, 6> kBinaryFormats{{{"LOGG", make_blf_parser},
-                                                      {"\x0A\x0D\x0D\x0A", make_pcapng_parser},
-                                                      {"\xA1\xB2\xC3\xD4", make_pcap_parser},
-                                                      {"\xD4\xC3\xB2\xA1", make_pcap_parser},
-                                                      {"\xA1\xB2\x3C\x4D", make_pcap_parser},
-                                                      {"\x4D\x3C\xB2\xA1", make_pcap_parser}}};
+constexpr std::array<BinaryFormat, 8> kBinaryFormats{{{"LOGG", kBlf},
+                                                      {"MDF     ", make_mdf_parser},
+                                                      {"UnFinMF ", make_mdf_parser},
+                                                      {"\x0A\x0D\x0D\x0A", kPcapng},
+                                                      {"\xA1\xB2\xC3\xD4", kPcap},
+                                                      {"\xD4\xC3\xB2\xA1", kPcap},
+                                                      {"\xA1\xB2\x3C\x4D", kPcap},
+                                                      {"\x4D\x3C\xB2\xA1", kPcap}}};
 
 struct RefusedFormat {
   std::string_view magic;
   const char* reason;
 };
-constexpr std::array<RefusedFormat, 4> kRefusedFormats{
-    {{"MDF     ", "an MDF measurement, which is not read; export it as .asc or .csv"},
-     {"UnFinMF ", "an MDF measurement, which is not read; export it as .asc or .csv"},
-     {"BZh", "packed with bzip2, which is not read; pack with gzip or zstd"},
+constexpr std::array<RefusedFormat, 2> kRefusedFormats{
+    {{"BZh", "packed with bzip2, which is not read; pack with gzip or zstd"},
      {"\xFD"
       "7zXZ",
       "packed with xz, which is not read; pack with gzip or zstd"}}};
@@ -315,7 +325,7 @@ std::unique_ptr<LogReader> LogReader::open(const std::string& path, bool notes) 
   for (const BinaryFormat& format : kBinaryFormats) {
     if (!std::string_view(front).starts_with(format.magic)) continue;
     return make_binary_reader(
-        format.make(ByteSource::with_front(std::move(source), std::move(front))));
+        format.make(ByteSource::with_front(std::move(source), std::move(front)), path));
   }
   return std::make_unique<TextLogReader>(
       ByteSource::with_front(std::move(source), std::move(front)), notes);

@@ -74,7 +74,13 @@ class CandumpParser : public LineParser {
                                                          : console_frame(word, line, record.frame);
     if (kind != LineKind::kFrame) return kind;
     after_error_ = record.frame.error;
-    record.t_ns = delta_&& hash == std::string_view::npos ? sum_ns_ += *t_ns : *t_ns;
+    record.t_ns = *t_ns;
+    if (delta_ && hash == std::string_view::npos) {
+      if (__builtin_add_overflow(sum_ns_, *t_ns, &sum_ns_)) {
+        return bad("time stamp beyond the range");
+      }
+      record.t_ns = sum_ns_;
+    }
     record.interface = interface;
     record.sent = hash != std::string_view::npos && take_word(line) == "T";
     return LineKind::kFrame;

@@ -9,7 +9,7 @@ namespace beltgrip::cli {
 
 // What a LOG may be, for help.
 inline constexpr const char* kLogKinds =
-    "CAN log (candump, .asc, .trc, .csv, .blf, .pcapng; .gz, .zst; - for standard input)";
+    "CAN log (candump, .asc, .trc, .csv, .blf, .mf4, .pcapng; .gz, .zst; - for standard input)";
 
 // "LOG: no readable frame in 3 lines, line 1: what is wrong with it", and the hint where one fits.
 std::string no_frame_text(const std::string& path, const can::LogStats& stats);
