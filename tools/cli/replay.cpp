@@ -20,6 +20,7 @@
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
 #include "tools/cli/resumed_lines.h"
+#include "tools/cli/signals_out.h"
 #include "tools/cli/stop_signals.h"
 #include "tools/text/terminal.h"
 
@@ -40,6 +41,7 @@ struct Options {
   bool resume = false;
   bool quiet = false;
   std::string trace;
+  std::string signals;
   std::string log_out;
   std::string bus;
   double speed = 1.0;
@@ -203,8 +205,11 @@ void print_speed(std::uint64_t frames, std::chrono::steady_clock::time_point beg
 
 // The logs as one timeline onto a bus in real time; BeltGrip's own frames stay out.
 void play_logs(const Options& options) {
-  if (!options.json.empty() || !options.trace.empty() || !options.log_out.empty()) {
-    throw Failure{kUsage, "replay: --bus plays the log; it gives no --json, --trace, --log-out"};
+  if (!options.json.empty() || !options.trace.empty() || !options.signals.empty() ||
+      !options.log_out.empty()) {
+    throw Failure{kUsage,
+                  "replay: --bus plays the log; it gives no --json, --trace, --signals-out, "
+                  "--log-out"};
   }
   if (options.logs.size() > 1 && !options.join) {
     throw Failure{kUsage, "replay: --bus takes one log, or several with --join"};
@@ -238,23 +243,40 @@ void check_as_recorded(const Options& options, const daemon::Config& config) {
   }
 }
 
+// By the end of the file's name. A measurement has its counts in front: it needs a file.
+std::unique_ptr<signals::SignalWriter> signal_writer(const std::string& path, OutputFile& file,
+                                                     const daemon::Config& config) {
+  if (!path.ends_with(".mf4")) return signals::make_csv_writer(file.get(), signal_columns(config));
+  if (std::fseek(file.get(), 0, SEEK_SET) != 0) {
+    throw Failure{kCannotCreate, path + ": .mf4 cannot be written into a pipe, expected a file"};
+  }
+  return signals::make_mf4_writer(file.get(), signal_columns(config));
+}
+
 void run(const Options& options) {
   end_streams_when_stopped(options.logs);
   if (!options.bus.empty()) return play_logs(options);
   if (options.config.empty()) throw Failure{kUsage, "replay: --config is required"};
   const bool separate = options.logs.size() > 1 && !options.join;
-  if (separate && (!options.trace.empty() || !options.log_out.empty())) {
-    throw Failure{kUsage, "replay: --trace and --log-out take one log, or several with --join"};
+  if (separate &&
+      (!options.trace.empty() || !options.signals.empty() || !options.log_out.empty())) {
+    throw Failure{kUsage,
+                  "replay: --trace, --signals-out and --log-out take one log, or several with "
+                  "--join"};
   }
-  if ((options.json == "-") + (options.trace == "-") + (options.log_out == "-") > 1) {
-    throw Failure{kUsage, "replay: only one of --json, --trace, --log-out can be standard output"};
+  const int on_stdout = (options.json == "-") + (options.trace == "-") + (options.signals == "-") +
+                        (options.log_out == "-");
+  if (on_stdout > 1) {
+    throw Failure{kUsage,
+                  "replay: only one of --json, --trace, --signals-out, --log-out can be standard "
+                  "output"};
   }
   if (options.resume && (options.json.empty() || options.join)) {
     throw Failure{kUsage, "replay: --resume goes log by log, expected --json FILE and no --join"};
   }
   const daemon::Config config = load_configuration(options.config, options.method);
   check_as_recorded(options, config);
-  std::optional<OutputFile> json, trace, log_out;
+  std::optional<OutputFile> json, trace, signals_file, log_out;
   std::optional<ResumedLines> resumed;
   Inputs inputs(options.logs);
   inputs.add(config.files);
@@ -276,13 +298,19 @@ void run(const Options& options) {
                  options.logs.size());
   }
   if (!options.trace.empty()) trace.emplace(options.trace, inputs);
+  std::unique_ptr<signals::SignalWriter> signals;
+  if (!options.signals.empty()) {
+    signals_file.emplace(options.signals, inputs);
+    signals = signal_writer(options.signals, *signals_file, config);
+  }
   if (!options.log_out.empty()) log_out.emplace(options.log_out, inputs);
-  const bool text_to_stdout = options.json != "-" && options.trace != "-" && options.log_out != "-";
+  const bool text_to_stdout = on_stdout == 0;
 
   Teller teller(json ? json->get() : nullptr, text_to_stdout);
   Progress progress(!options.quiet);
   ReplayOutputs outputs;
   if (trace) outputs.trace = trace->get();
+  outputs.signals = signals.get();
   if (log_out) outputs.log_out = log_out->get();
   if (tasks.size() == 1) {
     outputs.also = &progress;
@@ -325,6 +353,10 @@ void run(const Options& options) {
   if (!any && !tasks.empty()) throw Failure{exit_code, ""};  // what earlier runs left stays
   if (json) json->close();
   if (trace) trace->close();
+  if (signals && signals_file) {
+    signals->finish();
+    signals_file->close();
+  }
   if (log_out) log_out->close();
   if (frames > 0 && !options.quiet) print_speed(frames, begin);
   if (exit_code != kDone) throw Failure{exit_code, ""};
@@ -357,6 +389,10 @@ void add_replay(command_line::Command app) {
   command.add_flag("--resume", options->resume,
                    "Go on in the file of --json: logs that stand in it are left out");
   command.add_option("--trace", options->trace, "Every sample of the experiments as CSV")
+      .type_name("FILE");
+  command
+      .add_option("--signals-out", options->signals,
+                  "Inputs and estimate at every sample: .mf4 (MDF 4.1), any other name CSV")
       .type_name("FILE");
   command
       .add_option("--log-out", options->log_out,

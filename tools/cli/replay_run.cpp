@@ -18,6 +18,7 @@
 #include "tools/cli/failure.h"
 #include "tools/cli/log_trouble.h"
 #include "tools/cli/recorded_log.h"
+#include "tools/cli/signals_out.h"
 #include "tools/ports/log_timeline.h"
 #include "tools/ports/record_port.h"
 #include "tools/ports/replay_port.h"
@@ -40,7 +41,9 @@ class Sink final : public daemon::SampleSink {
        const ReplayOutputs& outputs)
       : result_(result),
         pipeline_(pipeline),
+        config_(config),
         trace_(outputs.trace),
+        signals_(outputs.signals),
         also_(outputs.also),
         on_result_(outputs.on_result),
         period_s_(1.0 / config.estimator.sample_rate_hz),
@@ -67,6 +70,10 @@ class Sink final : public daemon::SampleSink {
     }
     count_inhibits(report, 1);
     if (also_ != nullptr) also_->on_report(report);
+    if (signals_ != nullptr) {
+      signal_values(report, pipeline_, config_, values_);
+      signals_->row(report.t, values_);
+    }
     if (trace_ == nullptr || !report.in_experiment || !report.curve.usable) return;
     const estimator::CurveEstimate& curve = report.curve;
     row_ = text::seconds_text(report.t);
@@ -132,7 +139,10 @@ class Sink final : public daemon::SampleSink {
 
   ReplayResult& result_;
   const daemon::Pipeline& pipeline_;
+  const daemon::Config& config_;
   std::FILE* trace_;
+  signals::SignalWriter* signals_;
+  std::vector<double> values_;  // of one sample
   daemon::SampleSink* also_;
   std::function<void(const ReplayResult&)> on_result_;
   double period_s_;

@@ -18,6 +18,7 @@
 #include "daemon/core/loop/pipeline.h"
 #include "daemon/core/observe/carried_record.h"
 #include "tools/ports/log_timeline.h"
+#include "tools/signals/signal_writer.h"
 
 namespace beltgrip::cli {
 
@@ -47,6 +48,7 @@ struct ReplayResult {
 
 struct ReplayOutputs {
   std::FILE* trace = nullptr;                          // CSV, one row a sample of an experiment
+  signals::SignalWriter* signals = nullptr;            // every sample
   std::FILE* log_out = nullptr;                        // candump, what the daemon would have sent
   daemon::SampleSink* also = nullptr;                  // sees every report, after the results
   std::function<void(const ReplayResult&)> on_result;  // at each, then the last

@@ -66,6 +66,7 @@ const std::vector<Output> kOutputs{
      ""},
     {"replay", "--json", false, kReplay, kReplayed, ""},
     {"replay", "--trace", false, kReplay, kReplayed, ""},
+    {"replay", "--signals-out", false, kReplay, kReplayed, ""},
     {"replay", "--log-out", false, kReplay, kReplayed, ""},
     {"diagnose", "--json", false, kDiagnose, kDiagnosed, ""},
     {"diagnose", "--report", false, kDiagnose, kDiagnosed, ""},

@@ -7,6 +7,8 @@
 #include <zlib.h>
 #include <zstd.h>
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -75,6 +77,101 @@ TEST_F(Replay, SameBytesEveryTime) {
       EXPECT_GT(lines(now[3]), 1000);
     }
   }
+}
+
+// Rows of a table in CSV; an empty cell is no number, a word is zero.
+std::vector<std::vector<double>> rows_of(const std::string& csv) {
+  std::vector<std::vector<double>> rows;
+  std::istringstream text(csv);
+  std::string line;
+  std::getline(text, line);
+  while (std::getline(text, line)) {
+    rows.emplace_back();
+    for (std::size_t at = 0; at <= line.size();) {
+      const std::size_t end = std::min(line.find(',', at), line.size());
+      const std::string cell = line.substr(at, end - at);
+      rows.back().push_back(cell.empty() ? std::nan("") : std::strtod(cell.c_str(), nullptr));
+      at = end + 1;
+    }
+  }
+  return rows;
+}
+
+TEST_F(Replay, SignalsOutAsCsvAndAsMf4SayTheSame) {
+  for (const char* name : {"s.csv", "s.mf4"}) {
+    const RunResult result = beltgrip(
+        with_config({path("trace.log"), "--signals-out", path(name), "--trace", path("t.csv")}));
+    ASSERT_EQ(result.status, 0) << result.err;
+  }
+  const std::string csv = place_->read("s.csv");
+  const std::string head = csv.substr(0, csv.find('\n'));
+  EXPECT_TRUE(head.starts_with("t[s],primary_speed[rad/s],secondary_speed[rad/s],")) << head;
+  const auto rows = rows_of(csv);
+  const auto traced = rows_of(place_->read("t.csv"));
+  ASSERT_GT(rows.size(), 2000u);
+  // What the trace says of the samples of an experiment.
+  const auto column = [&](const std::string& wanted) {
+    const std::size_t at = ("," + head + ",").find("," + wanted + ",");
+    EXPECT_NE(at, std::string::npos) << wanted;
+    return static_cast<std::size_t>(
+        std::count(head.begin(), head.begin() + static_cast<long>(at), ','));
+  };
+  const std::size_t mu_star = column("mu_star");
+  std::size_t found = 0;
+  for (const auto& row : rows) {
+    if (std::isnan(row[mu_star])) continue;
+    ASSERT_LT(found, traced.size());
+    EXPECT_EQ(row[0], traced[found][0]);
+    EXPECT_EQ(row[mu_star], traced[found][1]);
+    EXPECT_EQ(row[mu_star + 1], traced[found][2]);
+    ++found;
+  }
+  EXPECT_EQ(found, traced.size());
+
+  // By a reader that shares no code with the writer: the same numbers, column by column.
+  const RunResult read = run({"/usr/bin/python3", BELTGRIP_MDF_READER, "signals", path("s.mf4")},
+                             std::chrono::seconds(60));
+  ASSERT_EQ(read.status, 0) << read.err;
+  std::istringstream text(read.out);
+  std::string line;
+  std::getline(text, line);
+  const auto start_ns = static_cast<long long>(std::llround(rows[0][0] * 1e9));
+  EXPECT_EQ(line, "version 410 start " + std::to_string(start_ns) + " finished 1");
+  std::istringstream names(head);
+  std::string cell;
+  std::getline(names, cell, ',');
+  for (std::size_t i = 1; i < rows[0].size(); ++i) {
+    ASSERT_TRUE(std::getline(names, cell, ','));
+    ASSERT_TRUE(std::getline(text, line));
+    const std::string name = line.substr(0, line.find('\t'));
+    const std::string unit = line.substr(name.size() + 1, line.rfind('\t') - name.size() - 1);
+    EXPECT_EQ(unit.empty() ? name : name + '[' + unit + ']', cell);
+    EXPECT_EQ(line.substr(line.rfind('\t') + 1), std::to_string(rows.size()));
+    for (const auto& row : rows) {
+      ASSERT_TRUE(std::getline(text, line));
+      EXPECT_NEAR(std::stod(line) + rows[0][0], row[0], 1e-9);
+      const double value = std::stod(line.substr(line.find('\t') + 1));
+      EXPECT_TRUE(value == row[i] || (std::isnan(value) && std::isnan(row[i])));
+    }
+  }
+  EXPECT_FALSE(std::getline(text, line));
+}
+
+TEST_F(Replay, SignalsOutThatCannotBeWritten) {
+  const RunResult two =
+      beltgrip(with_config({path("trace.log"), "--signals-out", "-", "--trace", "-"}));
+  EXPECT_EQ(two.status, 64);
+  EXPECT_EQ(
+      beltgrip(with_config({path("trace.log"), path("trace.log"), "--signals-out", path("s.csv")}))
+          .status,
+      64);
+  ASSERT_EQ(mkfifo(path("f.mf4").c_str(), 0600), 0);
+  const int reader = open(path("f.mf4").c_str(), O_RDONLY | O_NONBLOCK);
+  const RunResult fifo = beltgrip(with_config({path("trace.log"), "--signals-out", path("f.mf4")}));
+  close(reader);
+  EXPECT_EQ(fifo.status, 73);
+  EXPECT_NE(fifo.err.find(".mf4 cannot be written into a pipe, expected a file"), std::string::npos)
+      << fifo.err;
 }
 
 TEST_F(Replay, JsonHasTheFieldsOfTheInterface) {
