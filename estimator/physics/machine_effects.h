@@ -38,6 +38,9 @@ struct MachineEffects {
   double loss_constant_Nm = 0.0;
   double loss_per_kN_Nm = 0.0;
   double loss_per_rad_s_Nm = 0.0;
+  // Behind the belt: T_secondary,measured = T_secondary,belt - constant - per_rad_s omega_s.
+  double secondary_loss_constant_Nm = 0.0;
+  double secondary_loss_per_rad_s_Nm = 0.0;
   // r_g = r_g0 (1 + end stop) (1 - per_kN F - per_kN2 F^2 - per_Nm T_p)
   double deformation_per_kN = 0.0;
   double deformation_per_kN2 = 0.0;
@@ -60,7 +63,7 @@ struct MachineEffects {
 };
 
 // Where an effect acts, in the order of evaluation.
-enum class Stage { kMeasurement, kForce, kDriveline, kRatio, kFriction };
+enum class Stage { kMeasurement, kForce, kDriveline, kRatio, kFriction, kSecondaryShaft };
 
 // The `role` of an effect in a file: which channel, or which input, it is of.
 struct EffectRole {
@@ -214,6 +217,15 @@ inline constexpr std::array kRows{
     EffectRow{"channel_skew", "delay_s", "s", nullptr, Stage::kMeasurement, 0.03, -0.2, 0.2,
               "x_measured(t) = x_true(t - delay)", "speed", "rate of the channel",
               "speed steps at constant torque and clamp force", kSkewedChannels},
+    EffectRow{
+        "secondary_loss", "constant_Nm", "Nm", &E::secondary_loss_constant_Nm,
+        Stage::kSecondaryShaft, 2.0, -20.0, 20.0, "T_s = T_s,belt - a", "secondary torque",
+        "nothing",
+        "steady torque at both end stops: a drag at the other shaft counts there by the ratio"},
+    EffectRow{"secondary_loss", "per_rad_s_Nm", "Nm s/rad", &E::secondary_loss_per_rad_s_Nm,
+              Stage::kSecondaryShaft, 0.015, -0.5, 0.5, "T_s = T_s,belt - c omega_s",
+              "secondary torque", "secondary_speed",
+              "sweep the speed at constant torque and clamp force with secondary_torque recorded"},
 };
 }  // namespace effect_table
 

@@ -58,8 +58,13 @@ void apply_model(const std::string& path, sim::RigScenario& scenario) {
   take(model.friction, "mu_max", belt.mu_max);
   take(model.friction, low ? "peak_slip_low_percent" : "peak_slip_overdrive_percent",
        belt.peak_slip_percent);
-  ModelFile rest = model;  // the deformation is the variator's
-  rest.driveline.erase("deformation_per_kN");
+  take(model.driveline, "secondary_loss_constant_Nm", scenario.variator.secondary_loss_Nm);
+  take(model.driveline, "secondary_loss_per_rad_s_Nm", scenario.variator.secondary_loss_Nm_s);
+  ModelFile rest = model;  // these are the variator's
+  for (const char* key :
+       {"deformation_per_kN", "secondary_loss_constant_Nm", "secondary_loss_per_rad_s_Nm"}) {
+    rest.driveline.erase(key);
+  }
   MachineEffects whole = daemon::whole_machine(rest);
   whole.centrifugal_N_s2 += model.variator.secondary_centrifugal_N_s2;
   lay(whole, scenario.effects);
@@ -90,9 +95,12 @@ void apply_model(const std::string& path, sim::VehicleScenario& scenario) {
   take(model.friction, "mu_max", scenario.belt.overdrive.mu_max);
   take(model.friction, "peak_slip_overdrive_percent", scenario.belt.overdrive.peak_slip_percent);
   take(model.friction, "peak_slip_low_percent", scenario.belt.low_peak_slip_percent);
-  ModelFile rest = model;  // these two are the variator's
-  rest.driveline.erase("deformation_per_kN");
-  rest.driveline.erase("loss_constant_Nm");
+  // The first two are the variator's; the drag at the wheels' side no model of a car has measured.
+  ModelFile rest = model;
+  for (const char* key : {"deformation_per_kN", "loss_constant_Nm", "secondary_loss_constant_Nm",
+                          "secondary_loss_per_rad_s_Nm"}) {
+    rest.driveline.erase(key);
+  }
   lay(daemon::whole_machine(rest), scenario.effects);
   scenario.learned = daemon::learned_terms(model);
 }

@@ -18,12 +18,19 @@ RigScenario with_its_belt(RigScenario scenario) {
   return scenario;
 }
 
+VariatorParameters with_its_drag(VariatorParameters variator,
+                                 const estimator::MachineEffects& effects) {
+  variator.secondary_loss_Nm += effects.secondary_loss_constant_Nm;
+  variator.secondary_loss_Nm_s += effects.secondary_loss_per_rad_s_Nm;
+  return variator;
+}
+
 }  // namespace
 
 RigSimulation::RigSimulation(const RigScenario& scenario)
     : Simulation(scenario),
       scenario_(with_its_belt(scenario)),
-      plant_(scenario.variator, scenario_.friction()),
+      plant_(with_its_drag(scenario.variator, scenario.effects), scenario_.friction()),
       command_force_N_(scenario.start_force_N),
       clamp_force_N_(scenario.start_force_N),
       clamping_(scenario.effects, step_s_),

@@ -63,6 +63,8 @@ VehiclePlant::VehiclePlant(const VehicleScenario& scenario)
                                    std::pow(body_.wheel_radius_m / body_.final_drive, 2)),
       cos_wedge_(std::cos(variator_.half_wedge_angle_rad)) {
   belt_.overdrive = shaped(belt_.overdrive, effects_);
+  variator_.secondary_loss_Nm += effects_.secondary_loss_constant_Nm;
+  variator_.secondary_loss_Nm_s += effects_.secondary_loss_per_rad_s_Nm;
   const double span = std::log(variator_.ratio_overdrive / variator_.ratio_low);
   for (int i = 0; i < kRadii; ++i) {
     const double ratio = variator_.ratio_low * std::exp(span * i / (kRadii - 1));

@@ -1,6 +1,7 @@
 // Writes one recording of the generator as CSV files, a configuration and the truth.
 //   generate DIRECTORY trial NUMBER                     that trial of the blind test
-//   generate DIRECTORY SEED [EFFECT.PARAMETER SIZE]...  SIZE in units of the usual size
+//   generate DIRECTORY SEED [equal] [EFFECT.PARAMETER SIZE]...  SIZE in units of the usual size;
+//                                                       equal: the same ramp twelve times
 #include <charconv>
 #include <cstdio>
 #include <cstring>
@@ -14,8 +15,9 @@
 int main(int argc, char** argv) {
   using namespace beltgrip::blind;
   if (argc < 3) {
-    std::fprintf(stderr,
-                 "usage: generate DIRECTORY trial NUMBER | SEED [EFFECT.PARAMETER SIZE]...\n");
+    std::fprintf(
+        stderr,
+        "usage: generate DIRECTORY trial NUMBER | SEED [equal] [EFFECT.PARAMETER SIZE]...\n");
     return 64;
   }
   const std::filesystem::path directory = argv[1];
@@ -32,8 +34,9 @@ int main(int argc, char** argv) {
     trial.seed = static_cast<std::uint64_t>(number(argv[2]));
     Random random(trial.seed);
     trial.machine = draw_machine(random);
-    trial.plan = draw_plan(random, trial.machine.setting, 12);
-    for (int i = 3; i + 1 < argc; i += 2) {
+    const bool equal = argc > 3 && std::strcmp(argv[3], "equal") == 0;
+    trial.plan = equal ? paper_plan(12) : draw_plan(random, trial.machine.setting, 12);
+    for (int i = equal ? 4 : 3; i + 1 < argc; i += 2) {
       const std::string name = argv[i];
       for (const Plantable& each : plantables()) {
         if (each.effect + "." + each.parameter == name) {

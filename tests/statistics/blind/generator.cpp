@@ -1,6 +1,7 @@
 #include "tests/statistics/blind/generator.h"
 
 #include <algorithm>
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <numbers>
@@ -282,6 +283,10 @@ History Experiment::run() {
                         fault_("torque_loss.per_kN_Nm") * force * 1e-3 +
                         fault_("torque_loss.per_rad_s_Nm") * omega_p +
                         fault_("x_loss_temperature.size") * (80.0 - temperature_C_) / 40.0;
+    const auto drag = [&](double w) {
+      return m_.secondary_loss_Nm + fault_("secondary_loss.constant_Nm") +
+             (m_.secondary_loss_per_speed_Nms + fault_("secondary_loss.per_rad_s_Nm")) * w;
+    };
     double acceleration_p = 0.0, acceleration_s = 0.0;
     double torque_p = 0.0, load_s = 0.0;
     if (!car) {
@@ -294,7 +299,7 @@ History Experiment::run() {
       const auto residual = [&](double w) {
         return w - omega_s -
                kStep_s / m_.secondary_inertia_kg_m2 *
-                   (belt(1.0 - w / (omega_p * ratio)) / ratio - load_s);
+                   (belt(1.0 - w / (omega_p * ratio)) / ratio - load_s - drag(w));
       };
       double low = omega_p * ratio * 0.3, high = omega_p * ratio * 1.9;
       double w = omega_s;
@@ -340,7 +345,7 @@ History Experiment::run() {
       slip = 1.0 - omega_s / (omega_p * ratio);
       belt_torque = belt(slip);
       torque_p = torque;
-      load_s = belt_torque / ratio - m_.secondary_inertia_kg_m2 * acceleration_s;
+      load_s = belt_torque / ratio - m_.secondary_inertia_kg_m2 * acceleration_s - drag(omega_s);
     }
     belt_before = belt_torque;
     energy_J += std::abs(belt_torque * slip) * omega_p * kStep_s;
@@ -474,6 +479,12 @@ Machine draw_machine(Random& random) {
   m.noise_pressure_Pa = random.log_uniform(500.0, 4000.0);
   m.noise_torque_Nm = random.log_uniform(0.1, 0.5);
   m.sample_rate_hz = random.uniform() < 0.75 ? 100.0 : 200.0;
+  // From a stream of its own: what follows is drawn as it was before there was any drag.
+  Random behind_belt(std::bit_cast<std::uint64_t>(m.mu_max));
+  if (behind_belt.uniform() < 0.5) {
+    m.secondary_loss_Nm = behind_belt.uniform(0.0, 1.5);
+    m.secondary_loss_per_speed_Nms = behind_belt.uniform(0.0, 0.004);
+  }
   return m;
 }
 
@@ -550,6 +561,8 @@ const std::vector<Plantable>& plantables() {
       {"speed_ripple", "primary", 1.2e-3, true},
       {"speed_ripple", "secondary", 1.2e-3, true},
       {"channel_skew", "delay_s", 0.03, false},
+      {"secondary_loss", "constant_Nm", 4.0, true},
+      {"secondary_loss", "per_rad_s_Nm", 0.03, true},
   };
   return kAll;
 }

@@ -44,6 +44,7 @@ struct Machine {
   double fall_per_unit = 0.15;  // of mu, per unit slip beyond the peak
   double deformation_per_kN = 1e-3;
   double loss_Nm = 0.5, loss_per_speed_Nms = 4e-3;
+  double secondary_loss_Nm = 0.0, secondary_loss_per_speed_Nms = 0.0;  // behind the belt
   double ratio_error_overdrive = 0.0, ratio_error_low = 0.0;
   double primary_inertia_kg_m2 = 0.18, secondary_inertia_kg_m2 = 0.3;
   // scatter between experiments, one sigma

@@ -18,6 +18,7 @@ using Course = std::function<double(double t_s)>;
 constexpr double kEnd_s = 12.0;
 constexpr double kMuMax = 0.1, kPeakSlipLow = 0.03, kPeakSlipOverdrive = 0.02;
 constexpr double kDeformationPerN = 1e-6, kLoss_Nm = 0.5, kLossPerSpeed_Nms = 5e-3;
+constexpr double kDrag_Nm = 0.5, kDragPerSpeed_Nms = 2e-3;  // at the secondary shaft
 constexpr double kSecondaryInertia_kgm2 = 0.1, kPrimaryInertia_kgm2 = 0.18;
 constexpr double kArea_m2 = 0.0113, kSpring_N = 500.0;
 constexpr double kLow = 0.405, kOverdrive = 2.25;
@@ -118,7 +119,8 @@ double rig_rate(const ExperimentData& data, double t_s, double omega_s) {
   const double ratio = kLow * (1.0 - kDeformationPerN * force_N);
   const double slip = 1.0 - omega_s / (at(data.omega_p.value, t_s) * ratio);
   const double belt_Nm = capacity_Nm(force_N, kRadiusLow_m) * traction(slip, kPeakSlipLow);
-  return (belt_Nm / ratio - at(data.torque_s.value, t_s)) / kSecondaryInertia_kgm2;
+  return (belt_Nm / ratio - at(data.torque_s.value, t_s) - kDrag_Nm - kDragPerSpeed_Nms * omega_s) /
+         kSecondaryInertia_kgm2;
 }
 
 TEST(Forward, StiffRigFollowsTheFineIntegrationUpToThePeakAndEndsThere) {
@@ -208,7 +210,10 @@ TEST(Forward, VehicleFollowsTheFineIntegration) {
     const double belt_Nm =
         capacity_Nm(force_N, kRadiusOverdrive_m) * traction(slip, kPeakSlipOverdrive);
     const double acceleration = (data.omega_s.value[k + 1] - data.omega_s.value[k - 1]) / 0.2;
-    EXPECT_NEAR(torque_s[k], belt_Nm / ratio - kSecondaryInertia_kgm2 * acceleration, 0.05) << k;
+    const double drag_Nm = kDrag_Nm + kDragPerSpeed_Nms * data.omega_s.value[k];
+    EXPECT_NEAR(torque_s[k], belt_Nm / ratio - kSecondaryInertia_kgm2 * acceleration - drag_Nm,
+                0.05)
+        << k;
   }
 }
 

@@ -49,8 +49,9 @@ constexpr double kLeftOutMin = 0.0;      // of the log predictive density
 constexpr double kLeftOutPlain = 200.0;  // the same: beyond doubt, however few experiments show it
 constexpr double kRippleMin = 1e-4;      // of the speed: less is of no consequence for slip
 
-constexpr std::array kConstants{kDeformationPerkN, kLossConstant_Nm, kLossPerSpeed_Nms,
-                                kLnRatioOverdrive, kLnRatioLow};
+constexpr std::array kConstants{kDeformationPerkN,         kLossConstant_Nm, kLossPerSpeed_Nms,
+                                kLnRatioOverdrive,         kLnRatioLow,      kSecondaryLoss_Nm,
+                                kSecondaryLossPerSpeed_Nms};
 
 std::string_view id_of(const Engine& engine, int slot) {
   return engine.campaign().slots[static_cast<std::size_t>(slot)].row->id;

@@ -127,7 +127,9 @@ Engine::Engine(Campaign campaign) : campaign_(std::move(campaign)) {
     const bool is_overdrive = i == kLnPeakSlipOverdrive ||
                               (i >= kShapeOverdrive && i < kShapeLow) || i == kLnRatioOverdrive;
     if ((is_low && !low) || (is_overdrive && !overdrive)) continue;
-    if (i == kSecondaryInertia_kgm2 && !campaign_.has_balance) continue;
+    const bool is_secondary =
+        i == kSecondaryInertia_kgm2 || i == kSecondaryLoss_Nm || i == kSecondaryLossPerSpeed_Nms;
+    if (is_secondary && !campaign_.has_balance) continue;
     if ((i == kCommandGain || i == kCommandOffset_Pa) && !campaign_.has_tracking) continue;
     nuisances_.push_back(i);
   }

@@ -123,7 +123,7 @@ Pass integrate(const ExperimentData& data, const Quantities& q, const ArrayXd& m
     if (!secondary) {
       by.torque_Nm = q.belt_torque[k] + configured_inertia_kg_m2 * data.omega_p.slope[k];
     } else if (data.torque_s.present) {
-      by.torque_Nm = -data.torque_s.value[k];
+      by.torque_Nm = -data.torque_s.value[k] - q.secondary_loss_Nm[k];
     } else {
       by.torque_Nm = inertia_kg_m2 * following(k) - q.belt_torque[k] / q.ratio[k];
     }
@@ -238,7 +238,7 @@ Forward run_forward(const Campaign& campaign, int run, const ModelState& state) 
     const Quantities q = quantities(campaign, simulated, run, state);
     add("secondary_torque", data.torque_s.value,
         last.belt_torque / q.ratio -
-            state.nuisance[kSecondaryInertia_kgm2] * data.omega_s.slow_slope);
+            state.nuisance[kSecondaryInertia_kgm2] * data.omega_s.slow_slope - q.secondary_loss_Nm);
   }
   return out;
 }

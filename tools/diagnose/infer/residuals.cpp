@@ -274,6 +274,12 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
     case kSecondaryInertia_kgm2:
       change.balance = -at.measured.ratio * at.measured.slope_s;
       return propagate(campaign, at, change);
+    case kSecondaryLoss_Nm:
+      change.balance = -at.measured.ratio;
+      return propagate(campaign, at, change);
+    case kSecondaryLossPerSpeed_Nms:
+      change.balance = -at.measured.ratio * at.measured.omega_s;
+      return propagate(campaign, at, change);
     default:
       break;
   }

@@ -53,6 +53,8 @@ NuisanceTable default_nuisances() {
       {"ln_ratio_overdrive", 0.0, 6e-4, 1e-5},
       {"ln_ratio_low", 0.0, 6e-4, 1e-5},
       {"secondary_inertia_kg_m2", 0.1, 0.3, 1e-3},
+      {"secondary_loss_constant_Nm", 0.5, 0.6, 1e-2},
+      {"secondary_loss_per_rad_s_Nm", 2e-3, 4e-3, 1e-4},
       {"command_offset_Pa", 0.0, 1e5, 10.0},
       {"command_gain", 0.0, 0.1, 1e-4},
   }};
@@ -255,6 +257,7 @@ Quantities evaluate(const ExperimentData& run, int experiment,
             ArrayXd::Zero(n),
             {},
             {},
+            {},
             ArrayXd::Zero(n),
             {nuisance[kLnPeakSlipOverdrive], nuisance[kLnPeakSlipLow]},
             {}};
@@ -304,8 +307,13 @@ Quantities evaluate(const ExperimentData& run, int experiment,
   if (run.torque_s.present) {
     // From the slow copies of all three channels: the inertia's share would else be fitted to the
     // noise of the speed's slope.
+    c.secondary_loss_Nm =
+        nuisance[kSecondaryLoss_Nm] + nuisance[kSecondaryLossPerSpeed_Nms] * c.omega_s;
+    apply(Stage::kSecondaryShaft);
     q.balance = c.belt_torque + run.torque.slow - run.torque.value -
-                ratio * (run.torque_s.slow + nuisance[kSecondaryInertia_kgm2] * c.slope_s);
+                ratio * (run.torque_s.slow + nuisance[kSecondaryInertia_kgm2] * c.slope_s +
+                         c.secondary_loss_Nm);
+    q.secondary_loss_Nm = std::move(c.secondary_loss_Nm);
   }
   if (run.command.present) {
     q.tracking =

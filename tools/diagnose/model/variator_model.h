@@ -3,7 +3,8 @@
 // friction curve, so it holds on both sides of the peak.
 //   F_s = A p_s + F_spring + c omega_s^2          T_belt = T_p - J d(omega_p)/dt - loss
 //   sigma = 1 - omega_s / (omega_p r_g)           capacity K = 2 R_p F_s mu_max / cos(theta)
-//   T_belt = K g(sigma / sigma_peak)              balance: T_belt - r_g (T_s + J_s d(omega_s)/dt)
+//   T_belt = K g(sigma / sigma_peak)
+//   balance: T_belt - r_g (T_s + J_s d(omega_s)/dt + loss_s)
 #pragma once
 
 #include <Eigen/Core>
@@ -42,6 +43,8 @@ enum Nuisance : int {
   kLnRatioOverdrive,
   kLnRatioLow,
   kSecondaryInertia_kgm2,
+  kSecondaryLoss_Nm,
+  kSecondaryLossPerSpeed_Nms,
   kCommandOffset_Pa,  // tracking residual only
   kCommandGain,
   kNuisanceCount
@@ -69,6 +72,7 @@ struct Context {
   Eigen::ArrayXd deformation;  // r_g = r_g0 (1 - deformation) exp(ln_ratio)
   Eigen::ArrayXd ln_ratio;
   Eigen::ArrayXd slip, belt_torque;
+  Eigen::ArrayXd secondary_loss_Nm;  // between belt and secondary torque, drag positive
   Eigen::ArrayXd ln_friction;
   std::array<double, kStops> ln_peak_slip{}, fall{};
 };
@@ -76,8 +80,9 @@ struct Context {
 // What the residuals are made of.
 struct Quantities {
   Eigen::ArrayXd slip, belt_torque, capacity, force_N, deformation, ratio, balance, tracking;
-  Eigen::ArrayXd omega_p, omega_s;  // the true ones
-  Eigen::ArrayXd slope_s;           // of omega_s
+  Eigen::ArrayXd omega_p, omega_s;   // the true ones
+  Eigen::ArrayXd slope_s;            // of omega_s
+  Eigen::ArrayXd secondary_loss_Nm;  // empty without secondary torque
   std::array<double, kStops> ln_peak_slip{}, fall{};
 };
 

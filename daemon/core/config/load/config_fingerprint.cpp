@@ -41,7 +41,8 @@ std::string config_fingerprint(const Config& config) {
   }
   if (config.corrected) {
     for (const estimator::EffectRow& key : estimator::effect_rows()) {
-      if (key.value == nullptr) continue;
+      // Nothing that lies behind the belt enters what is measured.
+      if (key.value == nullptr || key.stage == estimator::Stage::kSecondaryShaft) continue;
       text += std::string(key.id) + '.' + std::string(key.parameter) + '=' +
               number_text((*config.corrected).*key.value) + ';';
     }

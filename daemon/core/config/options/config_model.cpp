@@ -53,6 +53,10 @@ constexpr OptionRow kDriveline[] = {
     key("driveline", "ratio_low_relative", "", "The same at the low end stop."),
     key("driveline", "secondary_inertia_kg_m2", "kg m2",
         "Inertia between the belt and secondary_torque."),
+    key("driveline", "secondary_loss_constant_Nm", "Nm",
+        "Torque that is lost between the belt and secondary_torque, constant."),
+    key("driveline", "secondary_loss_per_rad_s_Nm", "Nm s/rad",
+        "And per speed of the secondary pulley."),
     key("driveline", "command_offset_Pa", "Pa",
         "By how much the secondary pressure is above its command."),
     key("driveline", "command_gain", "", "And by which share of the command."),
@@ -267,6 +271,8 @@ MachineEffects whole_machine(const ModelFile& model) {
   };
   out.loss_constant_Nm += given("loss_constant_Nm");
   out.loss_per_rad_s_Nm += given("loss_per_rad_s_Nm");
+  out.secondary_loss_constant_Nm += given("secondary_loss_constant_Nm");
+  out.secondary_loss_per_rad_s_Nm += given("secondary_loss_per_rad_s_Nm");
   out.deformation_per_kN += given("deformation_per_kN");
   out.end_stop_low += given("ratio_low_relative");
   out.end_stop_overdrive += given("ratio_overdrive_relative");

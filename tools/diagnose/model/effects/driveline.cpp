@@ -1,4 +1,4 @@
-// Effects between shaft and belt, and of the geometry: torque that does not reach the belt, radii
+// Effects between shafts and belt, and of the geometry: torque that does not reach the belt, radii
 // that are not what the ratio says.
 #include "tools/diagnose/model/effects/effect.h"
 
@@ -29,6 +29,12 @@ void apply_loss_per_kN(Context& c, const Slot&, double per_kN_Nm) {
 }
 void apply_loss_per_speed(Context& c, const Slot&, double per_rad_s_Nm) {
   c.loss_Nm += per_rad_s_Nm * c.omega_p;
+}
+void apply_secondary_constant(Context& c, const Slot&, double constant_Nm) {
+  c.secondary_loss_Nm += constant_Nm;
+}
+void apply_secondary_per_speed(Context& c, const Slot&, double per_rad_s_Nm) {
+  c.secondary_loss_Nm += per_rad_s_Nm * c.omega_s;
 }
 void apply_deformation_linear(Context& c, const Slot&, double per_kN) {
   c.deformation += per_kN * 1e-3 * c.force_N;
@@ -75,6 +81,9 @@ void at_low(const Carried& data, const AddSlot& add) {
 void at_overdrive(const Carried& data, const AddSlot& add) {
   if (data.overdrive) add(0, {});
 }
+void with_secondary_torque(const Carried& data, const AddSlot& add) {
+  if (data.secondary_torque) add(0, {});
+}
 void by_each_force(const Carried&, const AddSlot& add) {
   add(0, {});
   add(0, "clamp force");
@@ -91,6 +100,8 @@ constexpr Equation kEquations[] = {
     {"end_stop_ratio", "low", apply_end_stop_low, at_low},
     {"end_stop_ratio", "overdrive", apply_end_stop_overdrive, at_overdrive},
     {"ratio_creep", "rate", apply_ratio_creep, by_each_force},
+    {"secondary_loss", "constant_Nm", apply_secondary_constant, with_secondary_torque},
+    {"secondary_loss", "per_rad_s_Nm", apply_secondary_per_speed, with_secondary_torque},
 };
 
 }  // namespace

@@ -105,6 +105,7 @@ std::vector<Slot> make_slots(const std::vector<ExperimentData>& runs) {
   data.experiments = static_cast<int>(runs.size());
   data.temperature = any(runs, [](const auto& run) { return run.temperature.present; });
   data.command = any(runs, [](const auto& run) { return run.command.present; });
+  data.secondary_torque = any(runs, [](const auto& run) { return run.torque_s.present; });
   data.low = any(runs, [](const auto& run) { return has_stop(run, kLowStop); });
   data.overdrive = any(runs, [](const auto& run) { return has_stop(run, kOverdriveStop); });
   data.pressure_varies = pressure_moves_variously(runs);

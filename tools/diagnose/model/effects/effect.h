@@ -23,6 +23,7 @@ struct Carried {
   bool temperature = false, command = false;
   bool low = false, overdrive = false;  // end stops
   bool pressure_varies = false;         // at different rates
+  bool secondary_torque = false;
 };
 
 struct Slot;

@@ -1,0 +1,79 @@
+// Drag between the belt and the torque that is measured at the secondary shaft: any machine has
+// some, and a large one is a finding. The recordings are the blind generator's.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/statistics/blind/generator.h"
+#include "tools/diagnose/decide/namer.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+struct Diagnosed {
+  Engine engine;
+  Naming naming;
+};
+
+Diagnosed diagnosed(double drag_Nm, double drag_per_speed_Nms) {
+  blind::Trial trial;
+  trial.seed = 7;
+  trial.machine.law = blind::Law::kTanh;
+  trial.machine.secondary_loss_Nm = drag_Nm;
+  trial.machine.secondary_loss_per_speed_Nms = drag_per_speed_Nms;
+  blind::Random random(trial.seed);
+  trial.plan = blind::draw_plan(random, trial.machine.setting, 10);
+  // Drag at one shaft is told from drag at the other by both end stops.
+  for (const std::size_t i : {1U, 4U, 7U}) {
+    trial.plan[i].low = true;
+    trial.plan[i].torque_Nm = 40.0;
+  }
+  estimator::VariatorParameters variator;
+  variator.primary_inertia_kg_m2 = trial.machine.primary_inertia_kg_m2;
+  std::vector<ExperimentData> runs;
+  for (const std::string& text : blind::record(trial).csv) {
+    runs.push_back(prepare(parse_csv(text, "run.csv"), variator));
+  }
+  Engine engine(make_campaign(std::move(runs), nominal_model(variator)));
+  Naming naming = name_effects(engine, [] { return false; });
+  return {std::move(engine), std::move(naming)};
+}
+
+double mu_max(const Diagnosed& d) { return std::exp(d.naming.hypothesis.state.nuisance[kLnMuMax]); }
+
+// Left out of the machine, 2 Nm at 230 rad/s pass for 5 % of the friction.
+TEST(SecondaryLoss, OfAHealthyMachineIsNoFindingAndNoFriction) {
+  for (const double drag_Nm : {0.0, 1.2}) {
+    SCOPED_TRACE(drag_Nm);
+    const Diagnosed d = diagnosed(drag_Nm, drag_Nm / 400.0);
+    EXPECT_TRUE(d.naming.accepted.empty());
+    EXPECT_NEAR(mu_max(d), 0.1, 0.001);
+  }
+}
+
+TEST(SecondaryLoss, BeyondThatIsFoundInItsSize) {
+  const Diagnosed d = diagnosed(4.5, 0.002);
+  ASSERT_EQ(d.naming.accepted.size(), 1U);
+  const Accepted& found = d.naming.accepted.front();
+  EXPECT_EQ(d.engine.campaign().slots[static_cast<std::size_t>(found.slot)].label(),
+            "secondary_loss.constant_Nm");
+  // Of the 4.5 Nm some are the machine's own: 0.5 and 0.6 more or less.
+  const double size_Nm = d.naming.hypothesis.state.effects[found.slot];
+  EXPECT_NEAR(size_Nm + d.naming.hypothesis.state.nuisance[kSecondaryLoss_Nm], 4.5, 0.15);
+  EXPECT_NEAR(size_Nm, 4.0, 1.2);
+  // And what is lost at the other shaft is that machine's own.
+  EXPECT_NEAR(d.naming.hypothesis.state.nuisance[kLossConstant_Nm], 0.5, 0.3);
+}
+
+TEST(SecondaryLoss, IsNothingToFitWithoutThatTorque) {
+  blind::Trial trial;
+  trial.seed = 3;
+  trial.plan = blind::paper_plan(1);
+  SignalTable table = parse_csv(blind::record(trial).csv.front(), "run.csv");
+  table[Role::kSecondaryTorque] = {};
+  const std::vector<ExperimentData> runs{prepare(table, {})};
+  for (const Slot& slot : make_slots(runs)) EXPECT_NE(slot.row->id, "secondary_loss");
+}
+
+}  // namespace
+}  // namespace beltgrip::diagnose
