@@ -77,8 +77,10 @@ struct EffectRow {
   std::string_view unit;
   double MachineEffects::*value;  // none: one of the roles must say which
   Stage stage;
-  double typical;    // size met in practice, one sigma of the prior of a diagnosis; 0: not a size
-  double low, high;  // physical bounds of a fit
+  double typical;  // size met in practice, one sigma of the prior of a diagnosis; 0: not a size
+  // Physical bounds of what a fit may find, of the whole of an effect: no drag that drives, no
+  // pulley that grows under force, beyond what the nominal machine has of it.
+  double low, high;
   std::string_view equation;
   std::string_view acts_on;     // friction, ratio, torque, clamp force, speed
   std::string_view depends_on;  // what the residual follows
@@ -107,7 +109,7 @@ inline constexpr std::array kRows{
     EffectRow{"torque_bias", "bias_Nm", "Nm", &E::torque_bias_Nm, Stage::kMeasurement, 3.0, -40.0,
               40.0, "T_measured = T_true + bias", "torque", "nothing",
               "repeat one ramp at two torque levels (20 and 60 Nm), or read the sensor unloaded"},
-    EffectRow{"torque_gain", "gain", "", &E::torque_gain, Stage::kMeasurement, 0.05, -0.5, 0.5,
+    EffectRow{"torque_gain", "gain", "", &E::torque_gain, Stage::kMeasurement, 0.05, -0.25, 0.25,
               "T_measured = (1 + gain) T_true", "torque", "torque",
               "step the torque at constant clamp force with secondary_torque recorded"},
     EffectRow{"inertia_torque", "inertia_kg_m2", "kg m^2", &E::inertia_kg_m2, Stage::kDriveline,
@@ -118,13 +120,13 @@ inline constexpr std::array kRows{
               0.5, "T_measured(t) = T_true(t - delay)", "torque", "rate of torque",
               "torque steps at constant speed and clamp force"},
     EffectRow{"torque_loss", "constant_Nm", "Nm", &E::loss_constant_Nm, Stage::kDriveline, 2.0,
-              -20.0, 20.0, "T_belt = T - a", "torque", "nothing",
+              -1.0, 20.0, "T_belt = T - a", "torque", "nothing",
               "sweep the clamp force at constant torque, and repeat at another speed"},
-    EffectRow{"torque_loss", "per_kN_Nm", "Nm/kN", &E::loss_per_kN_Nm, Stage::kDriveline, 0.3,
-              -10.0, 10.0, "T_belt = T - b F/kN", "torque", "secondary_pressure",
+    EffectRow{"torque_loss", "per_kN_Nm", "Nm/kN", &E::loss_per_kN_Nm, Stage::kDriveline, 0.3, 0.0,
+              10.0, "T_belt = T - b F/kN", "torque", "secondary_pressure",
               "sweep the clamp force at constant torque, far from the peak"},
     EffectRow{"torque_loss", "per_rad_s_Nm", "Nm s/rad", &E::loss_per_rad_s_Nm, Stage::kDriveline,
-              0.015, -0.5, 0.5, "T_belt = T - c omega_p", "torque", "primary_speed",
+              0.015, -5e-3, 0.5, "T_belt = T - c omega_p", "torque", "primary_speed",
               "sweep the speed at constant torque and clamp force"},
     EffectRow{"centrifugal_force", "coefficient_N_s2", "N s^2", &E::centrifugal_N_s2, Stage::kForce,
               6e-3, -0.05, 0.05, "F_true = F_model + c omega_s^2", "clamp force", "secondary_speed",
@@ -149,10 +151,10 @@ inline constexpr std::array kRows{
               "direction of secondary_pressure",
               "the same triangle of the clamp force at two rates: a lag grows with the rate"},
     EffectRow{"pulley_deformation", "per_kN", "1/kN", &E::deformation_per_kN, Stage::kRatio, 2e-3,
-              -0.03, 0.03, "r_g = r_g0 (1 - a F/kN)", "ratio", "secondary_pressure",
+              -1e-3, 0.03, "r_g = r_g0 (1 - a F/kN)", "ratio", "secondary_pressure",
               "sweep the clamp force at almost no torque"},
     EffectRow{"pulley_deformation", "per_kN2", "1/kN^2", &E::deformation_per_kN2, Stage::kRatio,
-              2e-4, -0.005, 0.005, "r_g = r_g0 (1 - b (F/kN)^2)", "ratio", "secondary_pressure",
+              2e-4, 0.0, 0.005, "r_g = r_g0 (1 - b (F/kN)^2)", "ratio", "secondary_pressure",
               "sweep the clamp force up to its maximum at almost no torque"},
     EffectRow{"radius_tilt", "per_Nm", "1/Nm", &E::tilt_per_Nm, Stage::kRatio, 3e-5, -1e-3, 1e-3,
               "r_g = r_g0 (1 - a T_p)", "ratio", "torque",
@@ -219,11 +221,11 @@ inline constexpr std::array kRows{
               "speed steps at constant torque and clamp force", kSkewedChannels},
     EffectRow{
         "secondary_loss", "constant_Nm", "Nm", &E::secondary_loss_constant_Nm,
-        Stage::kSecondaryShaft, 2.0, -20.0, 20.0, "T_s = T_s,belt - a", "secondary torque",
+        Stage::kSecondaryShaft, 2.0, -1.0, 20.0, "T_s = T_s,belt - a", "secondary torque",
         "nothing",
         "steady torque at both end stops: a drag at the other shaft counts there by the ratio"},
     EffectRow{"secondary_loss", "per_rad_s_Nm", "Nm s/rad", &E::secondary_loss_per_rad_s_Nm,
-              Stage::kSecondaryShaft, 0.015, -0.5, 0.5, "T_s = T_s,belt - c omega_s",
+              Stage::kSecondaryShaft, 0.015, -5e-3, 0.5, "T_s = T_s,belt - c omega_s",
               "secondary torque", "secondary_speed",
               "sweep the speed at constant torque and clamp force with secondary_torque recorded"},
 };

@@ -149,11 +149,17 @@ Envelope draw_envelope(std::uint64_t number) {
     trial.machine.scatter_friction *= 2.0;
     trial.plan.resize(7);
   }
+  Random later(~number);
   const auto effect = [&] {
     // One draw a line: compilers differ in the order of a call's arguments.
     const double size = random.log_uniform(0.25, 2.5);
     const auto& all = plantables();
-    const int which_one = random.below(static_cast<int>(all.size()));
+    const int count = static_cast<int>(all.size());
+    // What came to the list later is drawn from a stream of its own: the other trials stay.
+    int which_one = random.below(count - kLaterPlantables);
+    if (later.below(count) < kLaterPlantables) {
+      which_one = count - 1 - later.below(kLaterPlantables);
+    }
     return draw_effect(random, all[static_cast<std::size_t>(which_one)], size);
   };
   if (out.kind == Kind::kSingle || out.kind == Kind::kPair) trial.planted.push_back(effect());

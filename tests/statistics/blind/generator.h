@@ -93,6 +93,7 @@ struct Plantable {
   bool positive;  // only one sign exists
 };
 const std::vector<Plantable>& plantables();
+inline constexpr int kLaterPlantables = 2;  // of them, the last
 // Drawn by the blind test; x_gain_temperature, x_friction_between and x_force_ripple are planted by
 // name alone.
 const std::vector<std::string>& outside_causes();

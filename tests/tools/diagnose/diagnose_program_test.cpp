@@ -196,9 +196,10 @@ TEST_F(Diagnose, SaysNothingOfAHealthyMachine) {
       ++seen[name];
     }
   }
-  for (const char* name : {"whiteness", "secondary_pressure", "primary_speed", "oil_temperature",
-                           "experiment", "time", "direction_of_clamp_force", "ratio",
-                           "order_spectrum_primary", "order_spectrum_secondary"}) {
+  // Not the ratio: what differs from one end stop to the other is drag at either shaft.
+  for (const char* name :
+       {"whiteness", "secondary_pressure", "primary_speed", "oil_temperature", "experiment", "time",
+        "direction_of_clamp_force", "order_spectrum_primary", "order_spectrum_secondary"}) {
     EXPECT_GT(seen[name], 0) << name;
   }
 }

@@ -120,8 +120,9 @@ bool credible(const Engine& engine, int slot, double size) {
   const double share = std::abs(size) / row.typical;
   if (std::abs(size) < kHeld * sample_period_s(engine.campaign(), which)) return false;
   if (row.id == "radius_tilt" && !engine.campaign().torque_varies) return false;
-  return share > kOfConsequence && share < kBelievable && size < row.high &&
-         (size > row.low || row.low == 0.0);
+  const double whole = engine.campaign().switched_on[slot] + size;
+  return share > kOfConsequence && share < kBelievable && whole < row.high &&
+         (whole > row.low || row.low == 0.0);
 }
 
 bool credible(const Engine& engine, const Hypothesis& h) {

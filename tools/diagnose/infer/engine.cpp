@@ -580,7 +580,9 @@ void Engine::move(const std::vector<int>& parameters, const VectorXd& step, doub
     } else {
       const int slot = parameters[j] - kNuisanceCount;
       const EffectRow& row = *campaign_.slots[static_cast<std::size_t>(slot)].row;
-      state.effects[slot] = std::clamp(state.effects[slot] + by, row.low, row.high);
+      const double on = campaign_.switched_on[slot];
+      state.effects[slot] = std::clamp(state.effects[slot] + by, std::min(0.0, row.low - on),
+                                       std::max(0.0, row.high - on));
     }
   }
 }

@@ -1,5 +1,6 @@
-// Drag between the belt and the torque that is measured at the secondary shaft: any machine has
-// some, and a large one is a finding. The recordings are the blind generator's.
+// Torque that is lost on its way. Behind the belt, before the torque that is measured at the
+// secondary shaft: any machine has some, and a large one is a finding. No loss drives. The
+// recordings are the blind generator's.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,12 +16,10 @@ struct Diagnosed {
   Naming naming;
 };
 
-Diagnosed diagnosed(double drag_Nm, double drag_per_speed_Nms) {
+Diagnosed diagnosed(const blind::Machine& machine) {
   blind::Trial trial;
   trial.seed = 7;
-  trial.machine.law = blind::Law::kTanh;
-  trial.machine.secondary_loss_Nm = drag_Nm;
-  trial.machine.secondary_loss_per_speed_Nms = drag_per_speed_Nms;
+  trial.machine = machine;
   blind::Random random(trial.seed);
   trial.plan = blind::draw_plan(random, trial.machine.setting, 10);
   // Drag at one shaft is told from drag at the other by both end stops.
@@ -37,6 +36,13 @@ Diagnosed diagnosed(double drag_Nm, double drag_per_speed_Nms) {
   Engine engine(make_campaign(std::move(runs), nominal_model(variator)));
   Naming naming = name_effects(engine, [] { return false; });
   return {std::move(engine), std::move(naming)};
+}
+
+Diagnosed diagnosed(double drag_Nm, double drag_per_speed_Nms) {
+  blind::Machine machine;
+  machine.secondary_loss_Nm = drag_Nm;
+  machine.secondary_loss_per_speed_Nms = drag_per_speed_Nms;
+  return diagnosed(machine);
 }
 
 double mu_max(const Diagnosed& d) { return std::exp(d.naming.hypothesis.state.nuisance[kLnMuMax]); }
@@ -63,6 +69,22 @@ TEST(SecondaryLoss, BeyondThatIsFoundInItsSize) {
   EXPECT_NEAR(size_Nm, 4.0, 1.2);
   // And what is lost at the other shaft is that machine's own.
   EXPECT_NEAR(d.naming.hypothesis.state.nuisance[kLossConstant_Nm], 0.5, 0.3);
+}
+
+// 5 Nm more at the belt than at the shaft: the shaft's torque is wrong, no bearing drives.
+TEST(Loss, ThatDrivesIsNone) {
+  blind::Machine machine;
+  machine.loss_Nm = -5.0;
+  const Diagnosed d = diagnosed(machine);
+  bool named = false;
+  for (const Accepted& each : d.naming.accepted) {
+    const Slot& slot = d.engine.campaign().slots[static_cast<std::size_t>(each.slot)];
+    if (slot.row->id == "torque_loss") {
+      EXPECT_GT(d.naming.hypothesis.state.effects[each.slot], -1.0);
+    }
+    named |= slot.row->id == "torque_bias";
+  }
+  EXPECT_TRUE(named);
 }
 
 TEST(SecondaryLoss, IsNothingToFitWithoutThatTorque) {
