@@ -53,7 +53,7 @@ class ContainerSource : public ByteSource {
 
   std::size_t read(std::span<char> out) override {
     while (fault_.empty()) {
-      if (left_ == 0) {
+      if (left_ == 0 && !unpacking_) {
         if (!next_object()) return 0;
         continue;
       }
@@ -157,17 +157,15 @@ class ContainerSource : public ByteSource {
     stream_.next_out = reinterpret_cast<Bytef*>(out.data());
     stream_.avail_out = static_cast<uInt>(out.size());
     while (stream_.avail_out == out.size()) {
-      if (stream_.avail_in == 0) {
-        if (left_ == 0) {
-          fail("a container whose packed data end before their end");
-          break;
-        }
+      if (stream_.avail_in == 0 && left_ > 0) {
         const auto bytes = piece(packed_.size());
         if (!bytes) break;
         std::copy(bytes->begin(), bytes->end(), packed_.begin());
         stream_.next_in = reinterpret_cast<Bytef*>(packed_.data());
         stream_.avail_in = static_cast<uInt>(bytes->size());
       }
+      // Without a byte going in, more may still come out.
+      const bool fed = stream_.avail_in > 0;
       const int status = inflate(&stream_, Z_NO_FLUSH);
       if (status == Z_STREAM_END) {
         const std::size_t count = out.size() - stream_.avail_out;
@@ -179,6 +177,10 @@ class ContainerSource : public ByteSource {
       }
       if (status != Z_OK && status != Z_BUF_ERROR) {
         fail("a container with damaged packed data");
+        break;
+      }
+      if (!fed && stream_.avail_out == out.size()) {
+        fail("a container whose packed data end before their end");
         break;
       }
     }

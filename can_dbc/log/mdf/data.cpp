@@ -168,18 +168,21 @@ std::size_t DataSource::unpack(std::span<char> out) {
   stream_.avail_out = static_cast<uInt>(std::min<std::uint64_t>(out.size(), unpacked_));
   const uInt asked = stream_.avail_out;
   while (stream_.avail_out == asked && asked > 0) {
-    if (stream_.avail_in == 0) {
+    if (stream_.avail_in == 0 && left_ > 0) {
       const auto most = static_cast<std::size_t>(std::min<std::uint64_t>(left_, kPackedPiece));
       const std::size_t count = file_.read_at(at_, packed_bytes_.data(), most);
-      if (count == 0) throw MdfError{at_, "a packed block ends before its end"};
+      if (count == 0) throw MdfError{at_, "a packed block is cut off by the end of the file"};
       at_ += count;
       left_ -= count;
       stream_.next_in = reinterpret_cast<Bytef*>(packed_bytes_.data());
       stream_.avail_in = static_cast<uInt>(count);
     }
+    // Without a byte going in, more may still come out.
+    const bool fed = stream_.avail_in > 0;
     const int status = inflate(&stream_, Z_NO_FLUSH);
     if (status == Z_STREAM_END) break;
     if (status != Z_OK && status != Z_BUF_ERROR) throw MdfError{at_, "damaged packed data"};
+    if (!fed && stream_.avail_out == asked) break;
   }
   const std::size_t count = asked - stream_.avail_out;
   unpacked_ -= count;

@@ -217,6 +217,21 @@ TEST(Blf, ObjectsThatBeginInOneContainerAndEndInAnother) {
   }
 }
 
+// Packed content that is longer than every buffer, and hardly longer packed than its end.
+TEST(Blf, LargeContainersLoseNothing) {
+  for (const std::size_t count : {1000U, 1365U, 1366U, 20'000U}) {
+    SCOPED_TRACE(count);
+    std::string content;
+    for (std::size_t i = 0; i < count; ++i) content += object(1, classic(0x123, "abc"), 0);
+    std::string file_text = header();
+    for (int i = 0; i < 5; ++i) file_text += container(content, true);
+    const LogFile file(file_text);
+    const ReadLog log = read_log(file.path());
+    EXPECT_EQ(log.frames.size(), 5 * count);
+    EXPECT_EQ(log.stats.lines_bad, 0U);
+  }
+}
+
 TEST(Blf, ObjectsWithoutAContainer) {
   const LogFile file(header() + objects() + container(objects(), true));
   const ReadLog log = read_log(file.path());
