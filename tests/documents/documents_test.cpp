@@ -102,7 +102,8 @@ std::string configuration() {
       << "Every key of `beltgripd.toml` with its default, unit and range, section by section. What "
       << "is left out has its default; a key that is not here is refused. `systemd/beltgripd.toml` "
       << "is the same as a file to fill in, `beltgrip init` writes one for your car, "
-      << "`include = [\"calibrated.toml\"]` at the top takes what `beltgrip calibrate` found.\n"
+      << "`include = [\"calibrated.toml\"]` at the top takes what `beltgrip calibrate` found, "
+      << "`include = [\"conf.d/*.toml\"]` every file of a folder, by name.\n"
       << kGenerated;
   std::string line;
   bool open = false;

@@ -51,6 +51,11 @@ class DocumentReader {
  private:
   bool read_included(const std::string& path, const std::string& folder, TomlNode& own,
                      TomlNode& root);
+  struct Included {
+    std::string text;  // the path as it is shown
+    std::uint32_t line;
+  };
+  std::vector<Included> included(const TomlNode& include, const std::string& folder);
   static void count_lines_from(std::uint32_t first_line, TomlNode& node);
   static void see_from(const std::string& folder, TomlNode& root);
   void put_over(TomlNode& own, TomlNode& root);
@@ -113,16 +118,11 @@ bool DocumentReader::read_included(const std::string& path, const std::string& f
   namespace fs = std::filesystem;
   std::error_code ignored;
   reading_.push_back(fs::weakly_canonical(path, ignored).string());
-  std::vector<std::string> names;
   const std::size_t errors_before = errors_.count();
   if (include.type != TomlType::kArray) {
     errors_.add(include.line, "include", include.found(), "an array: [\"other.toml\"]");
   }
-  for (const TomlNode& each : include.children) {
-    if (each.type != TomlType::kText || each.text.empty()) {
-      errors_.add(each.line, "include", each.found(), "the path of a configuration in quotes");
-      continue;
-    }
+  for (const Included& each : included(include, folder)) {
     const std::string inner = (fs::path(folder) / each.text).string();
     const std::string file = (fs::path(directory_) / inner).string();
     const std::string canonical = fs::weakly_canonical(file, ignored).string();
@@ -140,6 +140,44 @@ bool DocumentReader::read_included(const std::string& path, const std::string& f
   }
   reading_.pop_back();
   return errors_.count() == errors_before;
+}
+
+// The files that an array names, in its order: "conf.d/*.toml" stands for all of that folder, by
+// name. None is fine; a folder that is not there is not.
+std::vector<DocumentReader::Included> DocumentReader::included(const TomlNode& include,
+                                                               const std::string& folder) {
+  namespace fs = std::filesystem;
+  constexpr const char* kAll = "*.toml";
+  std::vector<Included> all;
+  for (const TomlNode& each : include.children) {
+    if (each.type != TomlType::kText || each.text.empty()) {
+      errors_.add(each.line, "include", each.found(), "the path of a configuration in quotes");
+      continue;
+    }
+    const fs::path path(each.text);
+    if (path.filename() != kAll) {
+      all.push_back({each.text, each.line});
+      continue;
+    }
+    std::error_code error;
+    fs::directory_iterator entry(fs::path(directory_) / folder / path.parent_path(), error);
+    if (error) {
+      errors_.add(each.line, "include",
+                  in_quotes(each.text) + ", whose folder cannot be read (" + error.message() + ")",
+                  "a folder of configurations", kNoInput);
+      continue;
+    }
+    std::vector<std::string> names;
+    for (; entry != fs::directory_iterator(); entry.increment(error)) {
+      const std::string name = entry->path().filename().string();
+      if (name.ends_with(".toml") && name.front() != '.') names.push_back(name);
+    }
+    std::sort(names.begin(), names.end());
+    for (const std::string& name : names) {
+      all.push_back({(path.parent_path() / name).string(), each.line});
+    }
+  }
+  return all;
 }
 
 void DocumentReader::count_lines_from(std::uint32_t first_line, TomlNode& node) {

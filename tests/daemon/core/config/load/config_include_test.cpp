@@ -2,6 +2,7 @@
 // value that a frame brings.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "daemon/core/config/load/load_config.h"
@@ -57,6 +58,30 @@ class Include : public testing::Test {
   }
   test::Workplace place;
 };
+
+TEST_F(Include, AFolderOfConfigurationsByName) {
+  std::filesystem::create_directories(place.path("conf.d"));
+  const std::string toml = "include = [\"base.toml\", \"conf.d/*.toml\"]\n";
+  ASSERT_TRUE(load(toml).config.has_value());  // none is fine
+  place.write("conf.d/20-belt.toml", "[variator]\nratio_low = 0.42\n");
+  place.write("conf.d/10-belt.toml", "[variator]\nratio_low = 0.41\nsafety_factor = 1.4\n");
+  place.write("conf.d/90-belt.toml.bak", "no configuration");
+  place.write("conf.d/.90-belt.toml", "no configuration");
+  const ConfigResult result = load(toml);
+  ASSERT_TRUE(result.config.has_value()) << (result.errors.empty() ? "" : result.errors[0].text);
+  EXPECT_EQ(result.config->variator.ratio_low, 0.42);
+  const std::vector<std::string>& files = result.config->files;
+  for (const char* name : {"conf.d/10-belt.toml", "conf.d/20-belt.toml"}) {
+    EXPECT_NE(std::find(files.begin(), files.end(), place.path(name)), files.end()) << name;
+  }
+  place.write("conf.d/30-belt.toml", "[variator]\nratio_low = \"x\"\n");
+  EXPECT_NE(error(toml).find("conf.d/30-belt.toml:2"), std::string::npos) << error(toml);
+  EXPECT_NE(error("include = [\"base.toml\", \"missing.d/*.toml\"]\n", 66)
+                .find("\"missing.d/*.toml\", whose folder cannot be read"),
+            std::string::npos);
+  place.write("conf.d/30-belt.toml", "include = [\"*.toml\"]\n");
+  EXPECT_NE(error(toml).find("which includes this file"), std::string::npos) << error(toml);
+}
 
 TEST_F(Include, LaterKeysWin) {
   place.write("more/belt.toml", "[variator]\nsafety_factor = 1.5\nratio_low = 0.41\n");
