@@ -27,6 +27,7 @@
 #include "daemon/core/observe/carried_window.h"
 #include "daemon/core/observe/event.h"
 #include "daemon/core/observe/observation.h"
+#include "daemon/core/observe/reasons_now.h"
 #include "daemon/io/bus_claim.h"
 #include "daemon/io/carried_keeper.h"
 #include "daemon/io/flight_recorder.h"
@@ -324,6 +325,12 @@ int run(const Arguments& arguments) {
   Requests requests(request_fd, reloader, log, service);
   bool observed = false;
   MonoTime pulse_at = 0;
+  const auto figure = [&](const Event& event) {
+    observed = slot.take() || observed;
+    if (!observed) return std::string();
+    const Observation& seen = slot.latest();
+    return figure_of(event, reloader.running(), seen.report, seen.signals);
+  };
   const auto take_carried = [&] {
     CarriedWindow window;
     while (carried_ring.pop(window)) carried.take(window, unix_time_s());
@@ -354,7 +361,7 @@ int run(const Arguments& arguments) {
     recorder = std::make_unique<FlightRecorder>(arguments.record, std::move(interfaces),
                                                 *record_rings, wall_ns - steady_ns());
   }
-  Housekeeper housekeeper(events, rings, history.get(), log, stop_fd, on_stop, on_turn);
+  Housekeeper housekeeper(events, rings, history.get(), log, figure, stop_fd, on_stop, on_turn);
 
   const LoopCounters loop = run_loop(*bus.port, pipeline, config.estimator.sample_rate_hz,
                                      estimator::StopReason::kShutdown, &sinks, &meters, tap.get(),

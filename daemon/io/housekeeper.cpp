@@ -7,12 +7,13 @@
 namespace beltgrip::daemon {
 
 Housekeeper::Housekeeper(EventRing& events, HistoryRings& rings, HistoryKeeper* history,
-                         LogSink& log, int stop_fd, std::function<void()> on_stop,
-                         std::function<void()> on_turn)
+                         LogSink& log, std::function<std::string(const Event&)> figure, int stop_fd,
+                         std::function<void()> on_stop, std::function<void()> on_turn)
     : events_(events),
       rings_(rings),
       history_(history),
       log_(log),
+      figure_(std::move(figure)),
       stop_fd_(on_stop ? stop_fd : -1),
       on_stop_(std::move(on_stop)),
       on_turn_(std::move(on_turn)),
@@ -28,7 +29,7 @@ void Housekeeper::stop() {
 void Housekeeper::drain() {
   Event event;
   while (events_.pop(event)) {
-    if (lines_.take(event)) log_.event(event);
+    if (lines_.take(event)) log_.event(event, figure_(event));
     if (const unsigned more = lines_.left_out(event.t)) {
       log_.warning(std::to_string(more) + " more events within a second");
     }

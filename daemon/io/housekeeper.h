@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <functional>
+#include <string>
 #include <thread>
 
 #include "daemon/core/loop/history_rings.h"
@@ -17,11 +18,13 @@ namespace beltgrip::daemon {
 
 class Housekeeper {
  public:
-  // stop_fd readable calls on_stop once, if there is one; on_turn is called every kTurn_ms. Log and
-  // history (which may be absent) are used by this thread alone from here until stop().
+  // figure: what stands beside an event in the log. stop_fd readable calls on_stop once, if there
+  // is one; on_turn is called every kTurn_ms. Log and history (which may be absent) are used by
+  // this thread alone from here until stop().
   static constexpr int kTurn_ms = 20;
   Housekeeper(EventRing& events, HistoryRings& rings, HistoryKeeper* history, LogSink& log,
-              int stop_fd, std::function<void()> on_stop, std::function<void()> on_turn);
+              std::function<std::string(const Event&)> figure, int stop_fd,
+              std::function<void()> on_stop, std::function<void()> on_turn);
   ~Housekeeper();
   // Takes what is left in the ring and ends the thread.
   void stop();
@@ -36,6 +39,7 @@ class Housekeeper {
   HistoryRings& rings_;
   HistoryKeeper* history_;
   LogSink& log_;
+  std::function<std::string(const Event&)> figure_;
   int stop_fd_;
   std::function<void()> on_stop_;
   std::function<void()> on_turn_;

@@ -63,7 +63,7 @@ void LogSink::info(const std::string& line) { logger_->log.info(can::printable(l
 void LogSink::warning(const std::string& line) { logger_->log.warn(can::printable(line)); }
 void LogSink::flush() { logger_->log.flush(); }
 
-void LogSink::event(const Event& event) {
+void LogSink::event(const Event& event, const std::string& figure) {
   if (event.t - second_ >= kSecond || event.t < second_) {
     if (suppressed_ != 0) logger_->log.warn("{} more events in the second before", suppressed_);
     second_ = event.t;
@@ -77,7 +77,7 @@ void LogSink::event(const Event& event) {
   ++lines_;
   logger_->log.log(
       level_of(event) == EventLevel::kWarning ? spdlog::level::warn : spdlog::level::info,
-      text_of(event));
+      text_of(event, figure));
 }
 
 }  // namespace beltgrip::daemon

@@ -24,7 +24,8 @@ class LogSink {
   void info(const std::string& line);
   void warning(const std::string& line);
   // At most kLinesPerSecond of them; the rest is counted and the number logged.
-  void event(const Event& event);
+  // figure: of an inhibit or a fault.
+  void event(const Event& event, const std::string& figure = "");
   void flush();
 
  private:

@@ -11,9 +11,10 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "can_dbc/text/unit_text.h"
 #include "daemon/core/base/named.h"
 #include "daemon/core/experiment/arming.h"
-#include "daemon/core/observe/event.h"
+#include "daemon/core/observe/reasons_now.h"
 #include "daemon/core/publish/names.h"
 #include "daemon/io/carried_keeper.h"
 
@@ -23,10 +24,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;  // NaN and infinity become null
 
-constexpr std::array<const char*, 6> kQualities{"valid", "learning", "frozen",
-                                                "stale", "missing",  "unbound"};
-// By can::Dimension.
-constexpr std::array<const char*, 9> kUnits{"rad/s", "Pa", "Nm", "degC", "m/s", "1", "N", "m", ""};
 constexpr double kMicrosecond = 1e3;
 constexpr int kWaitingMost = 8;
 
@@ -54,10 +51,10 @@ Json signals(MonoTime now, const Observation& observation) {
     if (seen.quality == SignalQuality::kUnbound) continue;
     const auto role = static_cast<Role>(i);
     Json& one = all[std::string(role_name(role))];
-    one["quality"] = kQualities[static_cast<std::size_t>(seen.quality)];
+    one["quality"] = quality_name(seen.quality);
     one["age_s"] = seen.seen ? Json(seconds(now - seen.t)) : Json();
     one["value"] = seen.seen ? Json(seen.value) : Json();
-    one["unit"] = kUnits[static_cast<std::size_t>(role_dimension(role))];
+    one["unit"] = can::si_unit_text(role_dimension(role));
   }
   return all;
 }
@@ -69,7 +66,8 @@ Json result(MonoTime now, const ExperimentResult& last) {
   const bool bound = peak.kind == estimator::PeakKind::kLowerBound;
   return {{"outcome", outcome_name(last.outcome)},
           {"stop_reason", stop_reason_name(last.stop_reason)},
-          {"reason", cause_text(last.stop_reason, last.cause)},
+          {"reason", why(last)},
+          {"remedy", remedy_of(last)},
           {"age_s", seconds(now - last.end)},
           {"mu_max", value ? Json(peak.mu_max) : Json()},
           {"mu_max_std", value ? Json(peak.mu_max_std) : Json()},
@@ -100,6 +98,22 @@ Json names(std::uint32_t bits, const std::array<Named<Enum>, kCount>& all) {
   return set;
 }
 
+Json reasons(const Config& config, const Observation& observation) {
+  Json all = Json::array();
+  const auto add = [&all](const char* kind) {
+    return [&all, kind](const Reason& each) {
+      all.push_back({{"kind", kind},
+                     {"name", each.name},
+                     {"means", each.means},
+                     {"figure", each.figure},
+                     {"remedy", each.remedy}});
+    };
+  };
+  each_fault(observation.report, observation.signals, add("fault"));
+  each_inhibit(config, observation.report, observation.signals, add("inhibit"));
+  return all;
+}
+
 }  // namespace
 
 std::string status_json(const Config& config, MonoTime now, const Observation& observation,
@@ -121,6 +135,7 @@ std::string status_json(const Config& config, MonoTime now, const Observation& o
       {"friction_slope", usable ? Json(curve.friction_slope) : Json()},
       {"faults", names(report.faults, kFaults)},
       {"inhibits", names(report.inhibits, kInhibits)},
+      {"why", reasons(config, observation)},
       {"result", result(now, report.result)},
       {"carried", carried_json(carried)},
       {"signals", signals(now, observation)},

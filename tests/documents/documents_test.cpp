@@ -12,9 +12,9 @@
 #include "can_dbc/dbc/parser.h"
 #include "daemon/core/config/options/config_model.h"
 #include "daemon/core/publish/own_frames.h"
+#include "daemon/core/reasons/reasons.h"
 #include "estimator/physics/machine_effects.h"
 #include "tests/support/program.h"
-#include "tools/reasons/reasons.h"
 
 namespace beltgrip::test {
 namespace {
@@ -192,21 +192,26 @@ std::string with_rows(const std::string& text, const std::string& head, const st
   return text.substr(0, begin) + rows + text.substr(end);
 }
 
-std::string reason_row(std::string_view name, const reasons::Words& words) {
+std::string reason_row(std::string_view name, const daemon::Words& words) {
   return "| " + std::string(name) + " | " + cell(words.means) + " | " + cell(words.remedy) + " |\n";
 }
 
 std::string no_result() {
-  std::string inhibits, faults;
+  std::string inhibits, faults, stops;
+  for (std::size_t i = 0; i < estimator::kStopReasonCount; ++i) {
+    const auto reason = static_cast<estimator::StopReason>(i);
+    stops += reason_row(daemon::stop_reason_name(reason), daemon::words_of(reason));
+  }
   for (const auto& each : daemon::kInhibits) {
-    inhibits += reason_row(each.name, reasons::words_of(each.value));
+    inhibits += reason_row(each.name, daemon::words_of(each.value));
   }
   for (const auto& each : daemon::kFaults) {
-    faults += reason_row(each.name, reasons::words_of(each.value));
+    faults += reason_row(each.name, daemon::words_of(each.value));
   }
   const std::string text = read_file(BELTGRIP_SOURCE_DIR "/tools/NO_RESULT.md");
-  return with_rows(with_rows(text, "| name | what is missing", inhibits), "| fault | what it means",
-                   faults);
+  return with_rows(with_rows(with_rows(text, "| name | what is missing", inhibits),
+                             "| fault | what it means", faults),
+                   "| StopReason | what happened", stops);
 }
 
 struct Document {

@@ -9,12 +9,11 @@
 
 #include "can_dbc/log/can_log.h"
 #include "daemon/core/loop/loop.h"
+#include "daemon/core/observe/reasons_now.h"
 #include "daemon/core/publish/names.h"
 #include "daemon/core/publish/own_frames.h"
 #include "daemon/io/carried_keeper.h"
 #include "daemon/io/reloader.h"
-#include "estimator/method/possible_friction.h"
-#include "estimator/physics/units.h"
 #include "tools/cli/failure.h"
 #include "tools/cli/log_trouble.h"
 #include "tools/cli/recorded_log.h"
@@ -22,7 +21,6 @@
 #include "tools/ports/log_timeline.h"
 #include "tools/ports/record_port.h"
 #include "tools/ports/replay_port.h"
-#include "tools/reasons/reasons.h"
 #include "tools/text/json_writer.h"
 #include "tools/text/seconds.h"
 #include "tools/text/snake_case.h"
@@ -108,7 +106,12 @@ class Sink final : public daemon::SampleSink {
     result_.beyond.take(report.beyond);
     for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
       if ((report.inhibits >> i & 1) == 0) continue;
-      result_.inhibited_s[i] += static_cast<double>(samples) * period_s_;
+      double& held_s = result_.inhibited_s[i];
+      const bool shown = held_s >= kShownInhibit_s;
+      held_s += static_cast<double>(samples) * period_s_;
+      if (shown || held_s < kShownInhibit_s) continue;
+      result_.inhibit_figures[i] = daemon::figure_of(static_cast<daemon::Inhibit>(i), config_,
+                                                     report, daemon::signals_of(pipeline_));
     }
   }
 
@@ -392,11 +395,6 @@ ReplayResult replay(const std::vector<std::string>& paths, const std::string& in
 
 namespace {
 
-bool has_bound(const daemon::ExperimentResult& e) {
-  return e.outcome == daemon::Outcome::kInconclusive &&
-         e.peak.kind == estimator::PeakKind::kLowerBound && e.peak.mu_max > 0.0;
-}
-
 // A shaft that is read as standing still, or as turning the other way, is no slip.
 constexpr double kSlipMost_percent = 100.0;
 
@@ -410,56 +408,6 @@ void interval(text::JsonWriter& json, bool known, double low, double high) {
   } else {
     json.null();
   }
-}
-
-// What reads the friction too high or too low, the likeliest first.
-std::string why_impossible(double mu) {
-  const bool high = mu > estimator::kBeltMost;
-  return format("a friction of %.3g is %s than any metal belt has (%.2f to %.2f): ", mu,
-                high ? "higher" : "lower", estimator::kBeltLeast, estimator::kBeltMost) +
-         (high
-              ? "piston area or spring force too small, centrifugal term left out, radius too "
-                "small, pressure or torque unit?"
-              : "piston area or spring force too large, inertia or sign of the torque, pressure or "
-                "torque unit?");
-}
-
-// Where nothing is known of mu_max.
-std::string why_no_value(const daemon::ExperimentResult& e, const std::string& lost) {
-  if (e.peak.impossible) return why_impossible(e.peak.mu_refused);
-  if (e.peak.contradictory)
-    return "its points lie on no one friction curve; is the piston area, the spring or the "
-           "centrifugal term wrong?";
-  if (e.beyond) {
-    const double share = static_cast<double>(e.beyond.samples) /
-                         static_cast<double>(std::max(e.samples, e.beyond.samples));
-    return daemon::beyond_text(e.beyond) +
-           format(", in %.0f %% of the experiment; to do: ", estimator::kPercent * share) +
-           std::string(reasons::words_of(daemon::Inhibit::kModel).remedy);
-  }
-  switch (e.stop_reason) {
-    case estimator::StopReason::kRatio:
-      return "speeds and torque do not fit the ratio at the end stop; is a speed or the sign of "
-             "the torque wrong, or the ratio off its stop?";
-    case estimator::StopReason::kInputs:
-      if (e.outcome == daemon::Outcome::kAborted && !lost.empty()) return lost + " was lost";
-      return "an input was lost, stood still, or read what cannot be";
-    case estimator::StopReason::kTorque:
-      return "the torque went to zero or changed its sign";
-    default:
-      return e.outcome == daemon::Outcome::kAborted
-                 ? "the experiment was broken off"
-                 : "too short, or too little torque or clamp force, or an input that stood still";
-  }
-}
-
-// Why it ended; where nothing is known of mu_max for another reason, that first.
-std::string why(const daemon::ExperimentResult& e, const std::string& lost) {
-  std::string cause = daemon::cause_text(e.stop_reason, e.cause);
-  if (cause.empty()) return why_no_value(e, lost);
-  const bool known = e.outcome == daemon::Outcome::kCompleted || has_bound(e);
-  if (known || e.outcome == daemon::Outcome::kAborted) return cause;
-  return why_no_value(e, lost) + " (" + cause + ")";
 }
 
 }  // namespace
@@ -489,7 +437,7 @@ std::string experiment_lines(const ReplayResult& result, std::size_t from) {
     json.key("assumed").begin_array();
     for (const std::string& key : result.assumed) json.value(key);
     json.end_array();
-    json.field("reason", why(e, result.lost[i]));
+    json.field("reason", why(e, result.lost[i])).field("remedy", remedy_of(e));
     json.field("mu_max_lower_bound", has_bound(e) ? e.peak.mu_max : text::kJsonNull)
         .field("sigma_stop_percent", slips ? e.sigma_stop_percent : text::kJsonNull)
         .field("contradictory", e.peak.contradictory)
@@ -503,6 +451,17 @@ std::string experiment_lines(const ReplayResult& result, std::size_t from) {
   }
   return lines;
 }
+
+namespace {
+
+// Of an inhibit, as it first held; of what lay beyond a box, the furthest.
+std::string figure_shown(const ReplayResult& result, std::size_t inhibit) {
+  const bool beyond = static_cast<daemon::Inhibit>(inhibit) == daemon::Inhibit::kModel;
+  return beyond && result.beyond ? daemon::beyond_text(result.beyond)
+                                 : result.inhibit_figures[inhibit];
+}
+
+}  // namespace
 
 std::string summary_line(const ReplayResult& result) {
   text::JsonWriter json;
@@ -521,6 +480,20 @@ std::string summary_line(const ReplayResult& result) {
   } else {
     json.null();
   }
+  json.key("inhibits").begin_array();
+  for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
+    if (result.inhibited_s[i] < kShownInhibit_s) continue;
+    const daemon::Reason reason =
+        daemon::reason_of(static_cast<daemon::Inhibit>(i), figure_shown(result, i));
+    json.begin_object()
+        .field("name", reason.name)
+        .field("seconds", result.inhibited_s[i])
+        .field("means", reason.means)
+        .field("figure", reason.figure)
+        .field("remedy", reason.remedy)
+        .end_object();
+  }
+  json.end_array();
   json.key("carried").raw(daemon::carried_json(result.carried).dump());
   json.end_object();
   return json.take() + "\n";
@@ -554,17 +527,13 @@ std::string inhibits_text(const ReplayResult& result) {
   return why;
 }
 
-// Of each of them what it means and what to do, as tools/NO_RESULT.md has it.
+// Of each of them what it means, its figure when it first held, and what to do.
 std::string inhibit_words(const ReplayResult& result) {
   std::string text;
   for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
     if (result.inhibited_s[i] < kShownInhibit_s) continue;
-    const daemon::Named<daemon::Inhibit>& inhibit = daemon::kInhibits[i];
-    const reasons::Words& words = reasons::words_of(inhibit.value);
-    const bool beyond = inhibit.value == daemon::Inhibit::kModel && result.beyond;
-    text += "    " + std::string(inhibit.name) + ": " + std::string(words.means) +
-            (beyond ? ": " + daemon::beyond_text(result.beyond) : "") +
-            "; to do: " + std::string(words.remedy) + "\n";
+    const auto inhibit = static_cast<daemon::Inhibit>(i);
+    text += "    " + reason_text(reason_of(inhibit, figure_shown(result, i))) + "\n";
   }
   return text;
 }
@@ -598,10 +567,11 @@ std::string experiment_text(const ReplayResult& result, std::size_t from) {
       out += format("  mu_max %.4f, std %.4f, 95 %% %.4f .. %.4f, peak at %.2f %% slip\n",
                     e.peak.mu_max, e.peak.mu_max_std, e.peak.ci95_low, e.peak.ci95_high,
                     e.peak.sigma_peak_percent);
-    } else if (has_bound(e)) {
-      out += format("  mu_max is at least %.4f\n", e.peak.mu_max);
     } else {
-      out += "  no value: " + why_no_value(e, result.lost[i]) + "\n";
+      const std::string remedy(remedy_of(e));
+      out += has_bound(e) ? format("  mu_max is at least %.4f", e.peak.mu_max)
+                          : "  no value: " + why_no_value(e, result.lost[i]);
+      out += (remedy.empty() ? "" : "; to do: " + remedy) + "\n";
     }
   }
   return out;

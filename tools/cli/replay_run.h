@@ -44,6 +44,7 @@ struct ReplayResult {
   // How long each daemon::Inhibit kept an experiment from beginning while the driver's feet did
   // not, triggers "coast_down" and "steady".
   std::array<double, daemon::kInhibitCount> inhibited_s{};
+  std::array<std::string, daemon::kInhibitCount> inhibit_figures;  // when it first had
 };
 
 struct ReplayOutputs {

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "can_dbc/text/printable.h"
+#include "daemon/core/reasons/reasons.h"
 
 namespace beltgrip::cli {
 
@@ -44,7 +45,13 @@ std::string outcome_text(const Json& result) {
 
 std::string result_text(const Json& result) {
   if (result.is_null()) return outcome_text(result);
-  return outcome_text(result) + ", " + number(result.at("age_s"), "%.0f s ago");
+  std::string text = outcome_text(result) + ", " + number(result.at("age_s"), "%.0f s ago");
+  if (result.at("mu_max").is_number()) return text;
+  if (const auto reason = result.at("reason").get<std::string>(); !reason.empty()) {
+    text += ": " + reason;
+  }
+  const auto remedy = result.at("remedy").get<std::string>();
+  return remedy.empty() ? text : text + "; to do: " + remedy;
 }
 
 // Of one direction and end stop, from "carried".
@@ -113,6 +120,10 @@ std::string status_text(const Json& status) {
   line("state", state_text(status));
   line("faults", list(status.at("faults")));
   line("inhibits", list(status.at("inhibits")));
+  for (const auto& why : status.at("why")) {
+    const auto text = [&](const char* key) { return why.at(key).get<std::string>(); };
+    line("why", daemon::reason_text({text("name"), text("means"), text("figure"), text("remedy")}));
+  }
   line("last result", result_text(status.at("result")));
   for (const auto& one : status.at("carried")) {
     line(one.at("direction").get<std::string>() + ", " + one.at("ratio").get<std::string>(),

@@ -6,7 +6,6 @@
 
 #include "daemon/core/publish/names.h"
 #include "daemon/core/publish/own_frames.h"
-#include "tools/reasons/reasons.h"
 #include "tools/text/snake_case.h"
 
 namespace beltgrip::monitor {
@@ -235,8 +234,7 @@ void BusModel::take_status(MonoTime t, const OwnFrameView& frame) {
   for (std::size_t i = 0; i < daemon::kFaultCount; ++i) {
     const std::string name(daemon::kFaults[i].name);
     if (frame.value(("Fault" + name).c_str()) < 0.5) continue;
-    const auto& words = reasons::words_of(static_cast<daemon::Fault>(i));
-    said_.faults.push_back({name, std::string(words.means), ""});
+    said_.faults.push_back(daemon::reason_of(static_cast<daemon::Fault>(i), ""));
   }
 }
 

@@ -266,12 +266,6 @@ std::string wall_text(std::int64_t wall_ns) {
   return text;
 }
 
-std::string reason_text(const Reason& reason) {
-  std::string text = reason.name;
-  if (!reason.figure.empty()) text += " (" + reason.figure + ")";
-  return text + ": " + reason.means;
-}
-
 std::string friction_text(const Friction& friction) {
   switch (friction.kind) {
     case estimator::PeakKind::kNone:

@@ -28,8 +28,6 @@ std::string text_of(const std::vector<Line>& lines);
 
 // "2026-11-23 09:22:16", local time.
 std::string wall_text(std::int64_t wall_ns);
-// "torque: outside its window (3.2 Nm, needs 10 to 100 Nm)"
-std::string reason_text(const Reason& reason);
 // "0.1068, 95 % 0.0915 to 0.1221"; "at least 0.0950"; "-"
 std::string friction_text(const Friction& friction);
 

@@ -9,16 +9,12 @@
 #include <vector>
 
 #include "daemon/core/base/port.h"
+#include "daemon/core/reasons/reasons.h"
 #include "estimator/method/slip_curve_estimator.h"
 
 namespace beltgrip::monitor {
 
-// Why something is as it is: its name, what it means, and the figure beside its limit where there
-// is one.
-struct Reason {
-  std::string name, means, figure;
-  friend bool operator==(const Reason&, const Reason&) = default;
-};
+using daemon::Reason;
 
 struct CurvePoint {
   double sigma_star_percent = 0.0, mu_star = 0.0;

@@ -18,6 +18,7 @@ void add_reasons(JsonWriter& json, const char* key, const std::vector<Reason>& r
         .field("name", each.name)
         .field("means", each.means)
         .field("figure", each.figure)
+        .field("remedy", each.remedy)
         .end_object();
   }
   json.end_array();

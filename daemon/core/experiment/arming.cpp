@@ -7,7 +7,6 @@ namespace beltgrip::daemon {
 
 namespace {
 
-constexpr double kPedalReleased = 0.02;
 constexpr double kPedalMoved = 0.05;  // in an experiment: the driver wants something
 constexpr double kOilBand_K = 1.0;    // in an experiment: below what it may begin with
 constexpr Duration kSampleLeast = kMillisecond;

@@ -108,12 +108,19 @@ class Arming {
   static constexpr Duration kClearancePeriod = 100 * kMillisecond;
   static constexpr double kRatioDrift = 0.01;
   static constexpr double kRatioTolerance = 0.03;  // a clamped belt slips and deforms by less
+  static constexpr double kPedalReleased = 0.02;   // chosen: noise of a pedal at rest
   static constexpr double kTorqueDrift = 0.25;
   static constexpr double kTorqueDrift_Nm = 4.0;
   // Of the way from own_percent to peak_percent: on a tanh curve the own force is then at 90 % of
   // the peak, less than the friction of a cylinder and a falling engine torque may take away.
   static constexpr double kSlipShare = 0.4;
   static constexpr double kSlipLeast_percent = 0.15;  // beyond what sensors and deformation explain
+
+  // The preconditions hold, and a request is forbidden for one of these.
+  static constexpr std::uint32_t kForbids =
+      inhibit_bit(Inhibit::kUnreachable) | inhibit_bit(Inhibit::kRamp) |
+      inhibit_bit(Inhibit::kTime) | inhibit_bit(Inhibit::kGrip) | inhibit_bit(Inhibit::kForce) |
+      inhibit_bit(Inhibit::kQuiet);
 
   explicit Arming(const Config& config);
 
@@ -156,10 +163,7 @@ class Arming {
   bool at_end_stop(double ratio) const noexcept;
 
  private:
-  static constexpr std::uint32_t kClearance =
-      inhibit_bit(Inhibit::kUnreachable) | inhibit_bit(Inhibit::kRamp) |
-      inhibit_bit(Inhibit::kTime) | inhibit_bit(Inhibit::kGrip) | inhibit_bit(Inhibit::kForce) |
-      inhibit_bit(Inhibit::kQuiet) | inhibit_bit(Inhibit::kWait);
+  static constexpr std::uint32_t kClearance = kForbids | inhibit_bit(Inhibit::kWait);
   std::uint32_t preconditions(const Now& now) const noexcept;
   void look(const Now& now) noexcept;
   void search_on(const Now& now) noexcept;

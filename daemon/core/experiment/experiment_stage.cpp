@@ -471,6 +471,11 @@ Stop ExperimentStage::abort_of(StopReason reason, const Now& now) const noexcept
   return gone.reason == reason ? gone : Stop{reason, {}};
 }
 
+StopCause ExperimentStage::obstacle() const noexcept {
+  const std::uint32_t forbidden = inhibits() & Arming::kForbids;
+  return forbidden != 0 ? stop_of(forbidden, arming_.obstacle()).cause : StopCause{};
+}
+
 // --- its result ---------------------------------------------------------------------------------
 
 bool ExperimentStage::stopped_by_slip() const noexcept {

@@ -84,6 +84,8 @@ class ExperimentStage {
   const ExperimentResult& running() const noexcept { return running_; }  // or the last one
   const ExperimentResult& result() const noexcept { return result_; }
   bool new_result() const noexcept { return new_result_; }  // with this sample
+  // Why a request is forbidden, where one of the inhibits does that.
+  StopCause obstacle() const noexcept;
   std::uint32_t inhibits() const noexcept { return by_conditions() ? arming_.inhibits() : 0U; }
   bool stopped_by_slip() const noexcept;
   EndedExperiment ended() const noexcept;

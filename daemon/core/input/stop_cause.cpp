@@ -22,25 +22,28 @@ constexpr std::array<ReasonRow, estimator::kStopReasonCount> kReasons{
     {{StopReason::kNone, "None", ""},
      {StopReason::kSlope, "Slope", "friction no longer rises with slip"},
      {StopReason::kConfidence, "Confidence", "mu_max is known well enough"},
-     {StopReason::kSlip, "Slip", "too much slip"},
-     {StopReason::kSlipRate, "SlipRate", "slip grows too fast"},
-     {StopReason::kSlipEnergy, "SlipEnergy", "too much slip energy"},
-     {StopReason::kTime, "Time", "the request has stood for as long as it may"},
-     {StopReason::kForceFloor, "ForceFloor", "the force has come to its floor"},
+     {StopReason::kSlip, "Slip", "more slip than allowed, in all or beyond the largest friction"},
+     {StopReason::kSlipRate, "SlipRate",
+      "slip grew faster than the ramp held it, and friction did not rise"},
+     {StopReason::kSlipEnergy, "SlipEnergy",
+      "more energy, power or time of fast slip than allowed since friction rose last"},
+     {StopReason::kTime, "Time",
+      "the request stood for its longest time, or no time was left for it"},
+     {StopReason::kForceFloor, "ForceFloor", "the force came to its floor before the peak"},
      {StopReason::kEngineSpeed, "EngineSpeed",
-      "engine and primary speed no longer go together, or are too low"},
+      "the shaft came too near its least speed, or the engine left the primary shaft"},
      {StopReason::kTorque, "Torque", "the torque went to zero, changed its sign or left its band"},
      {StopReason::kRatio, "Ratio", "speeds and torque do not fit the ratio at the end stop"},
      {StopReason::kInputs, "Inputs", "an input was lost, or read what cannot be"},
      {StopReason::kPermission, "Permission", "permission withdrawn"},
-     {StopReason::kDriver, "Driver", "the driver acted"},
-     {StopReason::kBus, "Bus", "the bus, or the frames on it"},
+     {StopReason::kDriver, "Driver", "the driver pressed a pedal"},
+     {StopReason::kBus, "Bus", "the CAN bus or BeltGrip's own frames failed"},
      {StopReason::kShutdown, "Shutdown", "the program was stopped"},
      {StopReason::kTraceEnd, "TraceEnd", "the log ended"},
      {StopReason::kClampNotFollowed, "ClampNotFollowed",
       "the clamping force does not follow the request"},
-     {StopReason::kInputFrozen, "InputFrozen", "an input stands still"},
-     {StopReason::kRoom, "Room", "too little slip is left"},
+     {StopReason::kInputFrozen, "InputFrozen", "an input stands still where a live one moves"},
+     {StopReason::kRoom, "Room", "the slip that is left is too little for the worst case"},
      {StopReason::kLag, "Lag", "the clamping force answers later than configured"}}};
 static_assert(in_wire_order(kReasons));
 
@@ -56,6 +59,8 @@ std::string rounded(double value) {
 }  // namespace
 
 std::string_view stop_reason_name(StopReason reason) { return row_of(reason).name; }
+
+std::string_view stop_reason_words(StopReason reason) { return row_of(reason).words; }
 
 std::string cause_text(StopReason reason, const StopCause& cause) {
   std::string text;

@@ -29,6 +29,9 @@ struct Stop {
 // As in BeltGrip's frames, the journal, the history, `status` and `replay`.
 std::string_view stop_reason_name(estimator::StopReason reason);
 
+// What the reason alone says; empty of kNone.
+std::string_view stop_reason_words(estimator::StopReason reason);
+
 // "secondary_pressure: stands still 0.21 s, limit 0.15 s". Never empty but with reason kNone.
 // Allocates: not on the real-time thread.
 std::string cause_text(estimator::StopReason reason, const StopCause& cause);

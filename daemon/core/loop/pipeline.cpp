@@ -215,6 +215,7 @@ const SampleReport& Pipeline::Parts::make_report(const Publication& published,
   report.foreign_identifier = output.foreign_identifier();
   report.frozen = input.channels().frozen();
   report.inhibits = experiment.inhibits();
+  report.obstacle = experiment.obstacle();
   report.beyond = estimate.beyond();
   report.torque_is_the_belts = input.torque_is_the_belts();
   report.oil_degC = input.learned_conditions().oil_temperature_degC;

@@ -30,6 +30,8 @@ struct SampleReport {
   // Every input is as it should be, and the lock-up closed, as far as a role says.
   bool torque_is_the_belts = false;
   double oil_degC = std::numeric_limits<double>::quiet_NaN();  // no number: not known
+  // Of the most lasting of the inhibits that forbid a request: its figure and limit.
+  StopCause obstacle;
   BeyondBox beyond;              // with this sample: why there is no curve
   double request_force_N = 0.0;  // as asked for with this sample; 0: no request stands
   double ramp_N_per_s = 0.0;     // of the request that stands

@@ -8,6 +8,7 @@
 
 #include "daemon/core/experiment/arming.h"
 #include "daemon/core/publish/names.h"
+#include "daemon/core/reasons/reasons.h"
 
 namespace beltgrip::daemon {
 
@@ -34,33 +35,47 @@ EventLevel level_of(const Event& event) {
   return event.id == EventId::kFaultRaised ? EventLevel::kWarning : EventLevel::kInfo;
 }
 
-std::string text_of(const Event& event) {
-  const auto reason = std::string(stop_reason_name(event.reason));
+namespace {
+
+std::string result_text(const ExperimentResult& result) {
+  std::string text = "experiment " + std::string(outcome_name(result.outcome)) + ", stop reason " +
+                     std::string(stop_reason_name(result.stop_reason));
+  if (const std::string cause = why(result); !cause.empty()) text += " (" + cause + ")";
+  if (result.peak.kind == estimator::PeakKind::kValue) {
+    text +=
+        ", mu_max " + rounded(result.peak.mu_max, 4) + " +- " + rounded(result.peak.mu_max_std, 4);
+  } else if (has_bound(result)) {
+    text += ", mu_max above " + rounded(result.peak.mu_max, 4);
+  }
+  const std::string_view remedy = remedy_of(result);
+  return remedy.empty() ? text : text + "; to do: " + std::string(remedy);
+}
+
+// What the event itself knows.
+std::string fault_figure(const Event& event) {
+  if (event.cause.role) return std::string(role_name(*event.cause.role));
+  return event.identifier != 0 ? "0x" + hexadecimal(event.identifier) : "";
+}
+
+}  // namespace
+
+std::string text_of(const Event& event, const std::string& figure) {
   switch (event.id) {
     case EventId::kState:
       return "state " + std::string(state_name(State{event.from})) + " -> " +
              std::string(state_name(State{event.to}));
     case EventId::kStop:
-      return "MacroSlipStop, reason " + reason + " (" + cause_text(event.reason, event.cause) +
-             "), slip " + rounded(event.first, 2) + " %, mu* " + rounded(event.second, 4);
-    case EventId::kResult: {
-      std::string text =
-          "experiment " + std::string(outcome_name(Outcome{event.to})) + ", stop reason " + reason;
-      const std::string cause = cause_text(event.reason, event.cause);
-      if (!cause.empty()) text += " (" + cause + ")";
-      if (event.kind == estimator::PeakKind::kValue) {
-        text += ", mu_max " + rounded(event.first, 4) + " +- " + rounded(event.second, 4);
-      } else if (event.kind == estimator::PeakKind::kLowerBound) {
-        text += ", mu_max above " + rounded(event.first, 4);
-      }
-      return text;
-    }
+      return "MacroSlipStop, reason " + std::string(stop_reason_name(event.reason)) + " (" +
+             cause_text(event.reason, event.cause) + "), slip " + rounded(event.slip_percent, 2) +
+             " %, mu* " + rounded(event.mu_star, 4);
+    case EventId::kResult:
+      return result_text(event.result);
     case EventId::kInhibit:
-      return "no experiment: " + std::string(kInhibits[event.to].name);
-    case EventId::kFaultRaised:
-      return "fault " + std::string(kFaults[event.to].name) +
-             (event.cause.role ? " (" + std::string(role_name(*event.cause.role)) + ")" : "") +
-             (event.identifier != 0 ? " (0x" + hexadecimal(event.identifier) + ")" : "");
+      return "no experiment: " + reason_text(reason_of(Inhibit{event.to}, figure));
+    case EventId::kFaultRaised: {
+      const std::string own = fault_figure(event);
+      return "fault " + reason_text(reason_of(Fault{event.to}, own.empty() ? figure : own));
+    }
     case EventId::kFaultCleared:
       break;
   }
@@ -90,20 +105,13 @@ void EventSink::on_report(const SampleReport& report) noexcept {
     ring_.push({.t = report.t,
                 .id = EventId::kStop,
                 .reason = report.stop_reason,
-                .first = report.curve.sigma_star_percent,
-                .second = report.curve.mu_star,
+                .slip_percent = report.curve.sigma_star_percent,
+                .mu_star = report.curve.mu_star,
                 .cause = report.stop_cause});
   }
   stop_ = report.macro_slip_stop;
   if (report.new_result) {
-    ring_.push({.t = report.t,
-                .id = EventId::kResult,
-                .to = static_cast<std::uint8_t>(report.result.outcome),
-                .reason = report.result.stop_reason,
-                .kind = report.result.peak.kind,
-                .first = report.result.peak.mu_max,
-                .second = report.result.peak.mu_max_std,
-                .cause = report.result.cause});
+    ring_.push({.t = report.t, .id = EventId::kResult, .result = report.result});
   }
   if (report.state != state_) {
     ring_.push({.t = report.t,

@@ -22,17 +22,18 @@ struct Event {
   MonoTime t = 0;
   EventId id = EventId::kState;
   std::uint8_t from = 0;  // state
-  std::uint8_t to = 0;    // state, fault, outcome, or inhibit
+  std::uint8_t to = 0;    // state, fault or inhibit
   estimator::StopReason reason = estimator::StopReason::kNone;
-  estimator::PeakKind kind = estimator::PeakKind::kNone;
-  double first = 0.0;            // slip in percent at the stop; mu_max
-  double second = 0.0;           // mu* at the stop; standard deviation of mu_max
+  double slip_percent = 0.0;     // at the stop
+  double mu_star = 0.0;          // there
   StopCause cause = {};          // beside reason; of fault InputFrozen, the role
+  ExperimentResult result = {};  // of kResult
   std::uint32_t identifier = 0;  // of fault ForeignSender
 };
 
 EventLevel level_of(const Event& event);
-std::string text_of(const Event& event);  // allocates: not on the real-time thread
+// figure: of an inhibit or a fault, where it is known. Allocates: not on the real-time thread.
+std::string text_of(const Event& event, const std::string& figure = "");
 
 using EventRing = SpscRing<Event, 256>;
 

@@ -45,13 +45,13 @@ TEST(ChangeLines, SayFaultsAndReasonsAsTheyComeAndGo) {
   ChangeLines changes;
   changes.update(at(0.0));
   View view = at(1.0);
-  view.faults = {{"InputStale", "it came and has stopped", ""}};
-  view.inhibits = {{"oil", "the oil is colder", "20 degC, needs 40 degC"}};
+  view.faults = {{"InputStale", "it came and has stopped", "", ""}};
+  view.inhibits = {{"oil", "the oil is colder", "20 degC, limit 40 degC", "warm up"}};
   EXPECT_EQ(changes.update(view),
             "(1700000001.000000) can0 fault InputStale: it came and has stopped\n"
-            "(1700000001.000000) can0 no experiment: oil (20 degC, needs 40 degC): the oil is "
-            "colder\n");
-  view.inhibits[0].figure = "21 degC, needs 40 degC";
+            "(1700000001.000000) can0 no experiment: oil (20 degC, limit 40 degC): the oil is "
+            "colder; to do: warm up\n");
+  view.inhibits[0].figure = "21 degC, limit 40 degC";
   EXPECT_EQ(changes.update(view), "") << "a figure alone is no news";
   EXPECT_EQ(changes.update(at(2.0)),
             "(1700000002.000000) can0 fault InputStale gone\n"

@@ -54,8 +54,8 @@ View troubled() {
   view.link = daemon::BusState::kAbsent;
   view.distrust = {12, 3, 4, "0x6A1: wrong CRC"};
   const std::string much(300, 'x');
-  for (int i = 0; i < 18; ++i) view.inhibits.push_back({"reason", much, "1 Nm, needs 2 Nm"});
-  for (int i = 0; i < 20; ++i) view.faults.push_back({"InputStale", much, ""});
+  for (int i = 0; i < 18; ++i) view.inhibits.push_back({"reason", much, "1 Nm, needs 2 Nm", much});
+  for (int i = 0; i < 20; ++i) view.faults.push_back({"InputStale", much, "", much});
   view.source = "\x1b[2J \xc3\xa9 " + much;
   return view;
 }
@@ -109,8 +109,8 @@ TEST(Layout, SaysWhyNothingBegins) {
   view.source = "can0";
   view.inhibits_known = true;
   view.silence_s = 0.1;
-  view.inhibits = {
-      {"torque", "the torque on the belt lies outside its window", "3.2 Nm, needs 10 to 100 Nm"}};
+  view.inhibits = {{"torque", "the torque on the belt lies outside its window",
+                    "3.2 Nm, needs 10 to 100 Nm", ""}};
   EXPECT_NE(shown(view, 120, 24)
                 .find("why      torque (3.2 Nm, needs 10 to 100 Nm): the torque on the belt lies "
                       "outside its window\n"),

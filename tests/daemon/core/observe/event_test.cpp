@@ -1,5 +1,6 @@
 // Events between reports, their text, and the ring they cross.
 #include "daemon/core/observe/event.h"
+#include "daemon/core/observe/reasons_now.h"
 #include "daemon/core/publish/names.h"
 
 #include <gtest/gtest.h>
@@ -40,12 +41,20 @@ TEST(EventSink, OneEventForEachChange) {
   EXPECT_EQ(bench.report(), std::vector<std::string>{"state Inhibited -> Ramping"});
   EXPECT_TRUE(bench.report().empty());
   bench.now.faults = fault_bit(Fault::kInputStale) | fault_bit(Fault::kFrameRefused);
-  EXPECT_EQ(bench.report(), (std::vector<std::string>{"fault InputStale", "fault FrameRefused"}));
+  EXPECT_EQ(bench.report(),
+            (std::vector<std::string>{
+                "fault InputStale: it came and has stopped; to do: `beltgrip status` names the "
+                "role; `period_ms` of a role that comes seldom",
+                "fault FrameRefused: the transmit gate stopped a frame of our own; to do: a defect "
+                "of BeltGrip: please report it"}));
   bench.now.faults = fault_bit(Fault::kFrameRefused);
   EXPECT_EQ(bench.report(), std::vector<std::string>{"fault InputStale gone"});
   bench.now.faults |= fault_bit(Fault::kForeignSender);
   bench.now.foreign_identifier = 0x6A3;
-  EXPECT_EQ(bench.report(), std::vector<std::string>{"fault ForeignSender (0x6A3)"});
+  EXPECT_EQ(bench.report(),
+            std::vector<std::string>{
+                "fault ForeignSender (0x6A3): another node sends with BeltGrip's identifiers; to "
+                "do: a second daemon, or a log that is being played"});
 }
 
 TEST(EventSink, WhatAloneKeepsAnExperimentFromBeginning) {
@@ -58,13 +67,18 @@ TEST(EventSink, WhatAloneKeepsAnExperimentFromBeginning) {
   const std::uint32_t brake = inhibit_bit(Inhibit::kBrake), pedal = inhibit_bit(Inhibit::kPedal);
   EXPECT_TRUE(after(kSecond, brake).empty());
   EXPECT_TRUE(after(kSecond - 1, brake).empty());
-  EXPECT_EQ(after(1, brake), std::vector<std::string>{"no experiment: brake"});
+  EXPECT_EQ(after(1, brake),
+            std::vector<std::string>{
+                "no experiment: brake: the brake is pressed; to do: coast without braking"});
   EXPECT_TRUE(after(kSecond, brake).empty());
   EXPECT_TRUE(after(kSecond, brake | pedal).empty());
   EXPECT_TRUE(after(2 * kSecond, brake | pedal).empty());
   EXPECT_TRUE(after(kSecond, inhibit_bit(Inhibit::kUnreachable)).empty());
   EXPECT_EQ(after(kSecond, inhibit_bit(Inhibit::kUnreachable)),
-            std::vector<std::string>{"no experiment: unreachable"});
+            std::vector<std::string>{
+                "no experiment: unreachable: the floor of the clamping force lies above the force "
+                "of the peak; to do: more torque, a lower pressure floor, a lower speed in "
+                "overdrive; else a lower bound is all there is"});
   bench.now.in_experiment = true;
   EXPECT_TRUE(after(5 * kSecond, inhibit_bit(Inhibit::kUnreachable)).empty());
 }
@@ -116,7 +130,82 @@ TEST(EventSink, AnAbortNamesItsOwnReason) {
   EXPECT_TRUE(texts[0].starts_with("MacroSlipStop, reason Inputs"));
   EXPECT_EQ(texts[1],
             "experiment Aborted, stop reason Inputs (secondary_pressure: silent for 0.055 s, limit "
-            "0.05 s)");
+            "0.05 s); to do: the role stands in `reason`; `beltgrip status`");
+}
+
+// Without a value it is said first why, then how it ended, then what to do.
+TEST(Event, AResultWithoutAValueSaysWhyAndWhatToDo) {
+  Event event;
+  event.id = EventId::kResult;
+  event.result.outcome = Outcome::kInconclusive;
+  event.result.stop_reason = StopReason::kForceFloor;
+  event.result.cause = {.what = "the force floor lies above the peak's force",
+                        .figure = 2203.0,
+                        .limit = 1168.0,
+                        .unit = "N"};
+  EXPECT_EQ(
+      text_of(event),
+      "experiment Inconclusive, stop reason ForceFloor (too short, or too little torque or "
+      "clamp force, or an input that stood still (the force floor lies above the peak's force "
+      "2203 N, limit 1168 N)); to do: more torque, a lower floor, a lower speed");
+  event.result.peak.kind = PeakKind::kLowerBound;
+  event.result.peak.mu_max = 0.05;
+  EXPECT_EQ(
+      text_of(event),
+      "experiment Inconclusive, stop reason ForceFloor (the force floor lies above the peak's "
+      "force 2203 N, limit 1168 N), mu_max above 0.0500; to do: more torque, a lower floor, a "
+      "lower speed");
+}
+
+// Each with its figure and limit, from the sample; by hand.
+TEST(ReasonsNow, SayTheFigureBesideTheLimit) {
+  Config config;
+  config.trigger = Trigger::kCoastDown;
+  config.experiment.primary_speed_min_rad_s = 100.0;
+  SampleReport report;
+  Signals signals{};
+  for (SignalObservation& each : signals) each.quality = SignalQuality::kUnbound;
+  const auto now = [&] {
+    std::vector<Reason> all;
+    each_inhibit(config, report, signals, [&](Reason each) { all.push_back(std::move(each)); });
+    return all;
+  };
+  const auto figure = [&](Inhibit inhibit) {
+    report.inhibits = inhibit_bit(inhibit);
+    const auto all = now();
+    EXPECT_EQ(all.size(), 1U);
+    EXPECT_FALSE(all[0].means.empty());
+    return all[0].figure;
+  };
+  report.sample.omega_p_rad_s = 92.1;
+  report.sample.omega_s_rad_s = 184.2;
+  report.curve.torque_p_Nm = 4.0;
+  report.oil_degC = 35.0;
+  EXPECT_EQ(figure(Inhibit::kSpeed), "92.1 rad/s, limit 100 rad/s");
+  EXPECT_EQ(figure(Inhibit::kRatio), "2.000, end stops 0.405 and 2.25");
+  EXPECT_EQ(figure(Inhibit::kTorque), "4 Nm, limits 10 and 100 Nm of overrun");
+  EXPECT_EQ(figure(Inhibit::kOil), "35 degC, limit 40 degC");
+  EXPECT_EQ(figure(Inhibit::kCooldown), "limits 60 s and 1000 m");
+  signals[static_cast<std::size_t>(Role::kAcceleratorPedal)] = {
+      .quality = SignalQuality::kValid, .seen = true, .value = 0.125, .t = 0};
+  EXPECT_EQ(figure(Inhibit::kPedal), "12.5 %, limit 2 %");
+  signals[static_cast<std::size_t>(Role::kSecondaryPressure)].quality = SignalQuality::kStale;
+  EXPECT_EQ(figure(Inhibit::kInputs), "secondary_pressure stale");
+  report.obstacle = {.what = "the ramp would last for", .figure = 18.0, .limit = 15.0, .unit = "s"};
+  EXPECT_EQ(figure(Inhibit::kTime), "the ramp would last for 18 s, limit 15 s");
+  EXPECT_EQ(figure(Inhibit::kBrake), "");
+  // The obstacle is that of the most lasting one.
+  report.inhibits = inhibit_bit(Inhibit::kTime) | inhibit_bit(Inhibit::kUnreachable);
+  const auto both = now();
+  ASSERT_EQ(both.size(), 2U);
+  EXPECT_FALSE(both[0].figure.empty());
+  EXPECT_TRUE(both[1].figure.empty());
+  report.faults = fault_bit(Fault::kInputStale);
+  std::string fault;
+  each_fault(report, signals, [&](const Reason& each) { fault += reason_text(each); });
+  EXPECT_EQ(fault,
+            "InputStale (secondary_pressure): it came and has stopped; to do: `beltgrip status` "
+            "names the role; `period_ms` of a role that comes seldom");
 }
 
 TEST(SpscRing, DropsAndCountsWhenFull) {

@@ -1,0 +1,136 @@
+#include "daemon/core/observe/reasons_now.h"
+
+#include <cmath>
+#include <cstdio>
+
+#include "daemon/core/input/stop_cause.h"
+#include "estimator/physics/units.h"
+
+namespace beltgrip::daemon {
+
+namespace {
+
+constexpr std::array<std::string_view, 6> kQualities{"valid", "learning", "frozen",
+                                                     "stale", "missing",  "unbound"};
+
+std::string format(const char* pattern, auto... arguments) {
+  std::array<char, 160> text;
+  std::snprintf(text.data(), text.size(), pattern, arguments...);
+  return text.data();
+}
+
+// Roles that a test of their quality takes, each followed by that quality where it is asked for.
+std::string roles_with(const Signals& signals, auto&& takes, bool says_quality) {
+  std::string text;
+  for (std::size_t i = 0; i < kRoleCount; ++i) {
+    const SignalQuality quality = signals[i].quality;
+    if (!takes(quality)) continue;
+    text += (text.empty() ? "" : ", ") + std::string(role_name(static_cast<Role>(i)));
+    if (says_quality) text += " " + std::string(quality_name(quality));
+  }
+  return text;
+}
+
+std::string fault_names(std::uint32_t bits) {
+  std::string text;
+  for (std::size_t i = 0; i < kFaultCount; ++i) {
+    if ((bits >> i & 1U) != 0) text += (text.empty() ? "" : ", ") + std::string(kFaults[i].name);
+  }
+  return text;
+}
+
+// The inhibit that SampleReport.obstacle is of: the first of these that stands.
+bool is_of_obstacle(Inhibit inhibit, std::uint32_t inhibits) {
+  for (const Inhibit each : {Inhibit::kUnreachable, Inhibit::kGrip, Inhibit::kQuiet,
+                             Inhibit::kForce, Inhibit::kRamp, Inhibit::kTime}) {
+    if ((inhibits & inhibit_bit(each)) != 0) return each == inhibit;
+  }
+  return false;
+}
+
+}  // namespace
+
+Signals signals_of(const Pipeline& pipeline) {
+  Signals signals;
+  for (std::size_t i = 0; i < kRoleCount; ++i) {
+    signals[i] = pipeline.signal(static_cast<Role>(i));
+  }
+  return signals;
+}
+
+std::string_view quality_name(SignalQuality quality) {
+  return kQualities.at(static_cast<std::size_t>(quality));
+}
+
+std::string figure_of(Inhibit inhibit, const Config& config, const SampleReport& report,
+                      const Signals& signals) {
+  const auto of = [&](Role role) { return signals[static_cast<std::size_t>(role)]; };
+  const ExperimentSettings& limits = config.experiment;
+  switch (inhibit) {
+    case Inhibit::kInputs:
+      return roles_with(
+          signals,
+          [](SignalQuality each) {
+            return each != SignalQuality::kValid && each != SignalQuality::kUnbound;
+          },
+          true);
+    case Inhibit::kFault:
+      return fault_names(report.faults);
+    case Inhibit::kPedal:
+      if (!of(Role::kAcceleratorPedal).seen) return "";
+      return format("%.3g %%, limit %.3g %%",
+                    estimator::kPercent * of(Role::kAcceleratorPedal).value,
+                    estimator::kPercent * Arming::kPedalReleased);
+    case Inhibit::kSpeed:
+      return format("%.4g rad/s, limit %.4g rad/s", report.sample.omega_p_rad_s,
+                    limits.primary_speed_min_rad_s);
+    case Inhibit::kOil:
+      if (!std::isfinite(report.oil_degC)) return "";
+      return format("%.3g degC, limit %.3g degC", report.oil_degC, limits.oil_temperature_min_degC);
+    case Inhibit::kTorque:
+      return format("%.3g Nm, limits %.3g and %.3g Nm %s", report.curve.torque_p_Nm,
+                    limits.torque_min_Nm, limits.torque_max_Nm,
+                    config.trigger == Trigger::kCoastDown ? "of overrun" : "of drive");
+    case Inhibit::kRatio:
+      if (!(report.sample.omega_p_rad_s > 0.0)) return "";
+      return format("%.3f, end stops %.4g and %.4g",
+                    report.sample.omega_s_rad_s / report.sample.omega_p_rad_s,
+                    config.variator.ratio_low, config.variator.ratio_overdrive);
+    case Inhibit::kCooldown:
+      return format("limits %g s and %g m", limits.cooldown_s, limits.cooldown_m);
+    case Inhibit::kModel:
+      return report.beyond ? beyond_text(report.beyond) : "";
+    default:
+      return is_of_obstacle(inhibit, report.inhibits) && report.obstacle.what != nullptr
+                 ? cause_text(estimator::StopReason::kNone, report.obstacle)
+                 : "";
+  }
+}
+
+std::string figure_of(Fault fault, const SampleReport& report, const Signals& signals) {
+  const auto those = [&](SignalQuality quality) {
+    return roles_with(
+        signals, [&](SignalQuality each) { return each == quality; }, false);
+  };
+  switch (fault) {
+    case Fault::kInputMissing:
+      return those(SignalQuality::kMissing);
+    case Fault::kInputStale:
+      return those(SignalQuality::kStale);
+    case Fault::kInputFrozen:
+      return report.frozen ? std::string(role_name(*report.frozen)) : those(SignalQuality::kFrozen);
+    case Fault::kForeignSender:
+      return report.foreign_identifier != 0 ? format("0x%X", report.foreign_identifier) : "";
+    default:
+      return "";
+  }
+}
+
+std::string figure_of(const Event& event, const Config& config, const SampleReport& report,
+                      const Signals& signals) {
+  if (event.id == EventId::kInhibit) return figure_of(Inhibit{event.to}, config, report, signals);
+  if (event.id == EventId::kFaultRaised) return figure_of(Fault{event.to}, report, signals);
+  return "";
+}
+
+}  // namespace beltgrip::daemon
