@@ -1,4 +1,6 @@
 // beltgrip init: a first configuration from DBC files, with every guess marked as one.
+#include <algorithm>
+#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -13,16 +15,18 @@
 #include "daemon/core/config/options/config_options.h"
 #include "tools/cli/command.h"
 #include "tools/cli/output_file.h"
+#include "tools/cli/role_evidence.h"
 #include "tools/cli/role_guess.h"
 
 namespace beltgrip::cli {
 
 namespace {
 
-constexpr std::size_t kAlternativesShown = 3;
+constexpr std::size_t kAlternativesShown = 2;
 
 struct Options {
   std::vector<std::string> dbc;
+  std::vector<std::string> log;
   std::string interface = "can0";
   std::string out = "-";
   bool force = false;
@@ -67,6 +71,11 @@ std::string signal_text(const RoleCandidate& candidate) {
   return quoted(candidate.message->name + "." + candidate.signal->name);
 }
 
+std::string trimmed(std::string name) {
+  name.erase(name.find_last_not_of(' ') + 1);
+  return name;
+}
+
 std::string unit_remark(const RoleCandidate& candidate) {
   return candidate.signal->unit.empty() ? "no unit" : can::printable(candidate.signal->unit);
 }
@@ -84,42 +93,114 @@ std::string labels_text(const can::SignalDef& signal) {
   return text;
 }
 
-// What says when a flag is 1; empty: where its signal is 1.
-std::string flag_line(const std::string& name, daemon::Role role, const RoleCandidate& best) {
-  const TrueWhen guessed = guess_true_when(role, *best.signal);
-  if (!guessed.needed) return {};
-  const bool has_one = best.signal->values.contains(1);
-  const bool known = !guessed.label.empty() || has_one;
-  const std::string when = !guessed.label.empty() ? quoted(guessed.label)
-                           : has_one              ? "1"
-                                                  : "\"...\"";
-  return (known ? "" : "# ") + name + " = { signal = " + signal_text(best) +
-         ", true_when = " + when + " }   # guessed, of " + labels_text(*best.signal) +
-         (known ? "\n" : ": enter which\n");
+// Where a role that nobody names can be found.
+struct Where {
+  daemon::Role role;
+  const char* text;
+};
+constexpr std::array kWhere{
+    Where{daemon::Role::kPrimarySpeed,
+          "the transmission's message of speeds: input, turbine or primary pulley"},
+    Where{daemon::Role::kSecondarySpeed,
+          "the transmission's message of speeds: output or secondary pulley"},
+    Where{daemon::Role::kSecondaryPressure,
+          "the transmission's messages; else by diagnostics, as below"},
+    Where{daemon::Role::kEngineTorque,
+          "the engine's message of torques: the actual, not the wanted"},
+    Where{daemon::Role::kPrimaryTorque, "a torque sensor on the primary shaft"},
+    Where{daemon::Role::kOilTemperature, "the transmission's messages; else by diagnostics"},
+    Where{daemon::Role::kVehicleSpeed,
+          "the brake controller's or the instrument cluster's message"},
+    Where{daemon::Role::kAcceleratorPedal,
+          "the engine's message of the pedal, not of the throttle"},
+    Where{daemon::Role::kBrakePressed, "the brake controller's or the body's message"},
+    Where{daemon::Role::kLockupClosed, "the transmission's message of the converter clutch"},
+    Where{daemon::Role::kExperimentPermitted,
+          "the transmission controller sends it for BeltGrip: daemon/CLAMP_CONTRACT.md"},
+};
+const char* where_of(daemon::Role role) {
+  const auto found = std::find_if(kWhere.begin(), kWhere.end(),
+                                  [role](const Where& each) { return each.role == role; });
+  return found == kWhere.end() ? "" : found->text;
 }
 
-void append_role(std::string& text, daemon::Role role, bool required,
-                 const std::vector<can::Database>& databases) {
+// What control "command" asks for beside the required ones.
+bool command_needs(daemon::Role role) {
+  using daemon::Role;
+  return role == Role::kExperimentPermitted || role == Role::kAcceleratorPedal ||
+         role == Role::kBrakePressed || role == Role::kLockupClosed ||
+         role == Role::kOilTemperature || role == Role::kVehicleSpeed;
+}
+
+// The proposal as it grows, and what it rests on.
+struct Proposal {
+  const std::vector<can::Database>& databases;
+  const EvidenceOf* evidence = nullptr;  // of logs, where some were given
+  std::string text;
+  std::string missing;  // required roles without a line
+};
+
+std::string evidence_text(const Proposal& proposal, daemon::Role role,
+                          const RoleCandidate& candidate) {
+  if (proposal.evidence == nullptr) return {};
+  return ", " +
+         can::printable(judge(role, candidate, proposal.evidence->at(candidate.signal)).text);
+}
+
+// A flag is never taken on trust: what speaks for it stands beside it.
+std::string flag_line(const Proposal& proposal, const std::string& name, daemon::Role role,
+                      const RoleCandidate& best) {
+  const TrueWhen guessed = guess_true_when(role, *best.signal);
+  const std::string labels = labels_text(*best.signal);
+  const std::string bits = std::to_string(best.signal->length) + " bit";
+  const std::string seen = bits + (labels.empty() ? "" : ", " + labels) +
+                           evidence_text(proposal, role, best) + ": uncomment where that is right";
+  if (!guessed.needed)
+    return "# " + name + " = " + signal_text(best) + "   # guessed, " + seen + "\n";
+  const std::string when = !guessed.label.empty()            ? quoted(guessed.label)
+                           : best.signal->values.contains(1) ? "1"
+                                                             : "\"...\"";
+  return "# " + name + " = { signal = " + signal_text(best) + ", true_when = " + when +
+         " }   # guessed, " + seen + "\n";
+}
+
+void append_role(Proposal& proposal, daemon::Role role, bool required) {
   std::string name(daemon::role_name(role));
   name.resize(std::max<std::size_t>(name.size(), 18), ' ');
-  const std::vector<RoleCandidate> candidates = guess_role(role, databases);
+  std::vector<RoleCandidate> candidates = guess_role(role, proposal.databases);
+  if (proposal.evidence != nullptr) order_by(*proposal.evidence, role, candidates);
+  std::string& text = proposal.text;
+  const bool needed = required || command_needs(role);
   if (candidates.empty()) {
-    if (required) text += "# " + name + " = \"Message.Signal\"   # NOT FOUND: enter it by hand\n";
+    if (needed) {
+      text += "# " + name + " = \"Message.Signal\"   # NOT FOUND" +
+              (required ? "" : ", control = \"command\" needs it") +
+              ": enter it by hand\n#   found: " + where_of(role) + "\n";
+    }
+    if (required) proposal.missing += (proposal.missing.empty() ? "" : ", ") + trimmed(name);
     return;
   }
   const RoleCandidate& best = candidates.front();
-  if (const std::string line = flag_line(name, role, best); !line.empty()) {
-    text += line;
-  } else if (best.has_unit) {
-    text += name + " = " + signal_text(best) + "   # guessed";
-    if (!best.signal->unit.empty()) text += ", " + unit_remark(best);
-    text += "\n";
+  const bool lives =
+      proposal.evidence == nullptr || judge(role, best, proposal.evidence->at(best.signal)).lives;
+  const bool is_flag = daemon::role_dimension(role) == can::Dimension::kNone;
+  const bool active = !is_flag && best.has_unit && lives;
+  const std::string evidence = evidence_text(proposal, role, best);
+  if (is_flag) {
+    text += flag_line(proposal, name, role, best);
+  } else if (active || best.has_unit) {
+    text += (active ? "" : "# ") + name + " = " + signal_text(best) + "   # guessed, " +
+            unit_remark(best) + evidence + "\n";
   } else {
     text += "# " + name + " = { signal = " + signal_text(best) +
-            ", unit = \"...\" }   # guessed; the DBC gives no unit: enter it\n";
+            ", unit = \"...\" }   # guessed; the DBC gives no unit: enter it" + evidence + "\n";
+  }
+  if (required && !active) {
+    proposal.missing += (proposal.missing.empty() ? "" : ", ") + trimmed(name);
   }
   for (std::size_t i = 1; i < candidates.size() && i <= kAlternativesShown; ++i) {
-    text += "#   or " + signal_text(candidates[i]) + ", " + unit_remark(candidates[i]) + "\n";
+    text += "#   or " + signal_text(candidates[i]) + ", " + unit_remark(candidates[i]) +
+            evidence_text(proposal, role, candidates[i]) + "\n";
   }
 }
 
@@ -131,7 +212,11 @@ void append_assumed(std::string& text, daemon::Role torque) {
       "\n# The variator's own numbers. Each that stays a comment is assumed, within the range "
       "given:\n"
       "# mu_max is then as wide as that. Enter what is known, and uncomment the section's name.\n"
-      "# [variator]\n";
+      "# [variator]\n"
+      "# ratio_low =   # default 0.405\n"
+      "#   found: beltgrip calibrate, of a drive from standstill\n"
+      "# ratio_overdrive =   # default 2.25\n"
+      "#   found: beltgrip calibrate, of a drive at steady speed\n";
   for (const daemon::Option& option : daemon::option_table()) {
     for (const estimator::Assumption& each : estimator::assumptions()) {
       if (option.section != "variator" || option.key != each.key) continue;
@@ -160,14 +245,31 @@ void append_assumed(std::string& text, daemon::Role torque) {
 }
 
 void run(const Options& options) {
-  OutputFile file(options.out, Inputs(options.dbc), unless_forced(options.force));
+  Inputs inputs(options.dbc);
+  inputs.add(options.log);
+  OutputFile file(options.out, inputs, unless_forced(options.force));
   std::vector<can::Database> databases;
   databases.reserve(options.dbc.size());
   for (const std::string& path : options.dbc) databases.push_back(read_database(path));
 
-  std::string text =
-      "# Proposed by beltgrip init. Roles were guessed from the names and units in the DBC files:\n"
-      "# check each line before use.\n\n[bus]\ninterface = " +
+  std::vector<RoleCandidate> candidates;
+  for (std::size_t i = 0; i < daemon::kRoleCount; ++i) {
+    const auto each = guess_role(static_cast<daemon::Role>(i), databases);
+    candidates.insert(candidates.end(), each.begin(), each.end());
+  }
+  EvidenceOf evidence;
+  Proposal proposal{.databases = databases, .evidence = nullptr, .text = "", .missing = ""};
+  if (!options.log.empty()) {
+    evidence = read_evidence(options.log, candidates);
+    proposal.evidence = &evidence;
+  }
+  std::string& text = proposal.text;
+  text =
+      "# Proposed by beltgrip init. Roles were guessed from the names, comments and units in the "
+      "DBC "
+      "files" +
+      std::string(options.log.empty() ? "" : ", and the values in the logs") +
+      ":\n# check each line before use; beltgrip check does it with a log.\n\n[bus]\ninterface = " +
       quoted(options.interface) + "\ndbc       = [";
   for (std::size_t i = 0; i < options.dbc.size(); ++i) {
     text += (i > 0 ? ", " : "") + quoted(path_text(options.dbc[i], options.out));
@@ -175,15 +277,15 @@ void run(const Options& options) {
   text += "]\n\n[signals]\n";
   using daemon::Role;
   for (const Role role : {Role::kPrimarySpeed, Role::kSecondarySpeed, Role::kSecondaryPressure}) {
-    append_role(text, role, true, databases);
+    append_role(proposal, role, true);
   }
   const bool measured = !guess_role(Role::kPrimaryTorque, databases).empty();
-  append_role(text, Role::kEngineTorque, !measured, databases);
-  if (measured) append_role(text, Role::kPrimaryTorque, true, databases);
-  text += "# optional\n";
+  append_role(proposal, Role::kEngineTorque, !measured);
+  if (measured) append_role(proposal, Role::kPrimaryTorque, true);
+  text += "# optional; yes/no signals stay comments until somebody has looked at them\n";
   for (std::size_t i = 0; i < daemon::kRoleCount; ++i) {
     const auto role = static_cast<Role>(i);
-    if (role > Role::kPrimaryTorque) append_role(text, role, false, databases);
+    if (role > Role::kPrimaryTorque) append_role(proposal, role, false);
   }
   text +=
       "\n# A signal that no frame broadcasts may come from diagnostics (UDS "
@@ -203,6 +305,11 @@ void run(const Options& options) {
       "# documented default file. beltgrip calibrate finds the ratios.\n";
   file.write(options.out == "-" ? can::printable_lines(text) : text);
   file.close();
+  if (proposal.missing.empty()) return;
+  throw Failure{kBadInput, options.dbc.front() + (options.dbc.size() > 1 ? ", ..." : "") +
+                               ": found no signal for " + proposal.missing +
+                               "; expected one for each, to be entered in " +
+                               (options.out == "-" ? "the proposal" : options.out)};
 }
 
 }  // namespace
@@ -212,6 +319,11 @@ void add_init(command_line::Command app) {
       app.add_subcommand("init", "Propose a configuration for DBC files");
   auto options = std::make_shared<Options>();
   command.add_option("DBC", options->dbc, "The vehicle's DBC files").type_name("").required();
+  command
+      .add_option(
+          "--log", options->log,
+          "Logs of the car: a signal that is not there, stands still or cannot be gives way")
+      .type_name("LOG");
   command.add_option("--interface", options->interface, "CAN interface to enter")
       .type_name("INTERFACE")
       .capture_default_str();
@@ -220,6 +332,7 @@ void add_init(command_line::Command app) {
       .capture_default_str();
   command.add_flag("--force", options->force, "Replace a file that exists");
   command.example("beltgrip init drive/vehicle.dbc --out mycar.toml");
+  command.example("beltgrip init drive/vehicle.dbc --log drive/trace.log");
   command.callback([options] { run(*options); });
 }
 

@@ -1,5 +1,5 @@
-// Which signals of a DBC may carry a role: by dimension of the unit and by the words in the names.
-// A guess for a person to check, no more. Tools only.
+// Which signals of a DBC may carry a role: by unit, length, value table, and the words in names and
+// comments (role_words.h). A guess for a person to check, no more. Tools only.
 #pragma once
 
 #include <string>
@@ -27,8 +27,5 @@ struct TrueWhen {
   std::string label;    // of the value table; empty: none tells
 };
 TrueWhen guess_true_when(daemon::Role role, const can::SignalDef& signal);
-
-// "N_PrimSpd2" -> n, prim, spd.
-std::vector<std::string> words_of(const std::string& name);
 
 }  // namespace beltgrip::cli
