@@ -64,6 +64,11 @@ TEST_F(History, Table) {
   EXPECT_NE(result.out.find(">0.0900"), std::string::npos);
   EXPECT_NE(result.out.find("outlier"), std::string::npos);
   EXPECT_NE(result.out.find("WEAR"), std::string::npos);
+  // The sixth of the ten, whose id is 7: by the rows above, 0.105 to 0.1008.
+  EXPECT_NE(
+      result.out.find("\n  4.0 % less friction since experiment 7 (2023-11-15), 99.9 % sure\n"),
+      std::string::npos)
+      << result.out;
   EXPECT_NE(result.out.find("1 experiments under other configurations"), std::string::npos);
 }
 
@@ -198,6 +203,7 @@ TEST_F(History, JsonLines) {
   EXPECT_NEAR(fused["mu_max"].get<double>(), 0.1009, 3e-4);
   EXPECT_EQ(fused["wear"]["found"], true);
   EXPECT_NEAR(fused["wear"]["change_percent"].get<double>(), -4.0, 0.2);
+  EXPECT_EQ(fused["wear"]["since_id"], 7);
   EXPECT_EQ(all[13]["experiments"], 12);
   EXPECT_EQ(all[13]["comparable"], 11);
 }
