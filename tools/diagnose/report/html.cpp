@@ -60,7 +60,8 @@ std::string sentence(const Finding& finding) {
   return out;
 }
 
-void add_findings(report::HtmlPage& page, const Diagnosis& d) {
+void add_findings(report::HtmlPage& page, const Diagnosis& d,
+                  const std::vector<report::Chart>& pictures) {
   if (d.findings.empty()) return;
   page.heading("What is wrong");
   Rows rows;
@@ -72,6 +73,13 @@ void add_findings(report::HtmlPage& page, const Diagnosis& d) {
   page.table({"effect", "equation", "size (95 %)", "probability", "these data cannot tell it from",
               "what would"},
              rows);
+  if (pictures.empty()) return;
+  page.paragraph(
+      "Over what each follows: what the data ask for where it acts, what the finding gives, and "
+      "what is left with it in the model. Each point stands for as many samples; the other "
+      "findings "
+      "and the machine's constants are as fitted.");
+  page.charts(pictures);
 }
 
 // In the unit of the function.
@@ -258,7 +266,7 @@ std::string html_text(const Diagnosis& d, const Plots& plots) {
     page.paragraph("Unexplained: " + sentence(*d.unexplained) + ".");
   }
   if (d.next_experiment) page.paragraph("Next experiment: " + d.next_experiment->text + ".");
-  add_findings(page, d);
+  add_findings(page, d, plots.findings);
   add_learned(page, d);
   add_errors(page, d);
   add_tables(page, d);

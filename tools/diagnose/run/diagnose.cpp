@@ -82,7 +82,7 @@ class Run {
     fill(engine, naming, learning);
     if (request_.with_plots) {
       answer_.plots = make_plots(engine.campaign(), naming.nominal.state, naming.hypothesis.state,
-                                 request_.experiments);
+                                 request_.experiments, out().findings);
     }
     progress(1.0, "done");
     return std::move(answer_);

@@ -1,0 +1,61 @@
+// The picture of a finding shows what the generator planted, in its unit, and nothing once it is in
+// the model.
+#include "tools/diagnose/report/finding_picture.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/statistics/blind/generator.h"
+#include "tools/diagnose/decide/namer.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+constexpr double kLoss_Nm_per_kN = 0.9;
+
+TEST(FindingPicture, IsTheCauseOverWhatItFollows) {
+  blind::Trial trial;
+  trial.seed = 11;
+  blind::Random random(trial.seed);
+  trial.plan = blind::draw_plan(random, trial.machine.setting, 8);
+  trial.planted.push_back({"torque_loss", {{"per_kN_Nm", kLoss_Nm_per_kN}}, {}});
+  estimator::VariatorParameters variator;
+  variator.primary_inertia_kg_m2 = trial.machine.primary_inertia_kg_m2;
+  std::vector<ExperimentData> runs;
+  for (const std::string& text : blind::record(trial).csv) {
+    runs.push_back(prepare(parse_csv(text, "run.csv"), variator));
+  }
+  Engine engine(make_campaign(std::move(runs), nominal_model(variator)));
+  const Naming naming = name_effects(engine, [] { return false; });
+  ASSERT_EQ(naming.accepted.size(), 1U);
+  Finding finding;
+  finding.effect = "torque_loss";
+  finding.parameters["per_kN_Nm"] = {0.9, 0.8, 1.0};
+  const std::vector<report::Chart> charts =
+      pictures_of(engine.campaign(), naming.hypothesis.state, {finding});
+  ASSERT_EQ(charts.size(), 1U);
+  EXPECT_EQ(charts[0].title, "torque_loss.per_kN_Nm");
+  EXPECT_EQ(charts[0].x_label, "secondary pressure, bar");
+  ASSERT_EQ(charts[0].series.size(), 5U);
+  const report::Series &law = charts[0].series[0], &low = charts[0].series[1],
+                       &high = charts[0].series[2], &asked = charts[0].series[3],
+                       &left = charts[0].series[4];
+  ASSERT_GT(law.x.size(), 20U);
+  for (std::size_t i = 0; i < law.x.size(); ++i) {
+    const double force_kN = 1e-3 * (0.0113 * 1e5 * law.x[i] + 500.0);
+    EXPECT_NEAR(law.y[i], kLoss_Nm_per_kN * force_kN, 0.1 * kLoss_Nm_per_kN * force_kN) << i;
+    EXPECT_NEAR(low.y[i] / law.y[i], 0.8 / 0.9, 1e-9);
+    EXPECT_NEAR(high.y[i] / law.y[i], 1.0 / 0.9, 1e-9);
+    EXPECT_NEAR(asked.y[i] - left.y[i], law.y[i], 1e-9);
+    EXPECT_LT(std::abs(left.y[i]), 0.5) << i;  // of 1 to 8 Nm
+  }
+}
+
+TEST(FindingPicture, IsNoneOfNothing) {
+  const Campaign campaign{};
+  EXPECT_TRUE(pictures_of(campaign, ModelState{}, {}).empty());
+}
+
+}  // namespace
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,237 @@
+#include "tools/diagnose/report/finding_picture.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "tools/diagnose/model/effects/effect.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+using Eigen::ArrayXd;
+using report::Series;
+
+constexpr std::size_t kPoints = 30;    // each of as many samples
+constexpr double kInformative = 1e-3;  // of the best point: less says nothing of the effect
+
+// Where a finding acts: what one unit there changes, and how it is shown.
+struct Point {
+  std::string_view acts_on;
+  const char* label;
+  double shown;  // per unit
+  QuantityChange (*unit)(const Residuals& at);
+};
+
+QuantityChange of_torque(const Residuals& at) {
+  QuantityChange out;
+  out.torque = ArrayXd::Constant(at.foot.size(), -1.0);
+  out.balance = out.torque;
+  return out;
+}
+QuantityChange of_secondary_torque(const Residuals& at) {
+  QuantityChange out;
+  out.balance = -at.measured.ratio;
+  return out;
+}
+QuantityChange of_force(const Residuals& at) {
+  QuantityChange out;
+  out.ln_capacity = 1.0 / at.measured.force_N.max(50.0);
+  return out;
+}
+QuantityChange of_friction(const Residuals& at) {
+  QuantityChange out;
+  out.ln_capacity = ArrayXd::Ones(at.foot.size());
+  return out;
+}
+QuantityChange of_ratio(const Residuals& at) {
+  QuantityChange out;
+  out.slip = 1.0 - at.measured.slip;
+  if (at.measured.balance.size() > 0) out.balance = -at.clean_Nm;
+  return out;
+}
+
+constexpr std::array<Point, 6> kActsOn{{
+    {"torque", "torque that the belt does not get, Nm", 1.0, of_torque},
+    {"secondary torque", "torque that the secondary shaft loses, Nm", 1.0, of_secondary_torque},
+    {"clamp force", "clamp force beyond the model's, N", 1.0, of_force},
+    {"friction", "friction beyond the model's, %", 1e2, of_friction},
+    {"ratio", "ratio beyond the model's, 1/1000", 1e3, of_ratio},
+    {"speed", "secondary over primary speed beyond the model's, 1/1000", 1e3, of_ratio},
+}};
+
+// What a finding may follow.
+struct Variable {
+  std::string_view name;
+  const char* label;
+  ArrayXd (*value)(const ExperimentData& run, int experiment);
+};
+
+ArrayXd primary_speed(const ExperimentData& run, int) { return run.omega_p.value; }
+ArrayXd secondary_speed(const ExperimentData& run, int) { return run.omega_s.value; }
+ArrayXd pressure_bar(const ExperimentData& run, int) { return 1e-5 * run.pressure.slow; }
+ArrayXd pressure_rate(const ExperimentData& run, int) { return 1e-5 * run.pressure.slow_slope; }
+ArrayXd torque(const ExperimentData& run, int) { return run.torque.slow; }
+ArrayXd torque_rate(const ExperimentData& run, int) { return run.torque.slow_slope; }
+ArrayXd acceleration(const ExperimentData& run, int) { return run.omega_p.slow_slope; }
+ArrayXd oil(const ExperimentData& run, int) {
+  return run.temperature.present ? run.temperature.value : ArrayXd();
+}
+ArrayXd primary_pressure(const ExperimentData& run, int) {
+  return run.pressure_p.present ? ArrayXd(1e-5 * run.pressure_p.value) : ArrayXd();
+}
+ArrayXd speed_ratio(const ExperimentData& run, int) {
+  return run.omega_s.value / run.omega_p.value;
+}
+ArrayXd time(const ExperimentData& run, int) { return run.t_s; }
+ArrayXd count(const ExperimentData& run, int experiment) {
+  return ArrayXd::Constant(run.size(), experiment + 1.0);
+}
+
+constexpr std::array<Variable, 13> kVariables{{
+    {"primary_speed", "primary speed, rad/s", primary_speed},
+    {"secondary_speed", "secondary speed, rad/s", secondary_speed},
+    {"secondary_pressure", "secondary pressure, bar", pressure_bar},
+    {"rate of secondary_pressure", "rate of the secondary pressure, bar/s", pressure_rate},
+    {"direction of secondary_pressure", "rate of the secondary pressure, bar/s", pressure_rate},
+    {"torque", "torque, Nm", torque},
+    {"rate of torque", "rate of the torque, Nm/s", torque_rate},
+    {"acceleration of primary_speed", "acceleration of the primary shaft, rad/s2", acceleration},
+    {"primary_pressure", "primary pressure, bar", primary_pressure},
+    {"oil_temperature", "oil temperature, degC", oil},
+    {"ratio", "speed ratio", speed_ratio},
+    {"time", "time in the experiment, s", time},
+    {"experiment", "experiment", count},
+}};
+
+const Variable* variable_of(const EffectRow& row) {
+  const auto named = [](std::string_view name) {
+    const auto found = std::find_if(kVariables.begin(), kVariables.end(),
+                                    [&](const Variable& each) { return each.name == name; });
+    return found == kVariables.end() ? nullptr : &*found;
+  };
+  // What follows nothing is as large everywhere: shown over what it is added to.
+  if (row.depends_on != "nothing") return named(row.depends_on);
+  return named(row.acts_on == "clamp force" ? "secondary_pressure"
+               : row.acts_on == "ratio"     ? "ratio"
+                                            : "torque");
+}
+
+// One sample of one residual: place, what a unit at the point changes, and the residual with the
+// finding and without.
+struct Sample {
+  double x, column, with, without;
+};
+
+std::vector<Sample> samples_of(const Campaign& campaign, const ModelState& extended, int slot,
+                               const Point& point, const Variable& variable) {
+  ModelState without = extended;
+  without.effects[slot] = 0.0;
+  std::vector<Sample> out;
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    const ExperimentData& run = campaign.runs[e];
+    const int experiment = static_cast<int>(e);
+    const ArrayXd x = variable.value(run, experiment);
+    if (run.valid_count == 0 || x.size() == 0) continue;
+    Residuals with = residuals_of(campaign, experiment, extended);
+    prepare_derivatives(campaign, experiment, extended, with);
+    const Residuals off = residuals_of(campaign, experiment, without);
+    const ResidualColumns columns = propagate(campaign, with, point.unit(with));
+    for (const ResidualKind kind : {kFrictionResidual, kBalanceResidual}) {
+      const auto k = static_cast<std::size_t>(kind);
+      for (Eigen::Index i = 0; i < columns[k].size(); ++i) {
+        if (!run.valid[static_cast<std::size_t>(i)] || columns[k][i] == 0.0) continue;
+        out.push_back({x[i], columns[k][i], with.value[k][i], off.value[k][i]});
+      }
+    }
+  }
+  std::erase_if(out, [](const Sample& each) {
+    return !std::isfinite(each.x + each.column + each.with + each.without);
+  });
+  return out;
+}
+
+// The sum over some neighbours by weighted least squares: what is asked for at the point.
+struct Asked {
+  double x = 0.0, without = 0.0, left = 0.0, information = 0.0;
+};
+
+std::vector<Asked> asked_by(std::vector<Sample> samples) {
+  std::stable_sort(samples.begin(), samples.end(),
+                   [](const Sample& a, const Sample& b) { return a.x < b.x; });
+  std::vector<Asked> out;
+  const std::size_t step = std::max<std::size_t>(1, samples.size() / kPoints);
+  for (std::size_t begin = 0; begin + step <= samples.size(); begin += step) {
+    Asked sum;
+    for (std::size_t i = begin; i < begin + step; ++i) {
+      const Sample& each = samples[i];
+      sum.x += each.x / static_cast<double>(step);
+      sum.without -= each.column * each.without;
+      sum.left -= each.column * each.with;
+      sum.information += each.column * each.column;
+    }
+    sum.without /= sum.information;
+    sum.left /= sum.information;
+    out.push_back(sum);
+  }
+  double best = 0.0;
+  for (const Asked& each : out) best = std::max(best, each.information);
+  std::erase_if(out, [&](const Asked& each) { return each.information < kInformative * best; });
+  return out;
+}
+
+// The interval of a size over the size; none where it is not a straight multiple.
+std::optional<std::array<double, 2>> band_of(const Slot& slot,
+                                             const std::vector<Finding>& findings) {
+  for (const Finding& each : findings) {
+    if (each.effect != slot.row->id || each.role != slot.role) continue;
+    const auto found = each.parameters.find(std::string(slot.row->parameter));
+    if (found == each.parameters.end() || found->second.value == 0.0) continue;
+    if (slot.row->to_contract != nullptr) return std::nullopt;
+    return std::array{found->second.low / found->second.value,
+                      found->second.high / found->second.value};
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::vector<report::Chart> pictures_of(const Campaign& campaign, const ModelState& extended,
+                                       const std::vector<Finding>& findings) {
+  std::vector<report::Chart> out;
+  for (std::size_t i = 0; i < campaign.slots.size(); ++i) {
+    const Slot& slot = campaign.slots[i];
+    if (extended.effects[static_cast<Eigen::Index>(i)] == 0.0) continue;
+    const auto point = std::find_if(kActsOn.begin(), kActsOn.end(), [&](const Point& each) {
+      return each.acts_on == slot.row->acts_on;
+    });
+    const Variable* variable = variable_of(*slot.row);
+    if (point == kActsOn.end() || variable == nullptr) continue;
+    const std::vector<Asked> asked =
+        asked_by(samples_of(campaign, extended, static_cast<int>(i), *point, *variable));
+    if (asked.size() < 2) continue;
+    Series law{"as found", {}, {}, true, false}, low{"95 % from", {}, {}, true, true},
+        high{"95 % to", {}, {}, true, true}, before{"asked for by the data", {}, {}, false, false},
+        after{"left with the finding", {}, {}, false, false};
+    const auto band = band_of(slot, findings);
+    for (const Asked& each : asked) {
+      const double size = point->shown * (each.without - each.left);
+      for (Series* series : {&law, &low, &high, &before, &after}) series->x.push_back(each.x);
+      law.y.push_back(size);
+      low.y.push_back(size * (band ? (*band)[0] : 1.0));
+      high.y.push_back(size * (band ? (*band)[1] : 1.0));
+      before.y.push_back(point->shown * each.without);
+      after.y.push_back(point->shown * each.left);
+    }
+    report::Chart chart{slot.label(), variable->label, point->label, {law}};
+    if (band) chart.series.insert(chart.series.end(), {low, high});
+    chart.series.insert(chart.series.end(), {before, after});
+    out.push_back(std::move(chart));
+  }
+  return out;
+}
+
+}  // namespace beltgrip::diagnose
