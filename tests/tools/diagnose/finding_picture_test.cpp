@@ -35,7 +35,7 @@ TEST(FindingPicture, IsTheCauseOverWhatItFollows) {
   const std::vector<report::Chart> charts =
       pictures_of(engine.campaign(), naming.hypothesis.state, {finding});
   ASSERT_EQ(charts.size(), 1U);
-  EXPECT_EQ(charts[0].title, "torque_loss.per_kN_Nm");
+  EXPECT_EQ(charts[0].title, "a drag that grows with the clamp force");
   EXPECT_EQ(charts[0].x_label, "secondary pressure, bar");
   ASSERT_EQ(charts[0].series.size(), 5U);
   const report::Series &law = charts[0].series[0], &low = charts[0].series[1],

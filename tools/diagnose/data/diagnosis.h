@@ -23,6 +23,7 @@ struct Finding {
   std::string effect;
   std::map<std::string, Interval> parameters;
   std::map<std::string, double> fixed;  // what is counted, not estimated: wear's "at"
+  std::string from_file;                // the same in words: the first file that has it
   std::string role;                     // channel_skew
   double probability = 0.0;
   // Share of the fits without one experiment in which it is there with 95 %; where fitted at all.

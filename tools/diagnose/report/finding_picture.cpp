@@ -8,6 +8,7 @@
 #include <string>
 
 #include "tools/diagnose/model/effects/effect.h"
+#include "tools/diagnose/report/finding_words.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -226,7 +227,10 @@ std::vector<report::Chart> pictures_of(const Campaign& campaign, const ModelStat
       before.y.push_back(point->shown * each.without);
       after.y.push_back(point->shown * each.left);
     }
-    report::Chart chart{slot.label(), variable->label, point->label, {law}};
+    report::Chart chart{std::string(words_of(slot.row->id, slot.row->parameter)),
+                        variable->label,
+                        point->label,
+                        {law}};
     if (band) chart.series.insert(chart.series.end(), {low, high});
     chart.series.insert(chart.series.end(), {before, after});
     out.push_back(std::move(chart));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "tools/diagnose/report/finding_words.h"
 #include "tools/diagnose/report/json.h"
 
 namespace beltgrip::diagnose {
@@ -37,9 +38,11 @@ std::string sizes(const Finding& finding) {
   std::string out;
   const auto add = [&](const std::string& text) { out += (out.empty() ? "" : "; ") + text; };
   for (const auto& [name, value] : finding.parameters) {
-    add(name + " = " + number(value.value) + " (" + range(value.low, value.high) + ")");
+    const std::string unit(unit_of(finding.effect, name));
+    add(name + " = " + number(value.value) + " (" + range(value.low, value.high) + ")" +
+        (unit.empty() ? "" : " " + unit));
   }
-  for (const auto& [name, value] : finding.fixed) add(name + " = " + number(value));
+  if (!finding.from_file.empty()) add("from " + finding.from_file + " on");
   return out;
 }
 
@@ -83,7 +86,7 @@ void add_findings(report::HtmlPage& page, const Diagnosis& d,
 }
 
 // In the unit of the function.
-const char* unit_of(const std::string& acts_on) {
+const char* unit_at(const std::string& acts_on) {
   if (acts_on == "torque") return "Nm";
   return acts_on == "clamp_force" ? "N" : "share";
 }
@@ -102,7 +105,7 @@ report::Chart picture_of(const LearnedFinding& learned) {
   }
   return {learned.acts_on + " over " + joined(learned.depends_on),
           joined(learned.depends_on),
-          learned.acts_on + ", " + unit_of(learned.acts_on),
+          learned.acts_on + ", " + unit_at(learned.acts_on),
           {mean, low, high}};
 }
 

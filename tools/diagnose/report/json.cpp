@@ -1,9 +1,11 @@
 #include "tools/diagnose/report/json.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cstdio>
 #include <vector>
 
+#include "tools/diagnose/report/finding_words.h"
 #include "tools/text/json_writer.h"
 
 namespace beltgrip::diagnose {
@@ -30,6 +32,12 @@ void interval(text::JsonWriter& json, double low, double high) {
 std::string number(double value) {
   char buffer[32];
   std::snprintf(buffer, sizeof buffer, "%.4g", value);
+  return buffer;
+}
+
+std::string short_number(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.2g", value);
   return buffer;
 }
 
@@ -312,36 +320,32 @@ std::string verdict_line(const Diagnosis& d) {
 
 namespace {
 
-std::string size_text(const Finding& finding) {
-  std::string out = finding.effect + (finding.role.empty() ? "" : " (" + finding.role + ")");
-  for (const auto& [name, value] : finding.parameters) {
-    out += ", " + name + " " + number(value.value) + " [" + number(value.low) + ", " +
-           number(value.high) + "]";
-  }
-  return out;
-}
-
 // By how much the error of mu_max falls, or of the signal that gains most.
 std::string gain_text(const Diagnosis& d) {
   if (d.mu_max && d.mu_max->after < d.mu_max->before) {
-    return "; with it mu_max is off by " + number(100.0 * d.mu_max->after) + " % instead of " +
-           number(100.0 * d.mu_max->before) + " %";
+    return "; with it mu_max is off by " + short_number(100.0 * d.mu_max->after) +
+           " % instead of " + short_number(100.0 * d.mu_max->before) + " %";
   }
   const auto best =
       std::min_element(d.held_out.begin(), d.held_out.end(), [](const auto& a, const auto& b) {
         return a.second.after * b.second.before < b.second.after * a.second.before;
       });
   if (best == d.held_out.end() || !(best->second.after < best->second.before)) return {};
-  return "; with it " + best->first + " is off by " + number(best->second.after) + " instead of " +
-         number(best->second.before) + " (SI)";
+  return "; with it " + best->first + " is off by " + short_number(best->second.after) +
+         " instead of " + short_number(best->second.before) + " (SI)";
 }
 
 }  // namespace
 
 std::string headline(const Diagnosis& d) {
   std::string found;
+  const auto begun = [](std::string text) {
+    if (!text.empty())
+      text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+    return text;
+  };
   for (const Finding& finding : d.findings) {
-    found += (found.empty() ? "" : " and ") + size_text(finding);
+    found += (found.empty() ? "" : " and ") + in_words(finding);
   }
   for (const LearnedFinding& each : d.learned) {
     found += (found.empty() ? "" : " and ") + sentence(each);
@@ -351,7 +355,7 @@ std::string headline(const Diagnosis& d) {
            sentence(*d.unexplained) + ".";
   }
   if (d.verdict == Verdict::kExplained) {
-    return found + (d.findings.size() + d.learned.size() > 1 ? " explain" : " explains") +
+    return begun(found) + (d.findings.size() + d.learned.size() > 1 ? " explain" : " explains") +
            " what was wrong" + gain_text(d) + ".";
   }
   if (d.verdict == Verdict::kNothingWrong) {
@@ -371,11 +375,11 @@ std::string plain_text(const Diagnosis& d) {
     out += finding.effect + (finding.role.empty() ? "" : " (" + finding.role + ")") + ": " +
            finding.equation + "\n";
     for (const auto& [name, value] : finding.parameters) {
+      const std::string unit(unit_of(finding.effect, name));
       out += "  " + name + " = " + number(value.value) + " [" + number(value.low) + ", " +
-             number(value.high) + "]\n";
+             number(value.high) + "]" + (unit.empty() ? "" : " " + unit) + "\n";
     }
-    for (const auto& [name, value] : finding.fixed)
-      out += "  " + name + " = " + number(value) + "\n";
+    if (!finding.from_file.empty()) out += "  from " + finding.from_file + " on\n";
     out += "  probability " + number(finding.probability) + "\n";
     if (finding.stability) {
       out += "  there in " + number(100.0 * *finding.stability) +

@@ -451,7 +451,11 @@ class Run {
       finding.equation = slot.row->equation;
       finding.acts_on = slot.row->acts_on;
       finding.role = slot.role;
-      if (slot.counts_experiments()) finding.fixed["at"] = slot.index;
+      if (slot.counts_experiments()) {
+        finding.fixed["at"] = slot.index;
+        const std::string& path = campaign.runs[static_cast<std::size_t>(slot.index)].name;
+        finding.from_file = path.substr(path.rfind('/') + 1);
+      }
       const double a = slot.to_contract(value - half, h.state.nuisance);
       const double b = slot.to_contract(value + half, h.state.nuisance);
       finding.parameters[std::string(slot.row->parameter)] = {
