@@ -145,7 +145,7 @@ TEST(Staircase, KeepsThePlateausAndNotTheSteps) {
   EXPECT_EQ(kept, data.valid_count);
   EXPECT_GE(kept, 3 * 6);  // of 13 samples of a whole plateau, half a second and more
   // The first and the last plateau are cut short by the ends of the data.
-  EXPECT_EQ(data.start_of_segment.size(), 3U);
+  EXPECT_EQ(data.stretches.size(), 3U);
 }
 
 }  // namespace

@@ -132,7 +132,7 @@ TEST(Forward, StiffRigFollowsTheFineIntegrationUpToThePeakAndEndsThere) {
   auto end = begin;
   while (forward.grips[static_cast<std::size_t>(end) + 1]) ++end;
   ASSERT_GT(end - begin, 60);
-  EXPECT_LT(end, data.start_of_segment[0] + data.valid_count - 1);  // before the data end
+  EXPECT_LT(end, data.stretches[0].begin + data.valid_count - 1);  // before the data end
   const auto rate = [&](double t_s, double speed) { return rig_rate(data, t_s, speed); };
   const ArrayXd& simulated = signal(forward, "secondary_speed").simulated;
   const ArrayXd truth = integrated(rate, simulated[begin], begin, end + 1, 1e-5);
@@ -185,7 +185,7 @@ TEST(Forward, VehicleFollowsTheFineIntegration) {
   const Campaign campaign = campaign_of(table);
   const ExperimentData& data = campaign.runs[0];
   const Forward forward = run_forward(campaign, 0, nominal_state(campaign));
-  const int begin = data.start_of_segment[0], end = begin + data.valid_count - 1;
+  const int begin = data.stretches[0].begin, end = begin + data.valid_count - 1;
   ASSERT_GT(end - begin, 100);
   const ArrayXd& simulated = signal(forward, "primary_speed").simulated;
   const auto rate = [&](double t_s, double omega_p) {

@@ -261,7 +261,11 @@ void mask_and_segment(const std::vector<bool>& masked, ExperimentData& data) {
   if (in_long > in_short) found = stretches(kBeside);
   std::vector<bool> kept(data.valid.size(), false);
   for (const auto& [begin, end] : found) {
-    data.start_of_segment.push_back(begin);
+    if (!data.stretches.empty() && data.stretches.back().end == begin) {
+      data.stretches.back().end = end;  // at the other stop
+    } else {
+      data.stretches.push_back({begin, end});
+    }
     data.valid_count += end - begin;
     for (int i = begin; i < end; ++i) kept[static_cast<std::size_t>(i)] = true;
   }

@@ -28,6 +28,11 @@ struct GridSignal {
   bool present = false;
 };
 
+// Neighbouring samples, all of them valid, before and behind which is none.
+struct Stretch {
+  int begin = 0, end = 0;  // end: behind the last
+};
+
 struct ExperimentData {
   std::string name;
   double dt_s = 0.1;
@@ -35,9 +40,9 @@ struct ExperimentData {
   GridSignal omega_p, omega_s, pressure, torque, torque_s, pressure_p, command, temperature;
   OrderLine line_p, line_s;  // once per revolution, primary and secondary speed
   bool torque_is_engine = false;
-  std::vector<int> stop;              // EndStopIndex per sample
-  std::vector<bool> valid;            // may carry a conclusion
-  std::vector<int> start_of_segment;  // first valid sample of every gapless stretch
+  std::vector<int> stop;           // EndStopIndex per sample
+  std::vector<bool> valid;         // may carry a conclusion
+  std::vector<Stretch> stretches;  // the valid samples
   int valid_count = 0;
   bool saturated_pressure = false;
   double rounding_slip = 0.0;  // one sigma of what the rounding of the speeds leaves in the slip

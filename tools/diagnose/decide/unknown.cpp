@@ -100,7 +100,7 @@ std::vector<UnknownGroup> score_groups(const Engine& engine) {
             change.balance = p * kUnit[2];
           }
           if (injection == 3) {
-            change.torque = p * kUnit[3] * at.clean.torque.value;
+            change.torque = p * kUnit[3] * at.clean_reading_Nm;
             change.balance = change.torque;
           }
           if (injection == 4) change.ln_capacity = p * kUnit[4] / at.there.force_N.max(50.0);

@@ -35,7 +35,7 @@ QuantityChange unit_change(const ModelState& state, const Residuals& at, const I
       out.balance = -by;
       break;
     case Injection::kTorqueGain:
-      out.torque = -by * at.clean.torque.value;
+      out.torque = -by * at.clean_reading_Nm;
       out.balance = out.torque;
       break;
     case Injection::kClampForce: {

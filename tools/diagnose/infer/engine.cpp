@@ -197,7 +197,7 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
     }
     return out;
   };
-  const auto summaries_at = [&](const ModelState& state, const std::vector<Residuals>& at,
+  const auto summaries_at = [&](const ModelState& state, std::vector<Residuals>& at,
                                 const std::vector<int>& wanted) {
     std::vector<Summary> out;
     for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
@@ -389,8 +389,8 @@ void Engine::update_noise() {
   raw.reserve(campaign_.runs.size());
   for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
     const auto run = static_cast<int>(e);
-    raw.push_back(raw_columns(campaign_, run, state_, residuals_of(campaign_, run, state_),
-                              summary_parameters_, scales, true));
+    Residuals at = residuals_of(campaign_, run, state_);
+    raw.push_back(raw_columns(campaign_, run, state_, at, summary_parameters_, scales, true));
   }
   for (int pass = 0; pass < 2; ++pass) whitening_ = fit_whitening(campaign_, raw, all, whitening_);
   summaries_.clear();

@@ -60,13 +60,7 @@ void whiten(const ExperimentData& data, const Whitening::Filter& filter, const A
             Eigen::Ref<VectorXd> out) {
   const int full = static_cast<int>(filter.coefficient.size()) - 1;
   Index row = 0;
-  for (int k = 0; k < data.size();) {
-    if (!data.valid[static_cast<std::size_t>(k)]) {
-      ++k;
-      continue;
-    }
-    int end = k;
-    while (end < data.size() && data.valid[static_cast<std::size_t>(end)]) ++end;
+  for (const auto& [k, end] : data.stretches) {
     const int warm = std::min(full, end - k);
     for (int order = 0; order < warm; ++order) {
       const VectorXd& a = filter.coefficient[static_cast<std::size_t>(order)];
@@ -88,7 +82,6 @@ void whiten(const ExperimentData& data, const Whitening::Filter& filter, const A
       }
       row += rest;
     }
-    k = end;
   }
 }
 
@@ -202,17 +195,14 @@ std::vector<WhiteBlock> whitened(const Campaign& campaign, int run, const RawCol
 
 }  // namespace
 
-RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& state,
-                       const Residuals& residuals, const std::vector<int>& parameters,
-                       const VectorXd& scale, bool with_random, const ExtraColumns& extra) {
+RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& state, Residuals& at,
+                       const std::vector<int>& parameters, const VectorXd& scale, bool with_random,
+                       const ExtraColumns& extra) {
   RawColumns out;
   out.with_random = with_random;
-  if (!with_random && parameters.empty() && !extra) {  // nothing that asks for derivatives
-    out.columns.push_back(residuals.value);
-    return out;
-  }
-  Residuals at = residuals;
-  if (with_random || !parameters.empty()) prepare_derivatives(campaign, run, state, at);
+  if (with_random) move_to_foot(campaign, run, at);
+  if (!parameters.empty()) prepare_derivatives(campaign, run, state, at);
+  out.columns.reserve(parameters.size() + 1 + kRandomEffects);
   for (std::size_t j = 0; j < parameters.size(); ++j) {
     ResidualColumns column = derivative(campaign, run, state, at, parameters[j]);
     for (ArrayXd& each : column) each *= scale[static_cast<Index>(j)];
@@ -271,7 +261,7 @@ Summary summary_of(const Campaign& campaign, int run, const RawColumns& raw,
   return out;
 }
 
-Summary summarise(const Campaign& campaign, int run, const ModelState& state, const Residuals& at,
+Summary summarise(const Campaign& campaign, int run, const ModelState& state, Residuals& at,
                   const std::vector<int>& parameters, const VectorXd& scale,
                   const Whitening& whitening, const ExtraColumns& extra) {
   return summary_of(
@@ -283,16 +273,16 @@ Summary summarise(const Campaign& campaign, int run, const ModelState& state, co
 Summary summarise(const Campaign& campaign, int run, const ModelState& state,
                   const std::vector<int>& parameters, const VectorXd& scale,
                   const Whitening& whitening, const ExtraColumns& extra) {
-  return summarise(campaign, run, state, residuals_of(campaign, run, state), parameters, scale,
-                   whitening, extra);
+  Residuals at = residuals_of(campaign, run, state);
+  return summarise(campaign, run, state, at, parameters, scale, whitening, extra);
 }
 
 std::array<VectorXd, kResidualKinds> white_residuals(const Campaign& campaign, int run,
                                                      const ModelState& state,
                                                      const Whitening& whitening,
                                                      const Scatter& scatter) {
-  const RawColumns raw =
-      raw_columns(campaign, run, state, residuals_of(campaign, run, state), {}, {}, true);
+  Residuals at = residuals_of(campaign, run, state);
+  const RawColumns raw = raw_columns(campaign, run, state, at, {}, {}, true);
   const Summary summary = summary_of(campaign, run, raw, whitening);
   const MatrixXd inverse = (1.0 / scatter.variance).matrix().asDiagonal();
   VectorXd weights(1 + kRandomEffects);

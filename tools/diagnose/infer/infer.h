@@ -103,15 +103,14 @@ struct RawColumns {
   std::vector<ResidualColumns> columns;
   bool with_random = false;
 };
-// at: the residuals of this state.
-RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& state,
-                       const Residuals& residuals, const std::vector<int>& parameters,
-                       const Eigen::VectorXd& scale, bool with_random,
-                       const ExtraColumns& extra = {});
+// at: the residuals of this state; what the columns need is added to them.
+RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& state, Residuals& at,
+                       const std::vector<int>& parameters, const Eigen::VectorXd& scale,
+                       bool with_random, const ExtraColumns& extra = {});
 Summary summary_of(const Campaign& campaign, int run, const RawColumns& raw,
                    const Whitening& whitening);
 // Both at once, with the residuals or without.
-Summary summarise(const Campaign& campaign, int run, const ModelState& state, const Residuals& at,
+Summary summarise(const Campaign& campaign, int run, const ModelState& state, Residuals& at,
                   const std::vector<int>& parameters, const Eigen::VectorXd& scale,
                   const Whitening& whitening, const ExtraColumns& extra = {});
 Summary summarise(const Campaign& campaign, int run, const ModelState& state,

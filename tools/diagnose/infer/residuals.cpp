@@ -7,32 +7,7 @@
 #include "tools/diagnose/model/curve_family.h"
 
 namespace beltgrip::diagnose {
-namespace {
-
 using Eigen::ArrayXd;
-
-// The foot point of what stands in the regressors: of the misfit in torque, the clamp force takes
-// its share.
-void move_to_foot(const ExperimentData& data, const estimator::VariatorParameters& variator,
-                  const ArrayXd& force_share, Residuals& out) {
-  const Quantities& q = out.measured;
-  out.clean_Nm = out.model_Nm;
-  out.clean = data;
-  for (int k = 0; k < data.size(); ++k) {
-    if (!data.valid[static_cast<std::size_t>(k)]) continue;
-    const double off_Nm = q.belt_torque[k] - out.model_Nm[k];
-    const double force_Nm = off_Nm * force_share[k];
-    if (out.model_Nm[k] != 0.0) {
-      const double relative = std::clamp(force_Nm / out.model_Nm[k], -0.2, 0.2);
-      out.clean.pressure.value[k] += relative * q.force_N[k] / variator.secondary_piston_area_m2;
-      out.clean_Nm[k] *= 1.0 + relative;
-    }
-    out.clean.torque.value[k] -= off_Nm - (out.clean_Nm[k] - out.model_Nm[k]);
-  }
-  if (q.balance.size() > 0) out.output_torque = out.clean_Nm / q.ratio;
-}
-
-}  // namespace
 
 double robust_sigma(std::vector<double>& values) {
   if (values.size() < 20) return 0.0;
@@ -42,7 +17,12 @@ double robust_sigma(std::vector<double>& values) {
 
 Quantities quantities(const Campaign& campaign, const ExperimentData& data, int run,
                       const ModelState& state) {
-  return evaluate(data, run, campaign.variator, state.nuisance,
+  return quantities(campaign, data, {data.pressure.value, data.torque.value}, run, state);
+}
+
+Quantities quantities(const Campaign& campaign, const ExperimentData& data, const Readings& read,
+                      int run, const ModelState& state) {
+  return evaluate(data, read, run, campaign.variator, state.nuisance,
                   Effects{&campaign.slots, campaign.switched_on + state.effects, campaign.learned,
                           state.learned});
 }
@@ -75,8 +55,7 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
   const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
   const std::array<double, kStops> peak_slip{std::exp(q.ln_peak_slip[0]),
                                              std::exp(q.ln_peak_slip[1])};
-  for (int k = 0; k < n; ++k) {
-    if (!data.valid[static_cast<std::size_t>(k)]) continue;
+  const auto find_foot = [&](int k) {
     const auto stop = static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)]);
     const double peak = peak_slip[stop], per_peak = 1.0 / peak;
     const double capacity = q.capacity[k];
@@ -123,11 +102,14 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
     out.value[kFrictionResidual][k] =
         (q.belt_torque[k] - foot.model_Nm - foot.slope * (q.slip[k] - foot.x * peak)) *
         out.weight[k];
+  };
+  for (const auto& [begin, end] : data.stretches) {
+    for (int k = begin; k < end; ++k) find_foot(k);
   }
   out.balance_weight = ArrayXd::Zero(n);
-  for (int k = 0; k < n; ++k) {
+  for (int k = 0; k < n; k += kBalanceStep) {
     const auto i = static_cast<std::size_t>(k);
-    if (data.valid[i] && k % kBalanceStep == 0) {
+    if (data.valid[i]) {
       out.balance_weight[k] =
           1.0 / campaign.noise.balance_Nm[static_cast<std::size_t>(data.stop[i])];
     }
@@ -144,19 +126,50 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
   return out;
 }
 
-void prepare_derivatives(const Campaign& campaign, int run, const ModelState& state,
-                         Residuals& at) {
+// The foot point of what stands in the regressors: of the misfit in torque, the clamp force takes
+// its share.
+void move_to_foot(const Campaign& campaign, int run, Residuals& at) {
+  if (at.clean_Nm.size() > 0) return;
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   const Quantities& q = at.measured;
-  // Share of the misfit that is the clamp force's: its noise comes with the torque it carries.
-  const ArrayXd carried_variance = (q.belt_torque * campaign.noise.force_N / q.force_N).square();
   const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
-  move_to_foot(data, campaign.variator, carried_variance / (sensor_variance + carried_variance),
-               at);
-  at.there = quantities(campaign, at.clean, run, state);
-  at.place.resize(static_cast<std::size_t>(at.foot.size()));
-  std::transform(at.foot.begin(), at.foot.end(), at.place.begin(),
-                 [](double x) { return place_on_curve(std::abs(x)); });
+  at.clean_Nm = at.model_Nm;
+  at.clean_pressure_Pa = data.pressure.value;
+  at.clean_reading_Nm = data.torque.value;
+  for (const auto& [begin, end] : data.stretches) {
+    for (int k = begin; k < end; ++k) {
+      // Share of the misfit that is the clamp force's: its noise comes with the torque it carries.
+      const double carried_Nm = q.belt_torque[k] * campaign.noise.force_N / q.force_N[k];
+      const double carried_variance = carried_Nm * carried_Nm;
+      const double force_share = carried_variance / (sensor_variance + carried_variance);
+      const double off_Nm = q.belt_torque[k] - at.model_Nm[k];
+      const double force_Nm = off_Nm * force_share;
+      if (at.model_Nm[k] != 0.0) {
+        const double relative = std::clamp(force_Nm / at.model_Nm[k], -0.2, 0.2);
+        at.clean_pressure_Pa[k] +=
+            relative * q.force_N[k] / campaign.variator.secondary_piston_area_m2;
+        at.clean_Nm[k] *= 1.0 + relative;
+      }
+      at.clean_reading_Nm[k] -= off_Nm - (at.clean_Nm[k] - at.model_Nm[k]);
+    }
+  }
+  if (q.balance.size() > 0) at.output_torque = at.clean_Nm / q.ratio;
+}
+
+void prepare_derivatives(const Campaign& campaign, int run, const ModelState& state,
+                         Residuals& at) {
+  if (at.there.slip.size() > 0) return;
+  move_to_foot(campaign, run, at);
+  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+  at.there = quantities(campaign, data, {at.clean_pressure_Pa, at.clean_reading_Nm}, run, state);
+  for (const auto& [begin, end] : data.stretches) {
+    for (int k = begin; k < end; ++k) {
+      if (!(at.weight[k] > 0.0)) continue;
+      at.on_curve[static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)])].push_back(
+          {k, place_on_curve(std::abs(at.foot[k])), at.measured.capacity[k],
+           -std::copysign(at.weight[k], at.foot[k])});
+    }
+  }
 }
 
 ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
@@ -184,6 +197,19 @@ ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
 }
 
 namespace {
+// Of one mode of the friction curve of one stop.
+ResidualColumns mode_column(const std::vector<CurveSample>& samples, int mode, int size) {
+  ResidualColumns out;
+  if (samples.empty()) return out;
+  ArrayXd& column = out[kFrictionResidual];
+  column = ArrayXd::Zero(size);
+  const CurveShape& shape = mode_shape(mode);
+  for (const CurveSample& each : samples) {
+    column[each.k] = each.capacity_Nm * shape.departure(each.place) * each.weight;
+  }
+  return out;
+}
+
 bool energy_acts(const Campaign& campaign, const ModelState& state) {
   for (std::size_t i = 0; i < campaign.slots.size(); ++i) {
     const auto j = static_cast<Eigen::Index>(i);
@@ -213,11 +239,6 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
       }
     }
     return out;
-  };
-  const auto bump = [&](int k, int i) {
-    const double f = i < kShapeKnots ? mode_function(i, at.place[static_cast<std::size_t>(k)])
-                                     : fall_function(std::abs(at.foot[k]));
-    return at.measured.capacity[k] * f * std::copysign(1.0, at.foot[k]);
   };
   switch (parameter) {
     case kLnMuMax:
@@ -264,7 +285,7 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
       change.slip = (1.0 - q.slip) * ln_ratio;
       if (q.balance.size() > 0) {
         change.balance =
-            (q.balance - q.belt_torque - at.clean.torque.slow + at.clean.torque.value) * ln_ratio;
+            (q.balance - q.belt_torque - data.torque.slow + at.clean_reading_Nm) * ln_ratio;
       }
       return propagate(campaign, at, change);
     }
@@ -284,10 +305,10 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
       break;
   }
   if (parameter >= kShapeOverdrive && parameter < kShapeLow) {
-    return per_stop(kOverdriveStop, [&](int k) { return bump(k, parameter - kShapeOverdrive); });
+    return mode_column(at.on_curve[kOverdriveStop], parameter - kShapeOverdrive, n);
   }
   if (parameter >= kShapeLow && parameter <= kEndOfShapes) {
-    return per_stop(kLowStop, [&](int k) { return bump(k, parameter - kShapeLow); });
+    return mode_column(at.on_curve[kLowStop], parameter - kShapeLow, n);
   }
   // The rest by central differences of the quantities.
   const bool slot = parameter >= kNuisanceCount;
@@ -297,9 +318,10 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
   ModelState moved = state;
   double& value = slot ? moved.effects[index] : moved.nuisance[index];
   value += step;
-  const Quantities above = quantities(campaign, at.clean, run, moved);
+  const Readings clean{at.clean_pressure_Pa, at.clean_reading_Nm};
+  const Quantities above = quantities(campaign, data, clean, run, moved);
   value -= 2.0 * step;
-  const Quantities below = quantities(campaign, at.clean, run, moved);
+  const Quantities below = quantities(campaign, data, clean, run, moved);
   const double scale = 0.5 / step;
   change.slip = (above.slip - below.slip) * scale;
   change.torque = (above.belt_torque - below.belt_torque) * scale;
@@ -314,8 +336,9 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
     const double peak = std::exp(above.ln_peak_slip[s]);
     for (int k = 0; k < n; ++k) {
       if (data.stop[static_cast<std::size_t>(k)] == stop && at.weight[k] > 0.0) {
-        change.torque[k] +=
-            at.slope[k] * at.foot[k] * peak * d_ln_peak - bump(k, kShapeKnots) * d_fall;
+        change.torque[k] += at.slope[k] * at.foot[k] * peak * d_ln_peak -
+                            at.measured.capacity[k] * fall_function(std::abs(at.foot[k])) *
+                                std::copysign(1.0, at.foot[k]) * d_fall;
       }
     }
   }

@@ -65,6 +65,14 @@ struct Campaign {
   bool has_tracking = false;
 };
 
+// A sample that counts, as the departure of its stop's friction curve sees it.
+struct CurveSample {
+  int k = 0;
+  CurvePlace place;  // of |foot|
+  double capacity_Nm = 0.0;
+  double weight = 0.0;  // of a change of the curve in the residual, with its sign
+};
+
 // Residuals of one experiment and what their derivatives need.
 struct Residuals {
   std::array<Eigen::ArrayXd, kResidualKinds> value;  // empty where the kind does not exist
@@ -74,20 +82,26 @@ struct Residuals {
   Eigen::ArrayXd weight;          // 1 / (noise of the distance)
   Eigen::ArrayXd balance_weight;  // 1 / (noise of the balance)
   Quantities measured;            // the model at the state, on the data as they are
-  // By prepare_derivatives only, at the foot point: no noise in a regressor.
+  // By move_to_foot only: of the belt at the foot point, and what the sensors would read there. No
+  // noise in a regressor.
   Eigen::ArrayXd clean_Nm, output_torque;
-  ExperimentData clean;           // torques and pressure there
-  Quantities there;               // the model on them
-  std::vector<CurvePlace> place;  // of |foot|
+  Eigen::ArrayXd clean_pressure_Pa, clean_reading_Nm;
+  // By prepare_derivatives only.
+  Quantities there;  // the model on those readings
+  std::array<std::vector<CurveSample>, kStops> on_curve;
 };
 
 // The model at a state, of the campaign's data or of others in their place; its friction curves.
 Quantities quantities(const Campaign& campaign, const ExperimentData& data, int run,
                       const ModelState& state);
+Quantities quantities(const Campaign& campaign, const ExperimentData& data, const Readings& read,
+                      int run, const ModelState& state);
 std::array<CurveShape, kStops> shapes(const Eigen::VectorXd& nuisance, const Quantities& q);
 
 Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state);
-// Adds what derivative() needs; at: the residuals of this state.
+// Adds what propagate() needs, unless it is there.
+void move_to_foot(const Campaign& campaign, int run, Residuals& at);
+// Adds what derivative() needs, unless it is there; at: the residuals of this state.
 void prepare_derivatives(const Campaign& campaign, int run, const ModelState& state, Residuals& at);
 
 // d(residual)/d(parameter); empty: zero. Parameters are numbered: nuisances first, then slots.

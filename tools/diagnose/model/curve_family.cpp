@@ -134,7 +134,7 @@ int first_knot(int parameter) {
   return parameter < kShapeLow ? kShapeOverdrive : kShapeLow;
 }
 
-double mode_function(int mode, const CurvePlace& place) {
+const CurveShape& mode_shape(int mode) {
   static const std::array<CurveShape, kShapeKnots> kModes = [] {
     std::array<CurveShape, kShapeKnots> out;
     for (int i = 0; i < kShapeKnots; ++i) {
@@ -143,7 +143,7 @@ double mode_function(int mode, const CurvePlace& place) {
     }
     return out;
   }();
-  return kModes[static_cast<std::size_t>(mode)].departure(place);
+  return kModes[static_cast<std::size_t>(mode)];
 }
 
 }  // namespace beltgrip::diagnose

@@ -20,8 +20,8 @@ const Eigen::Matrix<double, kShapeKnots, 1>& usual_departure();
 const KnotMatrix& curve_modes();
 // Differences at the knots to sizes of the modes, in sigmas.
 const KnotMatrix& curve_modes_inverse();
-// Departure of one sigma of a mode.
-double mode_function(int mode, const CurvePlace& place);
+// The departure of one sigma of a mode.
+const CurveShape& mode_shape(int mode);
 
 // What no friction does: by how much the slope of a curve grows from one interval between its knots
 // to the next on the way to the peak, and its derivatives by the modes.

@@ -71,75 +71,11 @@ namespace {
 
 constexpr double kBend = 1.3;
 
-// Ends of the intervals of the cubic: 0, the knots below the peak, the peak, the knots beyond it.
-constexpr int kEnds = kShapeKnots + 2;
-constexpr int kPeakEnd = kKnotsBelowPeak + 1;
-constexpr int end_of_knot(int knot) { return knot < kKnotsBelowPeak ? knot + 1 : knot + 2; }
-constexpr std::array<double, kEnds> kEnd = [] {
-  std::array<double, kEnds> ends{};
-  for (int i = 0; i < kShapeKnots; ++i) {
-    ends[static_cast<std::size_t>(end_of_knot(i))] = kShapeKnot[static_cast<std::size_t>(i)];
-  }
-  ends[kPeakEnd] = 1.0;
-  return ends;
-}();
-
-using Cubics = std::array<std::array<double, 4>, kShapeKnots + 1>;
-
-// Hermite cubics through y with the slopes of finite differences, flat at the last end.
-Cubics cubics(const std::array<double, kEnds>& y) {
-  std::array<double, kEnds> slope{};
-  for (std::size_t j = 0; j + 1 < kEnds; ++j) {
-    slope[j] = j == 0 ? (y[1] - y[0]) / (kEnd[1] - kEnd[0])
-                      : (y[j + 1] - y[j - 1]) / (kEnd[j + 1] - kEnd[j - 1]);
-  }
-  Cubics out{};
-  for (std::size_t j = 0; j + 1 < kEnds; ++j) {
-    const double h = kEnd[j + 1] - kEnd[j];
-    const double secant = (y[j + 1] - y[j]) / h;
-    out[j] = {y[j], slope[j], (3.0 * secant - 2.0 * slope[j] - slope[j + 1]) / h,
-              (slope[j] + slope[j + 1] - 2.0 * secant) / (h * h)};
-  }
-  return out;
-}
-
 CurveShape::Point nominal_formula(double size) {
   static const double kStiffness = std::tan(std::numbers::pi / (2.0 * kBend));
   const double angle = kBend * std::atan(kStiffness * size);
   return {std::sin(angle),
           std::cos(angle) * kBend * kStiffness / (1.0 + kStiffness * kStiffness * size * size)};
-}
-
-// The nominal curve as cubics between points of a table (error below 1e-7), beside each the
-// interval of the departure that it begins in: both are evaluated millions of times.
-constexpr std::size_t kCellsPerUnit = 64, kCellUnits = 4;
-static_assert(kShapeKnot.back() < kCellUnits);
-struct Cell {
-  std::array<double, 4> nominal;  // of the cell's own abscissa, 0 to 1
-  std::size_t interval;
-};
-using Cells = std::array<Cell, kCellsPerUnit * kCellUnits>;
-const Cells& cells() {
-  static const Cells kCells = [] {
-    Cells out{};
-    std::size_t interval = 0;
-    for (std::size_t i = 0; i < out.size(); ++i) {
-      const double x = static_cast<double>(i) / kCellsPerUnit;
-      const CurveShape::Point a = nominal_formula(x), b = nominal_formula(x + 1.0 / kCellsPerUnit);
-      const double rise = b.value - a.value;
-      const double begins = a.slope / kCellsPerUnit, ends = b.slope / kCellsPerUnit;
-      while (interval + 2 < kEnds && kEnd[interval + 1] < x) ++interval;
-      out[i] = {{a.value, begins, 3.0 * rise - 2.0 * begins - ends, begins + ends - 2.0 * rise},
-                interval};
-    }
-    return out;
-  }();
-  return kCells;
-}
-
-std::size_t interval_from(std::size_t first, double x) {
-  while (first + 2 < kEnds && kEnd[first + 1] < x) ++first;
-  return first;
 }
 
 }  // namespace
@@ -181,7 +117,43 @@ double nominal_inverse(double value) {
   return std::copysign(x, value);
 }
 
-CurveShape::CurveShape(std::span<const double, kShapeKnots> departure, double fall) : fall_(fall) {
+// Hermite cubics through y with the slopes of finite differences, flat at the last end.
+CurveShape::Cubics CurveShape::cubics(const std::array<double, kEnds>& y) {
+  std::array<double, kEnds> slope{};
+  for (std::size_t j = 0; j + 1 < kEnds; ++j) {
+    slope[j] = j == 0 ? (y[1] - y[0]) / (kEnd[1] - kEnd[0])
+                      : (y[j + 1] - y[j - 1]) / (kEnd[j + 1] - kEnd[j - 1]);
+  }
+  Cubics out{};
+  for (std::size_t j = 0; j + 1 < kEnds; ++j) {
+    const double h = kEnd[j + 1] - kEnd[j];
+    const double secant = (y[j + 1] - y[j]) / h;
+    out[j] = {y[j], slope[j], (3.0 * secant - 2.0 * slope[j] - slope[j + 1]) / h,
+              (slope[j] + slope[j + 1] - 2.0 * secant) / (h * h)};
+  }
+  return out;
+}
+
+const CurveShape::Cells& CurveShape::cells() {
+  static const Cells kCells = [] {
+    Cells out{};
+    std::size_t interval = 0;
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      const double x = static_cast<double>(i) / kCellsPerUnit;
+      const CurveShape::Point a = nominal_formula(x), b = nominal_formula(x + 1.0 / kCellsPerUnit);
+      const double rise = b.value - a.value;
+      const double begins = a.slope / kCellsPerUnit, ends = b.slope / kCellsPerUnit;
+      while (interval + 2 < kEnds && kEnd[interval + 1] < x) ++interval;
+      out[i] = {{a.value, begins, 3.0 * rise - 2.0 * begins - ends, begins + ends - 2.0 * rise},
+                interval};
+    }
+    return out;
+  }();
+  return kCells;
+}
+
+CurveShape::CurveShape(std::span<const double, kShapeKnots> departure, double fall)
+    : cells_(&cells()), fall_(fall) {
   std::array<double, kEnds> y{};
   for (int i = 0; i < kShapeKnots; ++i) {
     y[static_cast<std::size_t>(end_of_knot(i))] = departure[static_cast<std::size_t>(i)];
@@ -190,45 +162,26 @@ CurveShape::CurveShape(std::span<const double, kShapeKnots> departure, double fa
 }
 
 CurvePlace place_on_curve(double x) {
-  if (!(x < kEnd.back())) return {kEnds - 2, kEnd.back() - kEnd[kEnds - 2]};
-  const std::size_t j =
-      interval_from(cells()[static_cast<std::size_t>(x * kCellsPerUnit)].interval, x);
-  return {j, x - kEnd[j]};
+  using Curve = CurveShape;
+  if (!(x < Curve::kEnd.back())) {
+    return {Curve::kEnds - 2, Curve::kEnd.back() - Curve::kEnd[Curve::kEnds - 2]};
+  }
+  const std::size_t first =
+      Curve::cells()[static_cast<std::size_t>(x * Curve::kCellsPerUnit)].interval;
+  const std::size_t j = Curve::interval_from(first, x);
+  return {j, x - Curve::kEnd[j]};
 }
 
-double CurveShape::departure(const CurvePlace& place) const {
-  const auto& c = cubic_[place.interval];
-  const double u = place.u;
-  return c[0] + u * (c[1] + u * (c[2] + u * c[3]));
-}
-
-CurveShape::Point CurveShape::evaluate(double x) const {
-  const double size = std::abs(x);
-  Point out;
-  if (size < kCellUnits) {
-    const double at = size * kCellsPerUnit;
-    const auto i = static_cast<std::size_t>(at);
-    const Cell& cell = cells()[i];
-    const double v = at - static_cast<double>(i);
-    const auto& n = cell.nominal;
-    out.value = n[0] + v * (n[1] + v * (n[2] + v * n[3]));
-    out.slope = (n[1] + v * (2.0 * n[2] + 3.0 * v * n[3])) * kCellsPerUnit;
-    const std::size_t j = interval_from(cell.interval, size);
-    const auto& c = cubic_[j];
-    const double u = std::min(size, kEnd.back()) - kEnd[j];
-    out.value += c[0] + u * (c[1] + u * (c[2] + u * c[3]));
-    if (size < kEnd.back()) out.slope += c[1] + u * (2.0 * c[2] + 3.0 * u * c[3]);
-  } else {
-    out = nominal_formula(size);
-    out.value += departure(place_on_curve(size));
-  }
-  if (fall_ != 0.0 && size > 1.0) {
-    const double beyond = size - 1.0;
-    out.value += fall_ * fall_function(size);
-    out.slope -= fall_ * (beyond * beyond + 0.6 * beyond) / ((0.3 + beyond) * (0.3 + beyond));
-  }
-  out.value *= std::copysign(1.0, x);
+CurveShape::Point CurveShape::far(double size) const {
+  Point out = nominal_formula(size);
+  out.value += departure(place_on_curve(size));
   return out;
+}
+
+void CurveShape::add_fall(double size, Point& point) const {
+  const double beyond = size - 1.0;
+  point.value += fall_ * fall_function(size);
+  point.slope -= fall_ * (beyond * beyond + 0.6 * beyond) / ((0.3 + beyond) * (0.3 + beyond));
 }
 
 namespace {
@@ -240,14 +193,22 @@ bool is_zero(const ArrayXd& values) {
 Quantities evaluate(const ExperimentData& run, int experiment,
                     const estimator::VariatorParameters& variator, const Eigen::VectorXd& nuisance,
                     const Effects& effects) {
+  return evaluate(run, {run.pressure.value, run.torque.value}, experiment, variator, nuisance,
+                  effects);
+}
+
+Quantities evaluate(const ExperimentData& run, const Readings& read, int experiment,
+                    const estimator::VariatorParameters& variator, const Eigen::VectorXd& nuisance,
+                    const Effects& effects) {
   const int n = run.size();
   Context c{run,
+            read,
             variator,
             experiment,
             run.omega_p.value,
             run.omega_s.value,
-            run.pressure.value,
-            run.torque.value,
+            read.pressure_Pa,
+            read.torque_Nm,
             run.omega_p.slow_slope,
             run.omega_s.slow_slope,
             run.command.present ? run.command.value : ArrayXd(),
@@ -310,14 +271,14 @@ Quantities evaluate(const ExperimentData& run, int experiment,
     c.secondary_loss_Nm =
         nuisance[kSecondaryLoss_Nm] + nuisance[kSecondaryLossPerSpeed_Nms] * c.omega_s;
     apply(Stage::kSecondaryShaft);
-    q.balance = c.belt_torque + run.torque.slow - run.torque.value -
+    q.balance = c.belt_torque + run.torque.slow - read.torque_Nm -
                 ratio * (run.torque_s.slow + nuisance[kSecondaryInertia_kgm2] * c.slope_s +
                          c.secondary_loss_Nm);
     q.secondary_loss_Nm = std::move(c.secondary_loss_Nm);
   }
   if (run.command.present) {
     q.tracking =
-        run.pressure.value - (1.0 + nuisance[kCommandGain]) * c.track - nuisance[kCommandOffset_Pa];
+        read.pressure_Pa - (1.0 + nuisance[kCommandGain]) * c.track - nuisance[kCommandOffset_Pa];
   }
   q.ratio = std::move(ratio);
   q.deformation = std::move(c.deformation);

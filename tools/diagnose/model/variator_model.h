@@ -8,7 +8,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -59,9 +61,16 @@ struct NuisanceRow {
 using NuisanceTable = std::array<NuisanceRow, kNuisanceCount>;
 NuisanceTable default_nuisances();
 
+// What the two noisiest channels read, sample by sample: the run's own, or others in their place.
+struct Readings {
+  const Eigen::ArrayXd& pressure_Pa;
+  const Eigen::ArrayXd& torque_Nm;
+};
+
 // State of one evaluation; effects change it at their injection point.
 struct Context {
   const ExperimentData& run;
+  const Readings& read;
   const estimator::VariatorParameters& variator;
   int experiment = 0;                                 // its place in the order given
   Eigen::ArrayXd omega_p, omega_s, pressure, torque;  // the true ones, as the model believes
@@ -88,6 +97,10 @@ struct Quantities {
 
 struct Effects;  // values of the slots, effects/effect.h
 
+Quantities evaluate(const ExperimentData& run, const Readings& read, int experiment,
+                    const estimator::VariatorParameters& variator, const Eigen::VectorXd& nuisance,
+                    const Effects& effects);
+// Of the run's own readings.
 Quantities evaluate(const ExperimentData& run, int experiment,
                     const estimator::VariatorParameters& variator, const Eigen::VectorXd& nuisance,
                     const Effects& effects);
@@ -99,8 +112,12 @@ struct CurvePlace {
 };
 CurvePlace place_on_curve(double x);
 
+// Which end of an interval of the departure a knot is: the peak stands between them.
+constexpr int end_of_knot(int knot) { return knot < kKnotsBelowPeak ? knot + 1 : knot + 2; }
+
 // g(x), x = slip / slip at the peak, odd; nominal: sin(1.3 atan(B x)), peak 1 at x = 1; departure:
 // cubic through the knots; fall: beyond the peak.
+// Evaluated millions of times: the nominal curve stands in a table.
 class CurveShape {
  public:
   CurveShape() = default;
@@ -109,11 +126,69 @@ class CurveShape {
     double value = 0.0;
     double slope = 0.0;
   };
-  Point evaluate(double x) const;
-  double departure(const CurvePlace& place) const;  // of the value, without the fall
+  Point evaluate(double x) const {
+    const double size = std::abs(x);
+    Point out;
+    if (size < kCellUnits) {
+      const double at = size * kCellsPerUnit;
+      const auto i = static_cast<std::size_t>(at);
+      const Cell& cell = (*cells_)[i];
+      const double v = at - static_cast<double>(i);
+      const auto& n = cell.nominal;
+      out.value = n[0] + v * (n[1] + v * (n[2] + v * n[3]));
+      out.slope = (n[1] + v * (2.0 * n[2] + 3.0 * v * n[3])) * kCellsPerUnit;
+      const std::size_t j = interval_from(cell.interval, size);
+      const auto& c = cubic_[j];
+      const double u = std::min(size, kEnd.back()) - kEnd[j];
+      out.value += c[0] + u * (c[1] + u * (c[2] + u * c[3]));
+      if (size < kEnd.back()) out.slope += c[1] + u * (2.0 * c[2] + 3.0 * u * c[3]);
+    } else {
+      out = far(size);
+    }
+    if (fall_ != 0.0 && size > 1.0) add_fall(size, out);
+    out.value *= std::copysign(1.0, x);
+    return out;
+  }
+  double departure(const CurvePlace& place) const {  // of the value, without the fall
+    const auto& c = cubic_[place.interval];
+    const double u = place.u;
+    return c[0] + u * (c[1] + u * (c[2] + u * c[3]));
+  }
 
  private:
-  std::array<std::array<double, 4>, kShapeKnots + 1> cubic_{};  // per interval, from its left end
+  friend CurvePlace place_on_curve(double x);
+  // Ends of the intervals of the cubic: 0, the knots below the peak, the peak, the knots beyond it.
+  static constexpr int kEnds = kShapeKnots + 2;
+  static constexpr int kPeakEnd = kKnotsBelowPeak + 1;
+  static constexpr std::array<double, kEnds> kEnd = [] {
+    std::array<double, kEnds> ends{};
+    for (int i = 0; i < kShapeKnots; ++i) {
+      ends[static_cast<std::size_t>(end_of_knot(i))] = kShapeKnot[static_cast<std::size_t>(i)];
+    }
+    ends[kPeakEnd] = 1.0;
+    return ends;
+  }();
+  // The nominal curve as cubics between points of a table (error below 1e-7), beside each the
+  // interval of the departure that it begins in.
+  static constexpr std::size_t kCellsPerUnit = 64, kCellUnits = 4;
+  static_assert(kShapeKnot.back() < kCellUnits);
+  struct Cell {
+    std::array<double, 4> nominal;  // of the cell's own abscissa, 0 to 1
+    std::size_t interval;
+  };
+  using Cells = std::array<Cell, kCellsPerUnit * kCellUnits>;
+  static const Cells& cells();
+  static std::size_t interval_from(std::size_t first, double x) {
+    while (first + 2 < kEnds && kEnd[first + 1] < x) ++first;
+    return first;
+  }
+  using Cubics = std::array<std::array<double, 4>, kShapeKnots + 1>;
+  static Cubics cubics(const std::array<double, kEnds>& y);
+  Point far(double size) const;  // beyond the table
+  void add_fall(double size, Point& point) const;
+
+  const Cells* cells_ = nullptr;  // at hand: a look-up behind a guard costs as much as the cubics
+  Cubics cubic_{};                // per interval, from its left end
   double fall_ = 0.0;
 };
 // Where the nominal curve, before its peak, has this value; NaN beyond.

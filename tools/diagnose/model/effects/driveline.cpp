@@ -60,7 +60,7 @@ void apply_ratio_creep(Context& c, const Slot& slot, double rate) {
   double away = 0.0;
   for (Eigen::Index k = 0; k < c.ln_ratio.size(); ++k) {
     const int stop = c.run.stop[static_cast<std::size_t>(k)];
-    const double force_N = c.variator.secondary_piston_area_m2 * c.run.pressure.value[k] +
+    const double force_N = c.variator.secondary_piston_area_m2 * c.read.pressure_Pa[k] +
                            c.variator.secondary_spring_force_N;
     if (stop == kNoStop || !(force_N > 0.0)) continue;
     double ln_force_ratio = -std::log(force_N);  // F_p / F_s

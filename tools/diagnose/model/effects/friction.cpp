@@ -24,8 +24,8 @@ void apply_friction_speed(Context& c, const Slot&, double per_ln_speed) {
 }
 // Of the slow pressure: else a larger exponent would fit better for the noise that it divides.
 void apply_friction_load(Context& c, const Slot&, double exponent) {
-  const ArrayXd force_N = c.force_N + c.variator.secondary_piston_area_m2 *
-                                          (c.run.pressure.slow - c.run.pressure.value);
+  const ArrayXd force_N =
+      c.force_N + c.variator.secondary_piston_area_m2 * (c.run.pressure.slow - c.read.pressure_Pa);
   c.ln_friction -= exponent * (force_N / kReferenceForce_N).max(0.01).log();
 }
 void apply_friction_ratio(Context& c, const Slot&, double relative) {
