@@ -19,14 +19,15 @@ using Eigen::VectorXd;
 
 constexpr double kSaturatedPrecision = 50.0;
 constexpr std::array<double, 3> kCoarseness{30.0, 8.0, 2.0};
-constexpr double kCovered = 2.0;     // rms in units of noise that is told apart from none by eye
-constexpr int kAttempts = 10;        // to find a step that gains, each shorter than the last
-constexpr double kLongStep = 0.05;   // in tolerances and usual sizes
-constexpr double kWorthwhile = 1.0;  // of the log likelihood
-constexpr double kSameStep = 1e-3;   // apart by less of their length: both fail
-constexpr double kCurveFault = 0.1;  // one sigma of curve_faults()
-constexpr int kSettled = 20;         // steps, where all else stays
-constexpr double kSizePrior = 3.0;   // one sigma of an effect's size, in usual sizes
+constexpr double kCovered = 2.0;       // rms in units of noise that is told apart from none by eye
+constexpr int kAttempts = 10;          // to find a step that gains, each shorter than the last
+constexpr double kLongStep = 0.05;     // in tolerances and usual sizes
+constexpr double kWorthwhile = 1.0;    // of the log likelihood
+constexpr double kNothingMore = 0.02;  // of the same, for a step: the end
+constexpr double kSameStep = 1e-3;     // apart by less of their length: both fail
+constexpr double kCurveFault = 0.1;    // one sigma of curve_faults()
+constexpr int kSettled = 20;           // steps, where all else stays
+constexpr double kSizePrior = 3.0;     // one sigma of an effect's size, in usual sizes
 
 bool stop_used(const Campaign& campaign, int stop) {
   for (const ExperimentData& run : campaign.runs) {
@@ -211,7 +212,8 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
   // Log likelihood of staying at a state.
   const auto standing = [&](const ModelState& state, const std::vector<Summary>& summaries,
                             const Scatter& with) {
-    const Fit none = fit_linear(summaries, {}, Prior{VectorXd(0), VectorXd(0)}, with, 0);
+    const Fit none =
+        fit_linear(summaries, {}, Prior{VectorXd(0), VectorXd(0)}, with, 0, Wanted::kStep);
     const Prior here = prior(parameters, state);
     return none.log_likelihood - 0.5 * here.pull.cwiseAbs2().dot(here.precision);
   };
@@ -219,8 +221,12 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
   best.state = start;
   std::vector<Residuals> at = residuals_at(start);
   best.summaries = summaries_at(start, at, parameters);
-  best.fit =
-      fit_linear(best.summaries, columns, prior(parameters, start), scatter, scatter_iterations);
+  best.fit.scatter = scatter;
+  const bool with_fit = scatter_iterations > 0;
+  if (with_fit) {
+    best.fit =
+        fit_linear(best.summaries, columns, prior(parameters, start), scatter, scatter_iterations);
+  }
   best.objective = standing(start, best.summaries, best.fit.scatter);
   double damping = 1e-4;
   for (int i = 0; i < iterations; ++i) {
@@ -236,7 +242,8 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
       Prior damped = here;
       damped.precision += damping * diagonal;
       damped.pull = here.pull.cwiseProduct(here.precision).cwiseQuotient(damped.precision);
-      const Fit step = fit_linear(best.summaries, columns, damped, best.fit.scatter, 0);
+      const Fit step =
+          fit_linear(best.summaries, columns, damped, best.fit.scatter, 0, Wanted::kStep);
       if ((step.step - failed).norm() < kSameStep * failed.norm()) {
         damping = std::clamp(10.0 * damping, 1e-5, 1e6);
         continue;
@@ -263,12 +270,15 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
       failed = step.step;
       damping = std::clamp(moved && share == 1.0 ? 0.1 * damping : 10.0 * damping, 1e-5, 1e6);
     }
-    if (!moved) break;
+    const bool is_last = !moved || gained < kNothingMore || i + 1 == iterations;
+    if (!moved || (is_last && !with_fit)) break;
     best.summaries = summaries_at(best.state, at, parameters);
-    best.fit = fit_linear(best.summaries, columns, prior(parameters, best.state), best.fit.scatter,
-                          scatter_iterations);
+    if (with_fit) {
+      best.fit = fit_linear(best.summaries, columns, prior(parameters, best.state),
+                            best.fit.scatter, scatter_iterations);
+    }
     best.objective = standing(best.state, best.summaries, best.fit.scatter);
-    if (gained < 0.02) break;
+    if (is_last) break;
   }
   return best;
 }
@@ -434,7 +444,8 @@ bool Engine::scatters_unusually() const {
 
 std::vector<Score> Engine::screen_with_usual_scatter() const {
   const std::vector<int> base = with_nuisances(accepted_);
-  return screen(fit_linear(summaries_, columns_of(base), prior(base, state_), default_scatter(), 0),
+  return screen(fit_linear(summaries_, columns_of(base), prior(base, state_), default_scatter(), 0,
+                           Wanted::kStep),
                 0);
 }
 
@@ -503,8 +514,8 @@ bool Engine::is_constant(int slot) const {
 
 Engine::Replacement Engine::add(const std::vector<int>& slots) const {
   const std::vector<int> parameters = with_nuisances(slots);
-  const Fit fit =
-      fit_linear(summaries_, columns_of(parameters), prior(parameters, state_), base_.scatter, 3);
+  const Fit fit = fit_linear(summaries_, columns_of(parameters), prior(parameters, state_),
+                             base_.scatter, 3, Wanted::kStep);
   Replacement out{2.0 * (fit.log_likelihood - base_.log_likelihood), state_, state_};
   move(parameters, fit.step, 1.0, out.state);
   return out;
@@ -532,8 +543,8 @@ std::vector<Summary> Engine::summaries_without(const std::vector<int>& slots) co
 Engine::Replacement Engine::replace(const std::vector<int>& slots, int instead_of) const {
   const std::vector<int> parameters = with_nuisances(slots);
   const std::vector<Summary> without = summaries_without({instead_of});
-  const Fit fit =
-      fit_linear(without, columns_of(parameters), prior(parameters, state_), base_.scatter, 3);
+  const Fit fit = fit_linear(without, columns_of(parameters), prior(parameters, state_),
+                             base_.scatter, 3, Wanted::kStep);
   Replacement out{2.0 * (fit.log_likelihood - base_.log_likelihood), state_, state_};
   out.state.effects[instead_of] = 0.0;
   out.beside = out.state;
@@ -541,7 +552,9 @@ Engine::Replacement Engine::replace(const std::vector<int>& slots, int instead_o
   if (slots.empty()) return out;
   const std::vector<int> alone(parameters.end() - static_cast<std::ptrdiff_t>(slots.size()),
                                parameters.end());
-  move(alone, fit_linear(without, columns_of(alone), prior(alone, state_), base_.scatter, 0).step,
+  move(alone,
+       fit_linear(without, columns_of(alone), prior(alone, state_), base_.scatter, 0, Wanted::kStep)
+           .step,
        1.0, out.beside);
   return out;
 }

@@ -125,6 +125,7 @@ class Engine {
     std::vector<Summary> summaries;
   };
   // Levenberg-Marquardt on the marginal likelihood, scatter re-estimated on the way.
+  // scatter_iterations 0: it stays, and the state alone is asked for.
   Optimum minimise(const Campaign& campaign, const std::vector<int>& parameters,
                    const ModelState& start, const Whitening& whitening, const Scatter& scatter,
                    int iterations, int scatter_iterations) const;

@@ -40,12 +40,12 @@ std::array<ResidualColumns, kRandomEffects> random_columns(const Campaign& campa
   out[2] = propagate(campaign, at, zero);
   QuantityChange peak;
   peak.torque = ArrayXd::Zero(n);
+  const double peak_low = std::exp(state.nuisance[kLnPeakSlipLow]);
+  const double peak_overdrive = std::exp(state.nuisance[kLnPeakSlipOverdrive]);
   for (Index k = 0; k < n; ++k) {
     const int stop = data.stop[static_cast<std::size_t>(k)];
     if (stop == kNoStop) continue;
-    peak.torque[k] =
-        at.slope[k] * at.foot[k] *
-        std::exp(state.nuisance[stop == kLowStop ? kLnPeakSlipLow : kLnPeakSlipOverdrive]);
+    peak.torque[k] = at.slope[k] * at.foot[k] * (stop == kLowStop ? peak_low : peak_overdrive);
   }
   out[3] = propagate(campaign, at, peak);
   zero_out.balance = ArrayXd::Ones(n);
@@ -298,7 +298,7 @@ std::array<VectorXd, kResidualKinds> white_residuals(const Campaign& campaign, i
 }
 
 Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& columns,
-               const Prior& prior, const Scatter& start, int scatter_iterations) {
+               const Prior& prior, const Scatter& start, int scatter_iterations, Wanted wanted) {
   const auto n = static_cast<Index>(columns.size());
   const auto runs = summaries.size();
   const Index last = summaries.empty() ? 0 : summaries[0].aa.rows() - 1;
@@ -326,7 +326,7 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
     const RandomSquare inverse = (1.0 / fit.scatter.variance).matrix().asDiagonal();
     for (std::size_t e = 0; e < runs; ++e) {
       const Eigen::LLT<RandomSquare> llt(summaries[e].uu + inverse);
-      posterior[e] = llt.solve(RandomSquare::Identity());
+      if (iteration < scatter_iterations) posterior[e] = llt.solve(RandomSquare::Identity());
       const RandomRows root = llt.matrixL().solve(parts[e].ua);
       total += parts[e].aa;
       total.selfadjointView<Eigen::Lower>().rankUpdate(root.transpose(), -1.0);
@@ -342,7 +342,10 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
     }
     const Eigen::LDLT<MatrixXd> ldlt(information);
     fit.step = ldlt.solve(right);
-    fit.covariance = ldlt.solve(MatrixXd::Identity(n, n));
+    const bool is_last = iteration >= scatter_iterations;
+    if (!is_last || wanted == Wanted::kCovariance) {
+      fit.covariance = ldlt.solve(MatrixXd::Identity(n, n));
+    }
     const VectorXd off = fit.step - prior.pull;
     VectorXd full(n + 1);
     full << fit.step, 1.0;
@@ -354,7 +357,7 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
                                             usual.variance[i] / fit.scatter.variance[i]);
     }
     fit.log_likelihood = -0.5 * (quadratic + ln_det + scatter_prior);
-    if (iteration >= scatter_iterations) break;
+    if (is_last) break;
     Eigen::Array<double, kRandomEffects, 1> square =
         Eigen::Array<double, kRandomEffects, 1>::Zero();
     for (std::size_t e = 0; e < runs; ++e) {

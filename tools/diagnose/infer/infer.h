@@ -70,9 +70,12 @@ struct Fit {
 };
 
 // columns: indices into the summaries' columns. Scatter is estimated (restricted likelihood with a
-// prior worth kScatterPriorRuns experiments) unless fixed.
+// prior worth kScatterPriorRuns experiments) unless fixed. The covariance at the end costs as much
+// as all else.
+enum class Wanted { kCovariance, kStep };
 Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& columns,
-               const Prior& prior, const Scatter& start, int scatter_iterations);
+               const Prior& prior, const Scatter& start, int scatter_iterations,
+               Wanted wanted = Wanted::kCovariance);
 
 // Log predictive density of each experiment, by a fit to the others; their scatter too.
 std::vector<double> left_out_densities(const std::vector<Summary>& summaries,
