@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -15,6 +16,7 @@
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
 #include "tools/cli/stop_signals.h"
+#include "tools/diagnose/infer/parallel.h"
 #include "tools/diagnose/infer/rerun.h"
 #include "tools/diagnose/report/html.h"
 #include "tools/diagnose/report/json.h"
@@ -79,12 +81,17 @@ daemon::Config told(daemon::Config config, const daemon::ModelFile& model) {
 // Every experiment again with the estimator told the model before and after.
 std::vector<diagnose::Rerun> rerun(const std::vector<std::string>& paths,
                                    const daemon::Config& with_before,
-                                   const daemon::Config& with_after) {
+                                   const daemon::Config& with_after, int jobs) {
+  using Found = std::vector<daemon::ExperimentResult>;
+  std::vector<std::array<Found, 2>> found(paths.size());
+  diagnose::in_parallel(jobs, 2 * paths.size(), [&](std::size_t i) {
+    found[i / 2][i % 2] = estimate(paths[i / 2], i % 2 == 0 ? with_before : with_after);
+  });
   std::vector<diagnose::Rerun> out;
-  for (const std::string& path : paths) {
-    const auto then = estimate(path, with_after);
-    for (const daemon::ExperimentResult& each : estimate(path, with_before)) {
-      diagnose::Rerun row{path, static_cast<double>(each.start) * 1e-9,
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    const Found& then = found[i][1];
+    for (const daemon::ExperimentResult& each : found[i][0]) {
+      diagnose::Rerun row{paths[i], static_cast<double>(each.start) * 1e-9,
                           diagnose::measured(each, with_before.variator), std::nullopt};
       const auto same = std::find_if(then.begin(), then.end(), [&](const auto& other) {
         return std::abs(static_cast<double>(other.start - each.start)) * 1e-9 < kSameExperiment_s;
@@ -141,7 +148,7 @@ void run(const Options& options) {
     std::vector<std::string> all = options.logs;
     all.insert(all.end(), options.held_out.begin(), options.held_out.end());
     answer.diagnosis.reruns = rerun(all, options.model.empty() ? config : told(config, before),
-                                    told(config, answer.extended));
+                                    told(config, answer.extended), options.jobs);
   }
   if (options.json != "-") text::print(stdout, diagnose::plain_text(answer.diagnosis));
   if (json) {

@@ -202,7 +202,7 @@ struct Promotion {
 // Every accepted slot against every other slot in its place. What is more probable there by more
 // than kPromotedOdds, if it is possible at all: it should have been accepted.
 std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
-                                         const std::function<bool()>& stop, int jobs) {
+                                         const std::function<bool()>& stop) {
   std::optional<Promotion> promoted;
   const std::vector<int>& set = engine.accepted();
   naming.accepted.clear();
@@ -217,9 +217,11 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(j));
     std::vector<std::pair<Engine::Replacement, int>> ranked;
     for (int slot = 0; slot < static_cast<int>(engine.campaign().slots.size()); ++slot) {
-      if (std::find(set.begin(), set.end(), slot) != set.end()) continue;
-      ranked.emplace_back(engine.replace(plus(others, slot), out.slot), slot);
+      if (std::find(set.begin(), set.end(), slot) == set.end()) ranked.push_back({{}, slot});
     }
+    in_parallel(engine.jobs(), ranked.size(), [&](std::size_t i) {
+      ranked[i].first = engine.replace(plus(others, ranked[i].second), out.slot);
+    });
     std::sort(ranked.begin(), ranked.end(),
               [](const auto& a, const auto& b) { return a.first.gain > b.first.gain; });
     std::map<std::string_view, std::vector<double>> evidence;
@@ -233,7 +235,7 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
       ++near;
     }
     std::vector<std::optional<Hypothesis>> rivals(near);
-    in_parallel(jobs, near, [&](std::size_t i) {
+    in_parallel(engine.jobs(), near, [&](std::size_t i) {
       if (stop()) return;
       const std::vector<int> rival = plus(others, ranked[i].second);
       rivals[i] = refine_replacement(engine, ranked[i].first, rival);
@@ -278,9 +280,9 @@ void drop(Engine& engine, const Naming& naming, int slot) {
   engine.update_noise();
 }
 
-void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& stop, int jobs) {
+void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& stop) {
   for (int i = 0; i < kPromotions; ++i) {
-    const std::optional<Promotion> better = compare_classes(engine, naming, stop, jobs);
+    const std::optional<Promotion> better = compare_classes(engine, naming, stop);
     if (!better || stop()) return;
     if (is_in_curve(naming, better->slot)) {
       naming.not_confirmed.push_back(better->instead_of);
@@ -290,7 +292,7 @@ void find_classes(Engine& engine, Naming& naming, const std::function<bool()>& s
       engine.update_noise();
     }
   }
-  compare_classes(engine, naming, stop, jobs);
+  compare_classes(engine, naming, stop);
 }
 
 void find_intervals(const Engine& engine, Naming& naming) {
@@ -305,7 +307,7 @@ void find_intervals(const Engine& engine, Naming& naming) {
 }
 
 // What the experiments do not agree on, or what is better left out, is no finding.
-void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& stop, int jobs) {
+void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& stop) {
   while (!naming.accepted.empty() && !stop()) {
     const auto doubtful =
         std::find_if(naming.accepted.begin(), naming.accepted.end(), [&](const Accepted& each) {
@@ -317,7 +319,7 @@ void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& 
     if (doubtful == naming.accepted.end()) return;
     naming.not_confirmed.push_back(doubtful->slot);
     drop(engine, naming, doubtful->slot);
-    find_classes(engine, naming, stop, jobs);
+    find_classes(engine, naming, stop);
     find_intervals(engine, naming);
   }
 }
@@ -373,8 +375,8 @@ void drop_superfluous(Engine& engine, double threshold) {
 }
 
 // Adds to the accepted effects as long as any is there. first_gain: the largest so far.
-void add_effects(Engine& engine, Naming& out, double& first_gain, const std::function<bool()>& stop,
-                 int jobs) {
+void add_effects(Engine& engine, Naming& out, double& first_gain,
+                 const std::function<bool()>& stop) {
   // A member may be dropped again: the number of steps is bounded, not only that of effects.
   for (int step = 0; step < kStepsMax && !stop(); ++step) {
     if (static_cast<int>(engine.accepted().size()) >= kEffectsMax) break;
@@ -428,7 +430,7 @@ void add_effects(Engine& engine, Naming& out, double& first_gain, const std::fun
     }
     const auto consider_all = [&](bool from_afar) {
       std::vector<std::optional<Hypothesis>> fits(candidates.size());
-      in_parallel(jobs, candidates.size(), [&](std::size_t i) {
+      in_parallel(engine.jobs(), candidates.size(), [&](std::size_t i) {
         if (!stop()) fits[i] = fitted(plus(set, candidates[i]), from_afar && i < kFromAfar);
       });
       for (std::optional<Hypothesis>& fit : fits) {
@@ -522,35 +524,35 @@ double chance_threshold(int candidates, double probability) {
 
 namespace {
 // Returns the largest gain of one.
-double find_effects(Engine& engine, Naming& out, const std::function<bool()>& stop, int jobs) {
+double find_effects(Engine& engine, Naming& out, const std::function<bool()>& stop) {
   double first_gain = 0.0;
   // What left-out experiments do not confirm may have stood before what they would.
   for (int round = 0; round < kRounds && !stop(); ++round) {
     const std::size_t dropped = out.not_confirmed.size();
     first_gain = 0.0;
-    add_effects(engine, out, first_gain, stop, jobs);
+    add_effects(engine, out, first_gain, stop);
     if (!stop()) out.last_screen = engine.screen();
     drop_unconfirmed(engine, out);
     if (out.not_confirmed.size() == dropped || out.unknown) break;
   }
-  find_classes(engine, out, stop, jobs);
+  find_classes(engine, out, stop);
   find_intervals(engine, out);
-  drop_doubtful(engine, out, stop, jobs);
+  drop_doubtful(engine, out, stop);
   return first_gain;
 }
 }  // namespace
 
-void name_anew(Engine& engine, Naming& naming, const std::function<bool()>& stop, int jobs) {
+void name_anew(Engine& engine, Naming& naming, const std::function<bool()>& stop) {
   naming.unknown.reset();
   drop_superfluous(engine, naming.threshold);
-  find_effects(engine, naming, stop, jobs);
+  find_effects(engine, naming, stop);
 }
 
-Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs) {
+Naming name_effects(Engine& engine, const std::function<bool()>& stop) {
   Naming out;
   out.threshold = chance_threshold(static_cast<int>(engine.campaign().slots.size()), kFalseName);
   out.ripples = find_ripples(engine.campaign(), out.threshold);
-  engine.fit_machine(jobs);
+  engine.fit_machine();
   engine.update_noise();
   for (int i = 0; i < 2; ++i) {
     engine.accept(engine.refine({}, kSettling));
@@ -559,7 +561,7 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
   out.sharp = {engine.state(), engine.campaign().noise, true};
   out.nominal = engine.nominal_from(engine.state());
   out.nominal_groups = score_groups(engine);
-  const double first_gain = find_effects(engine, out, stop, jobs);
+  const double first_gain = find_effects(engine, out, stop);
   if (stop() || out.unknown) return out;
 
   // What is left: any cause? An effect that it makes superfluous was only its shadow.
@@ -581,7 +583,7 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs)
     if (kept.size() == set.size() || stop()) return out;
     engine.accept(engine.refine(kept));
     engine.update_noise();
-    find_classes(engine, out, stop, jobs);
+    find_classes(engine, out, stop);
     find_intervals(engine, out);
   }
 }

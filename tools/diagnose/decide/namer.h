@@ -56,11 +56,11 @@ struct Naming {
 };
 
 // stop() is asked between steps, on any of the threads; true ends early with what is known.
-Naming name_effects(Engine& engine, const std::function<bool()>& stop, int jobs = 1);
+Naming name_effects(Engine& engine, const std::function<bool()>& stop);
 
 // The same once more from the engine's present state, which has learned something since: what that
 // makes superfluous goes, what it hid is found.
-void name_anew(Engine& engine, Naming& naming, const std::function<bool()>& stop, int jobs = 1);
+void name_anew(Engine& engine, Naming& naming, const std::function<bool()>& stop);
 
 // Chi-square(1) value that the largest of so many candidates exceeds by chance with this
 // probability.

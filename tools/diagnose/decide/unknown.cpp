@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "tools/diagnose/infer/index_variables.h"
+#include "tools/diagnose/infer/parallel.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -112,12 +113,11 @@ std::vector<UnknownGroup> score_groups(const Engine& engine) {
   };
   VectorXd scales(n);
   for (Index j = 0; j < n; ++j) scales[j] = engine.scale(parameters[static_cast<std::size_t>(j)]);
-  std::vector<Summary> summaries;
-  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
-    if (campaign.runs[e].valid_count == 0) continue;
-    summaries.push_back(summarise(campaign, static_cast<int>(e), engine.state(), parameters, scales,
-                                  engine.whitening(), extra));
-  }
+  std::vector<Summary> summaries(engine.used().size());
+  in_parallel(engine.jobs(), summaries.size(), [&](std::size_t i) {
+    summaries[i] = summarise(campaign, engine.used()[i], engine.state(), parameters, scales,
+                             engine.whitening(), extra);
+  });
   engine.add_curve_bounds(engine.state(), parameters, summaries);
   std::vector<int> base(static_cast<std::size_t>(n));
   for (std::size_t i = 0; i < base.size(); ++i) base[i] = static_cast<int>(i);

@@ -114,7 +114,10 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model)
   return out;
 }
 
-Engine::Engine(Campaign campaign) : campaign_(std::move(campaign)) {
+Engine::Engine(Campaign campaign, int jobs) : jobs_(jobs), campaign_(std::move(campaign)) {
+  for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
+    if (campaign_.runs[e].valid_count > 0) used_.push_back(static_cast<int>(e));
+  }
   state_.nuisance.resize(kNuisanceCount);
   for (int i = 0; i < kNuisanceCount; ++i) {
     state_.nuisance[i] = campaign_.nuisances[static_cast<std::size_t>(i)].nominal;
@@ -191,21 +194,17 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
   std::vector<int> columns(parameters.size());
   for (std::size_t i = 0; i < columns.size(); ++i) columns[i] = static_cast<int>(i);
   const auto residuals_at = [&](const ModelState& state) {
-    std::vector<Residuals> out(campaign.runs.size());
-    for (std::size_t e = 0; e < out.size(); ++e) {
-      if (campaign.runs[e].valid_count == 0) continue;
-      out[e] = residuals_of(campaign, static_cast<int>(e), state);
-    }
+    std::vector<Residuals> out(used_.size());
+    in_parallel(jobs_, out.size(),
+                [&](std::size_t i) { out[i] = residuals_of(campaign, used_[i], state); });
     return out;
   };
   const auto summaries_at = [&](const ModelState& state, std::vector<Residuals>& at,
                                 const std::vector<int>& wanted) {
-    std::vector<Summary> out;
-    for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
-      if (campaign.runs[e].valid_count == 0) continue;
-      out.push_back(
-          summarise(campaign, static_cast<int>(e), state, at[e], wanted, scales, whitening));
-    }
+    std::vector<Summary> out(used_.size());
+    in_parallel(jobs_, out.size(), [&](std::size_t i) {
+      out[i] = summarise(campaign, used_[i], state, at[i], wanted, scales, whitening);
+    });
     add_curve_bounds(state, wanted, out);
     return out;
   };
@@ -283,7 +282,7 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
   return best;
 }
 
-void Engine::fit_machine(int jobs) {
+void Engine::fit_machine() {
   const NoiseLevels measured = estimate_noise_levels(campaign_, state_);
   campaign_.noise = measured;
   campaign_.slip_noise_share = estimate_slip_noise_shares(campaign_, state_);
@@ -301,7 +300,7 @@ void Engine::fit_machine(int jobs) {
   };
   constexpr std::array kPeaks{0.012, 0.02, 0.035};
   std::array<Attempt, kPeaks.size()> attempts;
-  in_parallel(jobs, attempts.size(), [&](std::size_t i) {
+  for (std::size_t i = 0; i < attempts.size(); ++i) {
     Attempt& attempt = attempts[i];
     ModelState state = start;
     state.nuisance[kLnMuMax] = ln_mu_seen;
@@ -326,7 +325,7 @@ void Engine::fit_machine(int jobs) {
     attempt.objective = minimise(coarse_.back(), nuisances_, state, identity_whitening(campaign_),
                                  default_scatter(), 0, 0)
                             .objective;
-  });
+  }
   const Attempt& best = *std::max_element(
       attempts.begin(), attempts.end(),
       [](const Attempt& a, const Attempt& b) { return a.objective < b.objective; });
@@ -395,19 +394,20 @@ void Engine::update_noise() {
     all.precision[j] = kSaturatedPrecision;
     all.pull[j] = 0.0;
   }
-  std::vector<RawColumns> raw;
-  raw.reserve(campaign_.runs.size());
-  for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
+  std::vector<RawColumns> raw(campaign_.runs.size());
+  in_parallel(jobs_, raw.size(), [&](std::size_t e) {
     const auto run = static_cast<int>(e);
     Residuals at = residuals_of(campaign_, run, state_);
-    raw.push_back(raw_columns(campaign_, run, state_, at, summary_parameters_, scales, true));
+    raw[e] = raw_columns(campaign_, run, state_, at, summary_parameters_, scales, true);
+  });
+  for (int pass = 0; pass < 2; ++pass) {
+    whitening_ = fit_whitening(campaign_, raw, all, whitening_, jobs_);
   }
-  for (int pass = 0; pass < 2; ++pass) whitening_ = fit_whitening(campaign_, raw, all, whitening_);
-  summaries_.clear();
-  for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
-    if (campaign_.runs[e].valid_count == 0) continue;
-    summaries_.push_back(summary_of(campaign_, static_cast<int>(e), raw[e], whitening_));
-  }
+  summaries_.resize(used_.size());
+  in_parallel(jobs_, summaries_.size(), [&](std::size_t i) {
+    const int run = used_[i];
+    summaries_[i] = summary_of(campaign_, run, raw[static_cast<std::size_t>(run)], whitening_);
+  });
   add_curve_bounds(state_, summary_parameters_, summaries_);
   const std::vector<int> parameters = with_nuisances(accepted_);
   base_ = fit_linear(summaries_, columns_of(parameters), prior(parameters, state_),
@@ -450,7 +450,6 @@ std::vector<Score> Engine::screen_with_usual_scatter() const {
 }
 
 std::vector<Score> Engine::screen(const Fit& from, int scatter_steps) const {
-  std::vector<Score> out;
   const std::vector<int> base = with_nuisances(accepted_);
   const std::vector<int> base_columns = columns_of(base);
   const Prior base_prior = prior(base, state_);
@@ -461,8 +460,15 @@ std::vector<Score> Engine::screen(const Fit& from, int scatter_steps) const {
   const std::vector<int> curve_columns = columns_of(curve);
   const auto curve_size = static_cast<Index>(curve.size());
   const Prior any_curve{VectorXd::Zero(curve_size), VectorXd::Constant(curve_size, 1e-3)};
+  std::vector<int> slots;
   for (int slot = 0; slot < static_cast<int>(campaign_.slots.size()); ++slot) {
-    if (std::find(accepted_.begin(), accepted_.end(), slot) != accepted_.end()) continue;
+    if (std::find(accepted_.begin(), accepted_.end(), slot) == accepted_.end()) {
+      slots.push_back(slot);
+    }
+  }
+  std::vector<Score> out(slots.size());
+  in_parallel(jobs_, slots.size(), [&](std::size_t i) {
+    const int slot = slots[i];
     std::vector<int> parameters = base;
     parameters.push_back(kNuisanceCount + slot);
     const std::vector<int> columns = columns_of(parameters);
@@ -470,7 +476,7 @@ std::vector<Score> Engine::screen(const Fit& from, int scatter_steps) const {
         fit_linear(summaries_, columns, prior(parameters, state_), from.scatter, scatter_steps);
     const Information info =
         information_on(summaries_, base_columns, base_prior, columns.back(), fit.scatter);
-    Score score;
+    Score& score = out[i];
     score.slot = slot;
     double energy = 0.0;
     for (const Summary& each : summaries_) energy += each.aa(columns.back(), columns.back());
@@ -485,8 +491,7 @@ std::vector<Score> Engine::screen(const Fit& from, int scatter_steps) const {
     score.chi2 = chi2_of_student(fit.step[last] / std::sqrt(fit.covariance(last, last)),
                                  degrees(info.with_scatter, info.without_scatter));
     score.gain = 2.0 * (fit.log_likelihood - from.log_likelihood);
-    out.push_back(score);
-  }
+  });
   return out;
 }
 

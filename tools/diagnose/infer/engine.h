@@ -46,9 +46,12 @@ struct Nominal {
 
 class Engine {
  public:
-  explicit Engine(Campaign campaign);
+  // jobs: threads; the same result for any number.
+  explicit Engine(Campaign campaign, int jobs = 1);
 
+  int jobs() const { return jobs_; }
   const Campaign& campaign() const { return campaign_; }
+  const std::vector<int>& used() const { return used_; }  // experiments with valid samples
   const ModelState& state() const { return state_; }
   const std::vector<int>& accepted() const { return accepted_; }
   const std::vector<Summary>& summaries() const { return summaries_; }
@@ -59,7 +62,7 @@ class Engine {
   std::vector<RandomVector> offsets() const;
 
   // Constants of the nominal machine from the data: robust, from several starts.
-  void fit_machine(int jobs = 1);
+  void fit_machine();
   // sharp: the fit of the machine alone by the noise of the sensors.
   Nominal nominal_from(const ModelState& sharp) const;
   // Noise model and matrices at the present state; call after fit_machine and accept.
@@ -137,7 +140,9 @@ class Engine {
   std::vector<Summary> summaries_without(const std::vector<int>& slots) const;
   double ln_mu_reached() const;
 
+  int jobs_;
   Campaign campaign_;
+  std::vector<int> used_;
   std::vector<Campaign> coarse_;  // the same with more noise, falling
   std::vector<ModelState> way_;   // of the best fit of the machine alone: its state behind each
   ModelState state_;

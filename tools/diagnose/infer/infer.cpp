@@ -8,6 +8,7 @@
 
 #include "estimator/statistics/distributions.h"
 #include "estimator/statistics/order.h"
+#include "tools/diagnose/infer/parallel.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -429,13 +430,12 @@ Information information_on(const std::vector<Summary>& summaries, const std::vec
 }
 
 Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>& raw,
-                        const Prior& prior, const Whitening& before) {
-  std::vector<Summary> summaries;
+                        const Prior& prior, const Whitening& before, int jobs) {
   const auto runs = campaign.runs.size();
-  summaries.reserve(runs);
-  for (std::size_t e = 0; e < runs; ++e) {
-    summaries.push_back(summary_of(campaign, static_cast<int>(e), raw[e], before));
-  }
+  std::vector<Summary> summaries(runs);
+  in_parallel(jobs, runs, [&](std::size_t e) {
+    summaries[e] = summary_of(campaign, static_cast<int>(e), raw[e], before);
+  });
   std::vector<int> all(static_cast<std::size_t>(prior.pull.size()));
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
   const Fit fit = fit_linear(summaries, all, prior, default_scatter(), 4);

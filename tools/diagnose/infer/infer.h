@@ -131,7 +131,7 @@ std::array<Eigen::VectorXd, kResidualKinds> white_residuals(const Campaign& camp
 // fit of everything (parameters with the prior), so that no effect leaks into the noise. raw: with
 // random effects, one per experiment.
 Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>& raw,
-                        const Prior& prior, const Whitening& before);
+                        const Prior& prior, const Whitening& before, int jobs);
 
 // The chi-square(1) value with the same two-sided p-value as Student's t.
 double chi2_of_student(double t, double degrees);

@@ -74,8 +74,8 @@ class Run {
     }
     check_friction(runs, request_.model.variator, doubts_);
     progress(0.1, "fit");
-    Engine engine(make_campaign(std::move(runs), request_.model));
-    Naming naming = name_effects(engine, stop(), request_.jobs);
+    Engine engine(make_campaign(std::move(runs), request_.model), request_.jobs);
+    Naming naming = name_effects(engine, stop());
     progress(0.6, "tests");
     const Learning learning = criticise_and_learn(engine, naming);
     progress(0.8, "gain");
@@ -163,7 +163,7 @@ class Run {
       out.left = std::move(more.left);
       for (Learned& each : more.terms) out.terms.push_back(std::move(each));
       const std::vector<int> before = engine.accepted();
-      name_anew(engine, naming, stop(), request_.jobs);
+      name_anew(engine, naming, stop());
       if (stop()() || engine.accepted() == before) break;
       // Other effects: what was learned beside the old ones is learned beside these.
       relearn(engine, out);
