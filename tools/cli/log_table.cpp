@@ -55,6 +55,10 @@ diagnose::SignalTable read_log(const std::string& path, const daemon::Config& co
   note(bad, "frames whose length or kind is not the DBC's, ignored");
   note(timeline->counters().clock_steps, "steps of the log's clock, taken out");
   diagnose::close_gaps(table);
+  for (diagnose::Channel& each : table.channels) {
+    each.t_s.shrink_to_fit();
+    each.value.shrink_to_fit();
+  }
   return table;
 }
 

@@ -8,7 +8,9 @@
 #include <Eigen/Core>
 #include <array>
 #include <map>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tools/diagnose/data/experiment_data.h"
@@ -43,9 +45,27 @@ struct ModelState {
   std::vector<estimator::LearnedTerm> learned;  // beside those of the model file
 };
 
+// The data of a campaign. Copies share them: a fit from afar has the campaign with more noise.
+class Runs {
+ public:
+  Runs() = default;
+  // Not explicit: stands for them.
+  Runs(std::vector<ExperimentData> runs)
+      : runs_(std::make_shared<const std::vector<ExperimentData>>(std::move(runs))) {}
+  const ExperimentData& operator[](std::size_t i) const { return (*runs_)[i]; }
+  std::size_t size() const { return runs_->size(); }
+  auto begin() const { return runs_->begin(); }
+  auto end() const { return runs_->end(); }
+  const std::vector<ExperimentData>& all() const { return *runs_; }
+
+ private:
+  std::shared_ptr<const std::vector<ExperimentData>> runs_ =
+      std::make_shared<const std::vector<ExperimentData>>();
+};
+
 // Data and model of one diagnosis; everything that no hypothesis changes.
 struct Campaign {
-  std::vector<ExperimentData> runs;
+  Runs runs;
   estimator::VariatorParameters variator;
   NuisanceTable nuisances;
   std::vector<Slot> slots;

@@ -56,6 +56,8 @@ class Run {
     runs.resize(request_.experiments.size());
     in_parallel(request_.jobs, runs.size(), [&](std::size_t i) {
       runs[i] = prepare(request_.experiments[i], request_.model.variator);
+      // From here on the grid is all that counts; half of the memory that an hour takes.
+      if (!request_.with_plots) request_.experiments[i] = {};
     });
     out().experiments = static_cast<int>(runs.size());
     for (const ExperimentData& run : runs) {
@@ -212,10 +214,11 @@ class Run {
     for (const Accepted& each : naming.accepted) slots.push_back(each.slot);
     Campaign held_out = campaign;
     if (!request_.held_out.empty()) {
-      held_out.runs.clear();
+      std::vector<ExperimentData> runs;
       for (const SignalTable& table : request_.held_out) {
-        held_out.runs.push_back(prepare(table, request_.model.variator));
+        runs.push_back(prepare(table, request_.model.variator));
       }
+      held_out.runs = std::move(runs);
       held_out.slip_noise_share = estimate_slip_noise_shares(held_out, naming.nominal.state);
     }
     const auto gain_over = [&](const Nominal& nominal) -> Gain {
