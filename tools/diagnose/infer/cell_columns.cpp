@@ -108,7 +108,7 @@ std::vector<Summary> summaries_with(const Engine& engine, CellBase& base, const 
       for (std::size_t kind = 0; kind < kResidualKinds; ++kind) {
         if (whole[kind].size() > 0) column[kind] = whole[kind] * hat;
       }
-      columns.push_back(std::move(column));
+      columns.push_back(valid_rows(campaign.runs[static_cast<std::size_t>(run)], column));
     }
     columns.push_back(base.residual[i]);
     out.push_back(summary_of(campaign, run, base.raw[i], engine.whitening()));

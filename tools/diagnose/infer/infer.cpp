@@ -56,20 +56,21 @@ std::array<ResidualColumns, kRandomEffects> random_columns(const Campaign& campa
   return out;
 }
 
-// The prediction errors of the valid samples, segment by segment, in units of their sigma.
+// The prediction errors of the valid samples, stretch by stretch, in units of their sigma.
 void whiten(const ExperimentData& data, const Whitening::Filter& filter, const ArrayXd& in,
             Eigen::Ref<VectorXd> out) {
   const int full = static_cast<int>(filter.coefficient.size()) - 1;
   Index row = 0;
-  for (const auto& [k, end] : data.stretches) {
-    const int warm = std::min(full, end - k);
+  for (const auto& [begin, end] : data.stretches) {
+    const Index k = row;  // the stretch's first in the rows
+    const int warm = std::min(full, end - begin);
     for (int order = 0; order < warm; ++order) {
       const VectorXd& a = filter.coefficient[static_cast<std::size_t>(order)];
       double e = in[k + order];
       for (int i = 0; i < order; ++i) e -= a[i] * in[k + order - 1 - i];
       out[row++] = e / filter.sigma[static_cast<std::size_t>(order)];
     }
-    if (const Index rest = end - k - warm; rest > 0) {
+    if (const Index rest = end - begin - warm; rest > 0) {
       auto block = out.segment(row, rest);
       const VectorXd& a = filter.coefficient.back();
       const auto delayed = [&](int by) { return in.segment(k + warm - by, rest).matrix(); };
@@ -196,6 +197,23 @@ std::vector<WhiteBlock> whitened(const Campaign& campaign, int run, const RawCol
 
 }  // namespace
 
+ResidualColumns valid_rows(const ExperimentData& data, const ResidualColumns& column,
+                           double scale) {
+  ResidualColumns out;
+  for (std::size_t kind = 0; kind < kResidualKinds; ++kind) {
+    const ArrayXd& from = column[kind];
+    if (from.size() == 0) continue;
+    ArrayXd& to = out[kind];
+    to.resize(data.valid_count);
+    Index row = 0;
+    for (const auto& [begin, end] : data.stretches) {
+      to.segment(row, end - begin) = from.segment(begin, end - begin) * scale;
+      row += end - begin;
+    }
+  }
+  return out;
+}
+
 RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& state, Residuals& at,
                        const std::vector<int>& parameters, const VectorXd& scale, bool with_random,
                        const ExtraColumns& extra) {
@@ -204,18 +222,20 @@ RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& stat
   if (with_random) move_to_foot(campaign, run, at);
   if (!parameters.empty()) prepare_derivatives(campaign, run, state, at);
   out.columns.reserve(parameters.size() + 1 + kRandomEffects);
+  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   for (std::size_t j = 0; j < parameters.size(); ++j) {
-    ResidualColumns column = derivative(campaign, run, state, at, parameters[j]);
-    for (ArrayXd& each : column) each *= scale[static_cast<Index>(j)];
-    out.columns.push_back(std::move(column));
+    out.columns.push_back(valid_rows(data, derivative(campaign, run, state, at, parameters[j]),
+                                     scale[static_cast<Index>(j)]));
   }
   if (extra) {
-    for (ResidualColumns& column : extra(run, at)) out.columns.push_back(std::move(column));
+    for (const ResidualColumns& column : extra(run, at)) {
+      out.columns.push_back(valid_rows(data, column));
+    }
   }
-  out.columns.push_back(at.value);
+  out.columns.push_back(valid_rows(data, at.value));
   if (with_random) {
-    for (ResidualColumns& column : random_columns(campaign, run, state, at)) {
-      out.columns.push_back(std::move(column));
+    for (const ResidualColumns& column : random_columns(campaign, run, state, at)) {
+      out.columns.push_back(valid_rows(data, column));
     }
   }
   return out;
@@ -508,13 +528,8 @@ Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>&
     std::array<VectorXd, kResidualKinds> white;
     for (const int kind : kinds) {
       const auto q = static_cast<std::size_t>(kind);
-      ArrayXd grid = ArrayXd::Zero(data.size());
-      std::size_t row = 0;
-      for (int k = 0; k < data.size(); ++k) {
-        if (data.valid[static_cast<std::size_t>(k)]) grid[k] = rest[q][e][row++];
-      }
       white[q].resize(data.valid_count);
-      whiten(data, out.filter[q], grid, white[q]);
+      whiten(data, out.filter[q], ArrayXd::Map(rest[q][e].data(), data.valid_count), white[q]);
       for (Index i = 0; i < white[q].size(); ++i) {
         const double size = std::abs(white[q][i]);
         out.weight[e][q][i] = size > kHuber ? std::sqrt(kHuber / size) : 1.0;

@@ -100,8 +100,12 @@ Whitening identity_whitening(const Campaign& campaign);
 // Further columns of one experiment, behind the parameters.
 using ExtraColumns = std::function<std::vector<ResidualColumns>(int run, const Residuals& at)>;
 
-// Columns of one experiment on the grid: parameters (scaled), further columns, residual, and with
-// with_random the random effects.
+// The valid samples of a column on the grid.
+ResidualColumns valid_rows(const ExperimentData& data, const ResidualColumns& column,
+                           double scale = 1.0);
+
+// Columns of one experiment, a row per valid sample: parameters (scaled), further columns,
+// residual, and with with_random the random effects.
 struct RawColumns {
   std::vector<ResidualColumns> columns;
   bool with_random = false;
