@@ -215,6 +215,7 @@ class Run {
     Campaign held_out = campaign;
     if (!request_.held_out.empty()) {
       std::vector<ExperimentData> runs;
+      runs.reserve(request_.held_out.size());
       for (const SignalTable& table : request_.held_out) {
         runs.push_back(prepare(table, request_.model.variator));
       }
