@@ -98,7 +98,7 @@ void look_at_log(const std::string& path, const daemon::Config& config, check::R
   look(port, config, watch, {}, seen);
   const can::LogStats stats = timeline->stats();
   if (stats.lines_bad > 0) {
-    text::warn(path + ": " + unreadable_text(stats));
+    text::warn(path + ": " + unreadable_with_first(stats));
   }
 }
 

@@ -51,7 +51,7 @@ diagnose::SignalTable read_log(const std::string& path, const daemon::Config& co
   if (!first_ns) {
     throw Failure{kBadInput, no_frame_text(path, stats)};
   }
-  if (stats.lines_bad > 0) table.notes.push_back(path + ": " + unreadable_text(stats));
+  if (stats.lines_bad > 0) table.notes.push_back(path + ": " + unreadable_with_first(stats));
   note(bad, "frames whose length or kind is not the DBC's, ignored");
   note(timeline->counters().clock_steps, "steps of the log's clock, taken out");
   diagnose::close_gaps(table);

@@ -64,17 +64,21 @@ std::string table_hint(const std::string& path) {
   return {};
 }
 
-const char* unit_of(const can::LogStats& stats) { return stats.binary ? " records" : " lines"; }
+std::string unit_of(const can::LogStats& stats, std::uint64_t count) {
+  return std::string(stats.binary ? " record" : " line") + (count == 1 ? "" : "s");
+}
+
+std::string first_of(const can::LogStats& stats) {
+  if (stats.first_bad.empty()) return {};
+  const can::BadLine& first = stats.first_bad.front();
+  return (first.line > 0 ? ", line " : ", ") + first.place() + ": " + first.reason;
+}
 
 }  // namespace
 
 std::string no_frame_text(const std::string& path, const can::LogStats& stats) {
-  std::string text =
-      path + ": no readable frame in " + std::to_string(stats.lines) + unit_of(stats);
-  if (!stats.first_bad.empty()) {
-    const can::BadLine& first = stats.first_bad.front();
-    text += (first.line > 0 ? ", line " : ", ") + first.place() + ": " + first.reason;
-  }
+  const std::string text = path + ": no readable frame in " + std::to_string(stats.lines) +
+                           unit_of(stats, stats.lines) + first_of(stats);
   return stats.binary ? text : text + table_hint(path);
 }
 
@@ -83,7 +87,11 @@ std::string bad_line_text(const std::string& path, const can::BadLine& bad) {
 }
 
 std::string unreadable_text(const can::LogStats& stats) {
-  return std::to_string(stats.lines_bad) + " unreadable" + unit_of(stats);
+  return std::to_string(stats.lines_bad) + " unreadable" + unit_of(stats, stats.lines_bad);
+}
+
+std::string unreadable_with_first(const can::LogStats& stats) {
+  return unreadable_text(stats) + first_of(stats);
 }
 
 }  // namespace beltgrip::cli

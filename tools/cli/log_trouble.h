@@ -17,7 +17,9 @@ std::string no_frame_text(const std::string& path, const can::LogStats& stats);
 // "LOG:17: reason", "LOG: byte 4096: reason" for a binary log.
 std::string bad_line_text(const std::string& path, const can::BadLine& bad);
 
-// "3 unreadable lines", "3 unreadable records" of a binary log.
+// "3 unreadable lines", "1 unreadable record" of a binary log.
 std::string unreadable_text(const can::LogStats& stats);
+// The same and the first of them: "3 unreadable lines, line 17: reason".
+std::string unreadable_with_first(const can::LogStats& stats);
 
 }  // namespace beltgrip::cli
