@@ -157,6 +157,63 @@ TEST_F(Replay, SignalsOutAsCsvAndAsMf4SayTheSame) {
   EXPECT_FALSE(std::getline(text, line));
 }
 
+std::string number(std::uint64_t value, unsigned bytes, bool big_endian = false) {
+  std::string text;
+  for (unsigned i = 0; i < bytes; ++i) {
+    const unsigned place = big_endian ? bytes - 1 - i : i;
+    text += static_cast<char>((value >> (8U * place)) & 0xFFU);
+  }
+  return text;
+}
+
+std::string block(std::uint32_t type, const std::string& body) {
+  const std::string size = number(body.size() + 12, 4);
+  return number(type, 4) + size + body + size;
+}
+
+// Classic frames of eight bytes or fewer, as a capture with nanoseconds.
+std::string as_capture(const std::string& candump) {
+  std::string capture = block(0x0A0D0D0A, number(0x1A2B3C4D, 4) + number(1, 4) + number(0, 8)) +
+                        block(1, number(227, 4) + number(0, 4) + number(9, 2) + number(1, 2) +
+                                     number(9, 4) + number(0, 4));
+  std::istringstream lines(candump);
+  std::string stamp, interface, frame;
+  while (lines >> stamp >> interface >> frame) {
+    const std::size_t hash = frame.find('#');
+    const std::size_t point = stamp.find('.');
+    const std::string fraction = stamp.substr(point + 1, stamp.size() - point - 2);
+    const std::uint64_t t_ns = std::stoull(stamp.substr(1)) * 1'000'000'000 +
+                               std::stoull(fraction + std::string(9 - fraction.size(), '0'));
+    std::string data;
+    for (std::size_t at = hash + 1; at < frame.size(); at += 2) {
+      data += static_cast<char>(std::stoul(frame.substr(at, 2), nullptr, 16));
+    }
+    const std::string packet = number(std::stoul(frame.substr(0, hash), nullptr, 16), 4, true) +
+                               number(data.size(), 4) + data + std::string(8 - data.size(), '\0');
+    capture += block(6, number(0, 4) + number(t_ns >> 32U, 4) + number(t_ns & 0xFFFFFFFF, 4) +
+                            number(packet.size(), 4) + number(packet.size(), 4) + packet);
+  }
+  return capture;
+}
+
+TEST_F(Replay, ACaptureOfTheSameFramesGivesTheSameResult) {
+  place_->write("trace.pcapng", as_capture(trace()));
+  const RunResult captured = beltgrip(with_config({path("trace.pcapng"), "--json", "-"}));
+  ASSERT_EQ(captured.status, 0) << captured.err;
+  const auto expected = parse(json_of_trace());
+  const auto found = parse(captured.out);
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_EQ(nameless(found[i]), nameless(expected[i]));
+  }
+  place_->write("cut.pcapng", place_->read("trace.pcapng").substr(0, 299'999));
+  const RunResult cut = beltgrip(with_config({path("cut.pcapng")}));
+  EXPECT_EQ(cut.status, 0);
+  EXPECT_NE(cut.err.find("cut.pcapng: byte 299964: a block of 48 bytes is cut off by the end"),
+            std::string::npos)
+      << cut.err;
+}
+
 TEST_F(Replay, SignalsOutThatCannotBeWritten) {
   const RunResult two =
       beltgrip(with_config({path("trace.log"), "--signals-out", "-", "--trace", "-"}));
