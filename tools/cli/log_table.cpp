@@ -54,11 +54,11 @@ diagnose::SignalTable read_log(const std::string& path, const daemon::Config& co
   if (stats.lines_bad > 0) table.notes.push_back(path + ": " + unreadable_with_first(stats));
   note(bad, "frames whose length or kind is not the DBC's, ignored");
   note(timeline->counters().clock_steps, "steps of the log's clock, taken out");
-  diagnose::close_gaps(table);
   for (diagnose::Channel& each : table.channels) {
     each.t_s.shrink_to_fit();
     each.value.shrink_to_fit();
   }
+  diagnose::close_gaps(table);
   return table;
 }
 

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -230,12 +231,16 @@ void close_gaps(SignalTable& table) {
   constexpr std::size_t kNotesMost = 5;
   std::vector<double> all;
   for (const Channel& channel : table.channels) {
-    all.insert(all.end(), channel.t_s.begin(), channel.t_s.end());
+    if (channel.empty()) continue;
+    std::vector<double> both;
+    both.reserve(all.size() + channel.t_s.size());
+    std::set_union(all.begin(), all.end(), channel.t_s.begin(), channel.t_s.end(),
+                   std::back_inserter(both));
+    all = std::move(both);
   }
-  std::sort(all.begin(), all.end());
-  all.erase(std::unique(all.begin(), all.end()), all.end());
   if (all.size() < 3) return;
   std::vector<double> steps;
+  steps.reserve(all.size() - 1);
   for (std::size_t i = 1; i < all.size(); ++i) steps.push_back(all[i] - all[i - 1]);
   std::vector<double> sorted = steps;
   const double pause_s =
