@@ -333,8 +333,8 @@ class BlfParser : public BinaryParser {
   const char* read_fd(const Fields& body, LogRecord& record) {
     channel_ = std::to_string(body.u16(0));
     record.sent = (body.u8(2) & kSentFlag) != 0;
-    record.frame.remote = (body.u8(2) & kRemoteFlag) != 0;
     const std::uint8_t flags = body.u8(13);
+    record.frame.remote = (body.u8(2) & kRemoteFlag) != 0;
     set_fd(record.frame, (flags & 1U) != 0, (flags & 2U) != 0, (flags & 4U) != 0);
     return read_frame(body, 4, body.u8(3), body.u8(14), 20, record.frame);
   }
@@ -348,8 +348,10 @@ class BlfParser : public BinaryParser {
     return read_frame(body, 4, body.u8(1), body.u8(2), 40, record.frame);
   }
 
+  // CAN FD knows no remote frames: where both are marked, the data count.
   static void set_fd(CanFrame& frame, bool fd, bool bit_rate_switch, bool error_state) {
     frame.fd = fd;
+    frame.remote = frame.remote && !fd;
     frame.bit_rate_switch = fd && bit_rate_switch;
     frame.error_state_indicator = fd && error_state;
   }

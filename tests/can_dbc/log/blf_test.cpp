@@ -202,6 +202,19 @@ TEST(Blf, EveryKindOfFrameInContainersPackedOrNot) {
   }
 }
 
+// What has been seen in files of tests by others: marks that exclude each other, identifiers that
+// only an extended one can have.
+TEST(Blf, MarksThatExcludeEachOther) {
+  const LogFile file(header() + container(padded(object(101, fd64(0x15555555, "abc", 3, 0x1010))) +
+                                              padded(object(101, fd64(0x321, "", 3, 0x10))),
+                                          true));
+  const ReadLog log = read_log(file.path());
+  const std::vector<std::string> frames{"1700000000.250000000 3 15555555##0616263 T",
+                                        "1700000000.250000000 3 321#R3 T"};
+  EXPECT_EQ(log.frames, frames);
+  EXPECT_EQ(log.stats.lines_bad, 0U);
+}
+
 TEST(Blf, ObjectsThatBeginInOneContainerAndEndInAnother) {
   const std::string all = objects();
   for (std::size_t size = 1; size < 100; size += 7) {
