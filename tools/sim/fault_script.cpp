@@ -61,7 +61,9 @@ const std::vector<FaultKindRow>& fault_kinds() {
   return rows;
 }
 
-FaultScript::FaultScript(std::vector<FaultStep> steps) : steps_(std::move(steps)) {}
+FaultScript::FaultScript(std::vector<FaultStep> steps) : steps_(std::move(steps)) {
+  for (const FaultStep& step : steps_) has_[static_cast<std::size_t>(step.kind)] = true;
+}
 
 void FaultScript::request_began(double t_s) {
   if (request_s_ < 0.0) request_s_ = t_s;
@@ -72,7 +74,7 @@ double FaultScript::start_s(const FaultStep& step) const {
   return request_s_ < 0.0 ? std::numeric_limits<double>::infinity() : request_s_ + step.at_s;
 }
 
-const FaultStep* FaultScript::active(FaultKind kind, double t_s, std::string_view channel) const {
+const FaultStep* FaultScript::find(FaultKind kind, double t_s, std::string_view channel) const {
   for (const FaultStep& step : steps_) {
     if (step.kind != kind || (!step.channel.empty() && step.channel != channel)) continue;
     const double since_s = t_s - start_s(step);

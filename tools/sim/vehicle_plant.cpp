@@ -26,27 +26,39 @@ double wedge_factor(double half_angle_rad) {
   return (1.0 + cosine * cosine) / std::sin(2.0 * half_angle_rad);
 }
 
-// Solves the 3 by 3 system by elimination with pivots; the matrix I - gamma h J is regular.
-std::array<double, 3> solve(std::array<std::array<double, 3>, 3> a, std::array<double, 3> b) {
-  for (std::size_t i = 0; i < 3; ++i) {
-    std::size_t pivot = i;
-    for (std::size_t r = i + 1; r < 3; ++r) {
-      if (std::abs(a[r][i]) > std::abs(a[pivot][i])) pivot = r;
-    }
-    std::swap(a[i], a[pivot]);
-    std::swap(b[i], b[pivot]);
-    for (std::size_t r = i + 1; r < 3; ++r) {
-      const double factor = a[r][i] / a[i][i];
-      for (std::size_t c = i; c < 3; ++c) a[r][c] -= factor * a[i][c];
-      b[r] -= factor * b[i];
+// A 3 by 3 system by elimination with pivots, for several right sides; the matrix I - gamma h J is
+// regular.
+class Elimination {
+ public:
+  explicit Elimination(const std::array<std::array<double, 3>, 3>& matrix) : a_(matrix) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      pivot_[i] = i;
+      for (std::size_t r = i + 1; r < 3; ++r) {
+        if (std::abs(a_[r][i]) > std::abs(a_[pivot_[i]][i])) pivot_[i] = r;
+      }
+      std::swap(a_[i], a_[pivot_[i]]);
+      for (std::size_t r = i + 1; r < 3; ++r) {
+        factor_[i][r] = a_[r][i] / a_[i][i];
+        for (std::size_t c = i; c < 3; ++c) a_[r][c] -= factor_[i][r] * a_[i][c];
+      }
     }
   }
-  for (std::size_t i = 3; i-- > 0;) {
-    for (std::size_t c = i + 1; c < 3; ++c) b[i] -= a[i][c] * b[c];
-    b[i] /= a[i][i];
+  std::array<double, 3> solve(std::array<double, 3> b) const {
+    for (std::size_t i = 0; i < 3; ++i) {
+      std::swap(b[i], b[pivot_[i]]);
+      for (std::size_t r = i + 1; r < 3; ++r) b[r] -= factor_[i][r] * b[i];
+    }
+    for (std::size_t i = 3; i-- > 0;) {
+      for (std::size_t c = i + 1; c < 3; ++c) b[i] -= a_[i][c] * b[c];
+      b[i] /= a_[i][i];
+    }
+    return b;
   }
-  return b;
-}
+
+ private:
+  std::array<std::array<double, 3>, 3> a_, factor_{};
+  std::array<std::size_t, 3> pivot_{};
+};
 
 }  // namespace
 
@@ -61,13 +73,13 @@ VehiclePlant::VehiclePlant(const VehicleScenario& scenario)
       secondary_inertia_kg_m2_(variator_.secondary_inertia_kg_m2 +
                                body_.mass_kg *
                                    std::pow(body_.wheel_radius_m / body_.final_drive, 2)),
-      cos_wedge_(std::cos(variator_.half_wedge_angle_rad)) {
+      cos_wedge_(std::cos(variator_.half_wedge_angle_rad)),
+      ln_span_(std::log(variator_.ratio_overdrive / variator_.ratio_low)) {
   belt_.overdrive = shaped(belt_.overdrive, effects_);
   variator_.secondary_loss_Nm += effects_.secondary_loss_constant_Nm;
   variator_.secondary_loss_Nm_s += effects_.secondary_loss_per_rad_s_Nm;
-  const double span = std::log(variator_.ratio_overdrive / variator_.ratio_low);
   for (int i = 0; i < kRadii; ++i) {
-    const double ratio = variator_.ratio_low * std::exp(span * i / (kRadii - 1));
+    const double ratio = variator_.ratio_low * std::exp(ln_span_ * i / (kRadii - 1));
     radius_m_[static_cast<std::size_t>(i)] =
         estimator::running_radii(ratio, variator_.belt_length_m, variator_.centre_distance_m)
             .primary_m;
@@ -76,8 +88,7 @@ VehiclePlant::VehiclePlant(const VehicleScenario& scenario)
 
 double VehiclePlant::primary_radius_m(double ratio) const {
   if (!std::isfinite(ratio)) return ratio;  // what is no number stays none; the run ends on it
-  const double span = std::log(variator_.ratio_overdrive / variator_.ratio_low);
-  const double place = std::clamp(std::log(ratio / variator_.ratio_low) / span, 0.0, 1.0) *
+  const double place = std::clamp(std::log(ratio / variator_.ratio_low) / ln_span_, 0.0, 1.0) *
                        static_cast<double>(kRadii - 1);
   const auto i = std::min(static_cast<std::size_t>(place), static_cast<std::size_t>(kRadii - 2));
   const double share = place - static_cast<double>(i);
@@ -98,9 +109,8 @@ void VehiclePlant::settle(double speed_m_s, double ratio, double idle_rad_s) {
 
 VehiclePlant::Held VehiclePlant::hold(const DrivelineInput& input) const {
   Held held;
-  const double span = std::log(variator_.ratio_overdrive / variator_.ratio_low);
   const double low_share =
-      std::clamp(std::log(variator_.ratio_overdrive / state_.ratio) / span, 0.0, 1.0);
+      std::clamp(std::log(variator_.ratio_overdrive / state_.ratio) / ln_span_, 0.0, 1.0);
   held.curve = belt_.overdrive;
   held.curve.peak_slip_percent +=
       low_share * (belt_.low_peak_slip_percent - belt_.overdrive.peak_slip_percent);
@@ -254,12 +264,13 @@ void VehiclePlant::step(const DrivelineInput& input, double step_s) {
       w[i][j] = (i == j ? 1.0 : 0.0) - gamma_h * first.jacobian[i][j];
     }
   }
-  const std::array<double, 3> k1 = solve(w, first.value);
+  const Elimination elimination(w);
+  const std::array<double, 3> k1 = elimination.solve(first.value);
   std::array<double, 3> trial{};
   for (std::size_t i = 0; i < 3; ++i) trial[i] = x[i] + step_s * k1[i];
   Rates second = rates(trial, input, held);
   for (std::size_t i = 0; i < 3; ++i) second.value[i] -= 2.0 * k1[i];
-  const std::array<double, 3> k2 = solve(w, second.value);
+  const std::array<double, 3> k2 = elimination.solve(second.value);
   state_.omega_e_rad_s += step_s * (1.5 * k1[0] + 0.5 * k2[0]);
   state_.omega_p_rad_s += step_s * (1.5 * k1[1] + 0.5 * k2[1]);
   state_.omega_s_rad_s += step_s * (1.5 * k1[2] + 0.5 * k2[2]);

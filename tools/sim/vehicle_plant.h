@@ -102,6 +102,7 @@ class VehiclePlant {
   double engine_inertia_kg_m2_;
   double secondary_inertia_kg_m2_;  // with the vehicle
   double cos_wedge_;
+  double ln_span_;                       // of the ratios
   std::array<double, kRadii> radius_m_;  // over ln(ratio) between the end stops
   DrivelineState state_;
   DrivelineOutput output_;
