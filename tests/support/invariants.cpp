@@ -180,8 +180,8 @@ void Invariants::check_events(const daemon::SampleReport& now) {
         break;
       case daemon::EventId::kResult:
         ++results;
-        if (event.to == static_cast<std::uint8_t>(daemon::Outcome::kAborted) &&
-            event.reason == estimator::StopReason::kNone) {
+        if (event.result.outcome == daemon::Outcome::kAborted &&
+            event.result.stop_reason == estimator::StopReason::kNone) {
           broken("I9", "an end without a cause");
         }
         break;

@@ -209,8 +209,8 @@ TEST_F(ReplayAsRecorded, TheEndTellsWhatEachInhibitMeansAndWhatToDo) {
   const RunResult run =
       replay({path("twice/trace.log"), "--config", path("twice/resting.toml"), "--decide-anew"});
   EXPECT_NE(
-      run.out.find("    cool-down: too little time or distance since the last request; to do: "
-                   "wait: `cooldown_s`, `cooldown_m`\n"),
+      run.out.find("    cool-down (limits 60 s and 0 m): too little time or distance since the "
+                   "last request; to do: wait: `cooldown_s`, `cooldown_m`\n"),
       std::string::npos)
       << run.out;
 }
