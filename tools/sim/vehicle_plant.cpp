@@ -107,10 +107,18 @@ void VehiclePlant::settle(double speed_m_s, double ratio, double idle_rad_s) {
   observe({});
 }
 
-VehiclePlant::Held VehiclePlant::hold(const DrivelineInput& input) const {
+const VehiclePlant::Place& VehiclePlant::place() {
+  if (place_.ratio != state_.ratio) {
+    place_ = {state_.ratio,
+              std::clamp(std::log(variator_.ratio_overdrive / state_.ratio) / ln_span_, 0.0, 1.0),
+              primary_radius_m(state_.ratio)};
+  }
+  return place_;
+}
+
+VehiclePlant::Held VehiclePlant::hold(const DrivelineInput& input) {
   Held held;
-  const double low_share =
-      std::clamp(std::log(variator_.ratio_overdrive / state_.ratio) / ln_span_, 0.0, 1.0);
+  const double low_share = place().low_share;
   held.curve = belt_.overdrive;
   held.curve.peak_slip_percent +=
       low_share * (belt_.low_peak_slip_percent - belt_.overdrive.peak_slip_percent);
@@ -134,7 +142,7 @@ VehiclePlant::Held VehiclePlant::hold(const DrivelineInput& input) const {
                (1.0 - variator_.deformation_per_N * input.secondary_force_N -
                 effects_.deformation_per_kN * kN - effects_.deformation_per_kN2 * kN * kN -
                 (variator_.deformation_per_Nm + effects_.tilt_per_Nm) * output_.belt_torque_Nm);
-  held.radius_m = primary_radius_m(state_.ratio);
+  held.radius_m = place().radius_m;
   held.torque_per_mu = 2.0 * input.secondary_force_N * held.radius_m / cos_wedge_;
   return held;
 }

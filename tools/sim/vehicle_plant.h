@@ -14,6 +14,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 
 #include "estimator/physics/learned_effects.h"
 #include "tools/sim/friction_curve.h"
@@ -84,7 +85,14 @@ class VehiclePlant {
     double torque_per_mu = 0.0;
   };
 
-  Held hold(const DrivelineInput& input) const;
+  // What follows from the ratio alone.
+  struct Place {
+    double ratio = std::numeric_limits<double>::quiet_NaN();  // at which
+    double low_share = 0.0;                                   // of the way to the low end stop
+    double radius_m = 0.0;                                    // of the primary pulley
+  };
+  const Place& place();  // at the present ratio; kept, since it stands for most steps
+  Held hold(const DrivelineInput& input);
   static Slip slip_of(double ratio, double omega_p_rad_s, double omega_s_rad_s);
   Rates rates(const std::array<double, 3>& omega, const DrivelineInput& input,
               const Held& held) const;
@@ -102,6 +110,7 @@ class VehiclePlant {
   double engine_inertia_kg_m2_;
   double secondary_inertia_kg_m2_;  // with the vehicle
   double cos_wedge_;
+  Place place_;
   double ln_span_;                       // of the ratios
   std::array<double, kRadii> radius_m_;  // over ln(ratio) between the end stops
   DrivelineState state_;
