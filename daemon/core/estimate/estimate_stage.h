@@ -28,6 +28,7 @@ class EstimateStage {
   const estimator::CurveEstimate& curve() const noexcept { return curve_; }
   // Why there is no curve at the last sample, where a learned term does not reach so far.
   BeyondBox beyond() const noexcept;
+  bool is_beyond() const noexcept { return correction_ && correction_->uncovered() != nullptr; }
   // The clamp force in the transmission's own measure, which requests are made in.
   double measured_force_N() const noexcept {
     return curve_.clamp_force_N - (correction_ ? correction_->force_error_N() : 0.0);

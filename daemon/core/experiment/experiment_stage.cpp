@@ -81,7 +81,7 @@ bool ExperimentStage::arm(const Now& now, const KnownFriction& known,
       Arming::Now arming;
       arming.t = now.t;
       arming.usable = sample.usable && curve.usable;
-      arming.beyond_box = static_cast<bool>(now.estimate.beyond());
+      arming.beyond_box = now.estimate.is_beyond();
       arming.cooled = !commands() || request_.cooled();
       arming.faulted = commands() && (delays(now.faults) || channels.suspect() || now.unconfirmed);
       arming.omega_p_rad_s = sample.omega_p_rad_s;
@@ -209,7 +209,7 @@ ClampRequest::Now ExperimentStage::request_now(const Now& now) const noexcept {
 void ExperimentStage::count(const Now& now) noexcept {
   if (state_ != State::kRamping || !now.input.sample().usable) return;
   ++running_.samples;
-  running_.beyond.take(now.estimate.beyond());
+  if (now.estimate.is_beyond()) running_.beyond.take(now.estimate.beyond());
   const estimator::CurveEstimate& curve = now.estimate.curve();
   if (curve.usable) mu_star_most_ = std::max(mu_star_most_, std::abs(curve.mu_star));
 }

@@ -77,8 +77,8 @@ estimator::LearnedConditions InputStage::learned_conditions() const noexcept {
   return out;
 }
 
-bool InputStage::torque_is_the_belts() const noexcept {
-  bool fresh = !any_lost() && !monitor_.suspect();
+bool InputStage::lockup_closed() const noexcept {
+  bool fresh = true;
   const bool closed = monitor_.value_or(Role::kLockupClosed, 1.0, fresh) > 0.5;
   return fresh && closed;
 }

@@ -48,8 +48,7 @@ class InputStage {
   bool samples_lost() const noexcept { return samples_lost_; }  // before this one
   // A required channel is lost, or samples are.
   bool any_lost() const noexcept { return samples_lost_ || monitor_.any_lost(); }
-  // No input is in doubt, and the lock-up is closed, as far as a role says.
-  bool torque_is_the_belts() const noexcept;
+  bool lockup_closed() const noexcept;  // as far as a role says
   // Nothing, where no channel is lost and no sample: the caller may know more.
   Stop lost(MonoTime t) const noexcept;
   // Every input comes, but for as long as makes one stale no sample could be made of them: a

@@ -82,7 +82,7 @@ void Pipeline::Parts::judge_safety(const ExperimentStage::Now& now) noexcept {
   const InputMonitor& channels = input.channels();
   const estimator::VariatorSample& sample = input.sample();
   SafetySignals signals;
-  signals.fresh = !input.any_lost() && !channels.suspect() && experiment.conditions().fresh;
+  signals.fresh = inputs_sound && experiment.conditions().fresh;
   signals.omega_p_rad_s = sample.omega_p_rad_s;
   signals.omega_s_rad_s = sample.omega_s_rad_s;
   signals.torque_Nm = sample.torque_Nm;
@@ -128,7 +128,8 @@ const SampleReport& Pipeline::on_sample(MonoTime t, Outbox& outbox) noexcept {
     parts.output.announce();
   }
   parts.take_action(parts.experiment.begin(now));
-  parts.estimate.step(sample, parts.input.learned_conditions(), !parts.experiment.runs());
+  parts.conditions = parts.input.learned_conditions();
+  parts.estimate.step(sample, parts.conditions, !parts.experiment.runs());
   parts.experiment.count(now);
   if (const RoleSet still = parts.experiment.step_request(now); still.any()) {
     for (std::size_t i = 0; i < kRoleCount; ++i) {
@@ -136,6 +137,7 @@ const SampleReport& Pipeline::on_sample(MonoTime t, Outbox& outbox) noexcept {
     }
     parts.faults.raise(Fault::kInputFrozen, t);
   }
+  parts.inputs_sound = !parts.input.any_lost() && !parts.input.channels().suspect();
   parts.judge_safety(now);
   parts.take_action(parts.experiment.end(now));
   if (parts.experiment.state() == State::kEvaluating && parts.evaluate()) {
@@ -216,9 +218,9 @@ const SampleReport& Pipeline::Parts::make_report(const Publication& published,
   report.frozen = input.channels().frozen();
   report.inhibits = experiment.inhibits();
   report.obstacle = experiment.obstacle();
-  report.beyond = estimate.beyond();
-  report.torque_is_the_belts = input.torque_is_the_belts();
-  report.oil_degC = input.learned_conditions().oil_temperature_degC;
+  if (estimate.is_beyond() || report.beyond) report.beyond = estimate.beyond();
+  report.torque_is_the_belts = inputs_sound && input.lockup_closed();
+  report.oil_degC = conditions.oil_temperature_degC;
   report.request_force_N = permitted_force_N();
   report.ramp_N_per_s = experiment.ramp_N_per_s();
   return report;

@@ -39,10 +39,12 @@ struct Pipeline::Parts {
   OutputStage output;
   FaultSet faults;
   PipelineCounters counters;
-  MonoTime t = 0;                 // of the last sample
-  bool estimate_changed = false;  // with this sample
-  bool permitted = false;         // by the safety monitor: to ask for force with this sample
-  SampleReport report;            // of the last sample; written by make_report() alone
+  MonoTime t = 0;                           // of the last sample
+  bool estimate_changed = false;            // with this sample
+  bool inputs_sound = false;                // with this sample: none is lost, none in doubt
+  estimator::LearnedConditions conditions;  // with this sample
+  bool permitted = false;  // by the safety monitor: to ask for force with this sample
+  SampleReport report;     // of the last sample; written by make_report() alone
 };
 
 }  // namespace beltgrip::daemon
