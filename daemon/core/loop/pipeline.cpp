@@ -218,7 +218,7 @@ const SampleReport& Pipeline::Parts::make_report(const Publication& published,
   report.frozen = input.channels().frozen();
   report.inhibits = experiment.inhibits();
   report.obstacle = experiment.obstacle();
-  if (estimate.is_beyond() || report.beyond) report.beyond = estimate.beyond();
+  report.beyond = estimate.beyond();
   report.torque_is_the_belts = inputs_sound && input.lockup_closed();
   report.oil_degC = conditions.oil_temperature_degC;
   report.request_force_N = permitted_force_N();
