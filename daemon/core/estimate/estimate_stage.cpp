@@ -26,8 +26,8 @@ void EstimateStage::step(const estimator::VariatorSample& sample,
 }
 
 BeyondBox EstimateStage::beyond() const noexcept {
-  const estimator::LearnedTerm* term = correction_ ? correction_->uncovered() : nullptr;
-  if (term == nullptr) return {};
+  if (!correction_ || correction_->uncovered() == nullptr) return {};
+  const estimator::LearnedTerm* const term = correction_->uncovered();
   BeyondBox beyond;
   beyond.term = term->name;
   switch (term->variable) {
