@@ -26,8 +26,10 @@ void EstimateStage::step(const estimator::VariatorSample& sample,
 }
 
 BeyondBox EstimateStage::beyond() const noexcept {
-  if (!correction_ || correction_->uncovered() == nullptr) return {};
-  const estimator::LearnedTerm* const term = correction_->uncovered();
+  if (!correction_) return {};
+  const estimator::InputCorrection& correction = *correction_;
+  const estimator::LearnedTerm* const term = correction.uncovered();
+  if (term == nullptr) return {};
   BeyondBox beyond;
   beyond.term = term->name;
   switch (term->variable) {
@@ -44,7 +46,7 @@ BeyondBox EstimateStage::beyond() const noexcept {
       beyond.role = torque_is_engine_ ? Role::kEngineTorque : Role::kPrimaryTorque;
       break;
   }
-  beyond.figure = correction_->uncovered_at();
+  beyond.figure = correction.uncovered_at();
   beyond.least = term->knot[0];
   beyond.most = term->knot[term->count - 1];
   beyond.samples = 1;
