@@ -18,12 +18,6 @@ std::string number(double value) {
   return buffer;
 }
 
-std::string short_number(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.2g", value);
-  return buffer;
-}
-
 std::string range(double low, double high) { return number(low) + " .. " + number(high); }
 
 std::string probability(double value) { return value > 0.999 ? "> 0.999" : number(value); }

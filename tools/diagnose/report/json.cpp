@@ -35,12 +35,6 @@ std::string number(double value) {
   return buffer;
 }
 
-std::string short_number(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.2g", value);
-  return buffer;
-}
-
 const char* kind_text(MisfitKind kind) {
   switch (kind) {
     case MisfitKind::kFunction:
@@ -297,6 +291,12 @@ std::string json_text(const Diagnosis& d) {
   json.end_array();
   json.end_object();
   return json.take() + "\n";
+}
+
+std::string short_number(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.2g", value);
+  return buffer;
 }
 
 std::string verdict_line(const Diagnosis& d) {
