@@ -5,6 +5,7 @@
 #include <array>
 
 #include "can_dbc/log/format.h"
+#include "can_dbc/log/frame_bits.h"
 #include "can_dbc/log/text.h"
 
 namespace beltgrip::can {
@@ -20,9 +21,6 @@ using log_text::skip_blanks;
 using log_text::take_word;
 using log_text::time_ns;
 using log_text::trim_end;
-
-constexpr std::uint32_t kBusError = 0x80;  // class bits as in linux/can/error.h
-constexpr std::uint8_t kErrorLength = 8;
 
 bool starts_with_word(std::string_view text, std::string_view lower_case_word) {
   if (text.size() < lower_case_word.size()) return false;

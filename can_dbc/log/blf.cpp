@@ -11,6 +11,7 @@
 #include <limits>
 
 #include "can_dbc/log/binary.h"
+#include "can_dbc/log/frame_bits.h"
 #include "can_dbc/log/text.h"
 
 namespace beltgrip::can {
@@ -39,9 +40,6 @@ enum Packing : std::uint16_t { kNotPacked = 0, kZlib = 2 };
 
 constexpr std::uint32_t kTenMicroseconds = 1;  // flag of an object's time; else nanoseconds
 constexpr std::int64_t kTenMicroseconds_ns = 10'000;
-constexpr std::uint32_t kExtendedFlag = 0x8000'0000;
-constexpr std::uint32_t kBusError = 0x80;  // class bits as in linux/can/error.h
-constexpr std::uint8_t kErrorLength = 8;
 
 // The contents of all containers, one behind the other.
 class ContainerSource : public ByteSource {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "can_dbc/log/format.h"
+#include "can_dbc/log/frame_bits.h"
 #include "can_dbc/log/text.h"
 
 namespace beltgrip::can {
@@ -22,7 +23,6 @@ using log_text::kFdLengths;
 using log_text::time_ns;
 using log_text::trim_end;
 
-constexpr std::uint32_t kBusError = 0x80;  // class bits as in linux/can/error.h
 constexpr std::size_t kColumnsMax = 96;
 
 enum class Column : std::uint8_t {

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "can_dbc/log/binary.h"
+#include "can_dbc/log/frame_bits.h"
 
 namespace beltgrip::can {
 
@@ -22,7 +23,6 @@ constexpr std::uint16_t kCanXl = 0x000E;
 constexpr std::uint16_t kSentByUs = 4;
 
 // Flags as in linux/can.h.
-constexpr std::uint32_t kExtendedFlag = 0x8000'0000;
 constexpr std::uint32_t kRemoteFlag = 0x4000'0000;
 constexpr std::uint32_t kErrorFlag = 0x2000'0000;
 constexpr std::uint8_t kXlFlag = 0x80;  // where classic and FD have their length

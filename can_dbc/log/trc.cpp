@@ -4,6 +4,7 @@
 #include <string>
 
 #include "can_dbc/log/format.h"
+#include "can_dbc/log/frame_bits.h"
 #include "can_dbc/log/text.h"
 
 namespace beltgrip::can {
@@ -19,8 +20,6 @@ using log_text::take_word;
 using log_text::time_ns;
 using log_text::trim_end;
 
-constexpr std::uint32_t kBusError = 0x80;  // class bits as in linux/can/error.h
-constexpr std::uint8_t kErrorLength = 8;
 constexpr std::int64_t kMillisecond_ns = 1'000'000;
 constexpr std::string_view kDefaultInterface = "1";
 

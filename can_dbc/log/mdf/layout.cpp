@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "can_dbc/log/binary.h"
+#include "can_dbc/log/frame_bits.h"
 #include "can_dbc/log/text.h"
 
 namespace beltgrip::can::mdf {
@@ -17,10 +18,7 @@ constexpr int kDepthMost = 4;
 constexpr std::size_t kChannelFields = 28;
 constexpr std::size_t kConversionFields = 24;
 constexpr std::size_t kTableMost = 1024;
-constexpr std::uint32_t kBusError = 0x80;  // class bits as in linux/can/error.h
-constexpr std::uint8_t kErrorLength = 8;
 constexpr std::size_t kClassicMost = 8;
-constexpr std::uint32_t kExtendedFlag = 0x8000'0000;
 
 enum ChannelType : std::uint8_t {
   kFixed = 0,

@@ -1,10 +1,10 @@
 #include "daemon/core/estimate/beyond_box.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "can_dbc/text/unit_text.h"
+#include "daemon/core/base/rounded_text.h"
 
 namespace beltgrip::daemon {
 
@@ -15,13 +15,6 @@ double widths_out(const BeyondBox& beyond) noexcept {
   if (std::isnan(beyond.figure)) return std::numeric_limits<double>::infinity();
   const double out = std::max(beyond.least - beyond.figure, beyond.figure - beyond.most);
   return out / (beyond.most - beyond.least);
-}
-
-std::string rounded(double value) {
-  std::array<char, 32> text;
-  const auto end =
-      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 4);
-  return {text.data(), end.ptr};
 }
 
 }  // namespace
@@ -36,12 +29,13 @@ void BeyondBox::take(const BeyondBox& other) noexcept {
 std::string beyond_text(const BeyondBox& beyond) {
   const std::string role(role_name(beyond.role));
   const std::string box = "[learned." + std::string(beyond.term.data()) + "] of the model file";
-  const std::string range = rounded(beyond.least) + " .. " + rounded(beyond.most) + " " +
+  const std::string range = rounded_text(beyond.least) + " .. " + rounded_text(beyond.most) + " " +
                             std::string(can::si_unit_text(role_dimension(beyond.role)));
   if (std::isnan(beyond.figure)) {
     return role + " is not known, which " + box + " depends on (box " + range + ")";
   }
-  return role + " at " + rounded(beyond.figure) + " lies outside the box of " + box + ", " + range;
+  return role + " at " + rounded_text(beyond.figure) + " lies outside the box of " + box + ", " +
+         range;
 }
 
 }  // namespace beltgrip::daemon

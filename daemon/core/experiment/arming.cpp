@@ -7,8 +7,10 @@ namespace beltgrip::daemon {
 
 namespace {
 
-constexpr double kPedalMoved = 0.05;  // in an experiment: the driver wants something
-constexpr double kOilBand_K = 1.0;    // in an experiment: below what it may begin with
+constexpr double kPedalMoved =
+    0.05;  // chosen: in an experiment, above the noise of a pedal at rest
+constexpr double kOilBand_K =
+    1.0;  // chosen: in an experiment, below what it may begin with; oil cools slower
 constexpr Duration kSampleLeast = kMillisecond;
 constexpr double kKnownMargin = 1.05;  // the belt may have run in since its last value
 constexpr double kPeakSlipOverdrive = 0.020;

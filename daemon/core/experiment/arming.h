@@ -107,7 +107,7 @@ class Arming {
   static constexpr Duration kPatience = 8 * kSecond;  // after kSettle
   static constexpr Duration kClearancePeriod = 100 * kMillisecond;
   static constexpr double kRatioDrift = 0.01;
-  static constexpr double kRatioTolerance = 0.03;  // a clamped belt slips and deforms by less
+  static constexpr double kRatioTolerance = 0.03;  // chosen: a clamped belt slips, deforms by less
   static constexpr double kPedalReleased = 0.02;   // chosen: noise of a pedal at rest
   static constexpr double kTorqueDrift = 0.25;
   static constexpr double kTorqueDrift_Nm = 4.0;

@@ -1,11 +1,11 @@
 #include "daemon/core/input/stop_cause.h"
 
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <string_view>
 
 #include "daemon/core/base/named.h"
+#include "daemon/core/base/rounded_text.h"
 
 namespace beltgrip::daemon {
 
@@ -49,13 +49,6 @@ static_assert(in_wire_order(kReasons));
 
 const ReasonRow& row_of(StopReason reason) { return kReasons.at(static_cast<std::size_t>(reason)); }
 
-std::string rounded(double value) {
-  std::array<char, 32> text;
-  const auto end =
-      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 4);
-  return {text.data(), end.ptr};
-}
-
 }  // namespace
 
 std::string_view stop_reason_name(StopReason reason) { return row_of(reason).name; }
@@ -67,8 +60,8 @@ std::string cause_text(StopReason reason, const StopCause& cause) {
   if (cause.role) text = std::string(role_name(*cause.role)) + ": ";
   text += cause.what != nullptr ? std::string_view(cause.what) : row_of(reason).words;
   const std::string unit = *cause.unit == '\0' ? "" : std::string(" ") + cause.unit;
-  if (std::isfinite(cause.figure)) text += " " + rounded(cause.figure) + unit;
-  if (std::isfinite(cause.limit)) text += ", limit " + rounded(cause.limit) + unit;
+  if (std::isfinite(cause.figure)) text += " " + rounded_text(cause.figure) + unit;
+  if (std::isfinite(cause.limit)) text += ", limit " + rounded_text(cause.limit) + unit;
   return text;
 }
 

@@ -27,6 +27,7 @@ ReadLog read_log(const std::string& path) {
 }
 
 LogFile::LogFile(std::string_view content) {
+  // mkstemp() puts a name of its own where the X stand.
   path_ = (std::filesystem::temp_directory_path() / "beltgrip_log_XXXXXX").string();
   const int descriptor = mkstemp(path_.data());
   if (descriptor < 0) std::abort();

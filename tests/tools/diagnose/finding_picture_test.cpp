@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "tests/statistics/blind/generator.h"
+#include "tests/tools/diagnose/recorded_runs.h"
 #include "tools/diagnose/decide/namer.h"
 
 namespace beltgrip::diagnose {
@@ -20,13 +20,7 @@ TEST(FindingPicture, IsTheCauseOverWhatItFollows) {
   blind::Random random(trial.seed);
   trial.plan = blind::draw_plan(random, trial.machine.setting, 8);
   trial.planted.push_back({"torque_loss", {{"per_kN_Nm", kLoss_Nm_per_kN}}, {}});
-  estimator::VariatorParameters variator;
-  variator.primary_inertia_kg_m2 = trial.machine.primary_inertia_kg_m2;
-  std::vector<ExperimentData> runs;
-  for (const std::string& text : blind::record(trial).csv) {
-    runs.push_back(prepare(parse_csv(text, "run.csv"), variator));
-  }
-  Engine engine(make_campaign(std::move(runs), nominal_model(variator)));
+  Engine engine(campaign_of(trial));
   const Naming naming = name_effects(engine, [] { return false; });
   ASSERT_EQ(naming.accepted.size(), 1U);
   Finding finding;

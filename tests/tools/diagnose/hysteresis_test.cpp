@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "tests/statistics/blind/generator.h"
+#include "tests/tools/diagnose/recorded_runs.h"
 #include "tools/diagnose/decide/namer.h"
 
 namespace beltgrip::diagnose {
@@ -13,28 +13,21 @@ namespace {
 constexpr double kForce_N = 240.0;
 
 // A machine and a plan; before: where the clamp force comes from, 0 to 2 (the generator's).
-blind::Recording recording(std::uint64_t machine, std::uint64_t before) {
+blind::Trial trial_of(std::uint64_t machine, std::uint64_t before) {
   blind::Random random(machine);
   blind::Trial trial;
   trial.machine = blind::draw_machine(random);
   trial.plan = blind::draw_plan(random, trial.machine.setting, 12);
   trial.planted.push_back({"clamp_hysteresis", {{"force_N", kForce_N}}, {}});
   trial.seed = 3 * machine + before;
-  return blind::record(trial);
+  return trial;
 }
 
 TEST(Hysteresis, IsFoundInItsSizeWhateverWentBefore) {
   const char* const kRole[] = {"raised", "", "lowered"};
   for (std::uint64_t before = 0; before < 3; ++before) {
     SCOPED_TRACE(kRole[before]);
-    const blind::Recording recorded = recording(1, before);
-    estimator::VariatorParameters variator;
-    variator.primary_inertia_kg_m2 = 0.18;
-    std::vector<ExperimentData> runs;
-    for (const std::string& text : recorded.csv) {
-      runs.push_back(prepare(parse_csv(text, "run.csv"), variator));
-    }
-    Engine engine(make_campaign(std::move(runs), nominal_model(variator)));
+    Engine engine(campaign_of(trial_of(1, before)));
     const Naming naming = name_effects(engine, [] { return false; });
     ASSERT_EQ(naming.accepted.size(), 1U);
     const Accepted& found = naming.accepted.front();

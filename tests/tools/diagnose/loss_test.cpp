@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "tests/statistics/blind/generator.h"
+#include "tests/tools/diagnose/recorded_runs.h"
 #include "tools/diagnose/decide/namer.h"
 
 namespace beltgrip::diagnose {
@@ -27,13 +27,7 @@ Diagnosed diagnosed(const blind::Machine& machine) {
     trial.plan[i].low = true;
     trial.plan[i].torque_Nm = 40.0;
   }
-  estimator::VariatorParameters variator;
-  variator.primary_inertia_kg_m2 = trial.machine.primary_inertia_kg_m2;
-  std::vector<ExperimentData> runs;
-  for (const std::string& text : blind::record(trial).csv) {
-    runs.push_back(prepare(parse_csv(text, "run.csv"), variator));
-  }
-  Engine engine(make_campaign(std::move(runs), nominal_model(variator)));
+  Engine engine(campaign_of(trial));
   Naming naming = name_effects(engine, [] { return false; });
   return {std::move(engine), std::move(naming)};
 }

@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 
 constexpr double kSaturatedPrecision = 50.0;
 constexpr std::array<double, 3> kCoarseness{30.0, 8.0, 2.0};
-constexpr double kCovered = 2.0;       // rms in units of noise that is told apart from none by eye
+constexpr double kCovered = 2.0;       // chosen: rms in units of noise that the eye tells from none
 constexpr int kAttempts = 10;          // to find a step that gains, each shorter than the last
 constexpr double kLongStep = 0.05;     // in tolerances and usual sizes
 constexpr double kWorthwhile = 1.0;    // of the log likelihood

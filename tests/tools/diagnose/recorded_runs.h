@@ -1,0 +1,24 @@
+// The blind generator's recording as diagnose takes it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tests/statistics/blind/generator.h"
+#include "tools/diagnose/data/experiment_data.h"
+#include "tools/diagnose/infer/engine.h"
+
+namespace beltgrip::diagnose {
+
+// Told the inertia that the generator's machine has, and nothing else of it.
+inline Campaign campaign_of(const blind::Trial& trial) {
+  estimator::VariatorParameters variator;
+  variator.primary_inertia_kg_m2 = trial.machine.primary_inertia_kg_m2;
+  std::vector<ExperimentData> runs;
+  for (const std::string& text : blind::record(trial).csv) {
+    runs.push_back(prepare(parse_csv(text, "run.csv"), variator));
+  }
+  return make_campaign(std::move(runs), nominal_model(variator));
+}
+
+}  // namespace beltgrip::diagnose
