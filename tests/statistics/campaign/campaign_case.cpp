@@ -110,24 +110,20 @@ std::string number(double value) {
 
 class Drawer {
  public:
-  explicit Drawer(std::uint64_t seed, std::string_view stream = "campaign")
-      : random_(seed, stream) {}
-  double between(double low, double high) { return low + (high - low) * random_.uniform(); }
-  double log_between(double low, double high) {
-    return low * std::pow(high / low, random_.uniform());
-  }
+  explicit Drawer(const Uniform& uniform) : uniform_(uniform) {}
+  double between(double low, double high) { return low + (high - low) * uniform_(); }
+  double log_between(double low, double high) { return low * std::pow(high / low, uniform_()); }
   std::size_t index(std::size_t count) {
-    return std::min(count - 1,
-                    static_cast<std::size_t>(random_.uniform() * static_cast<double>(count)));
+    return std::min(count - 1, static_cast<std::size_t>(uniform_() * static_cast<double>(count)));
   }
   template <typename T>
   const T& one_of(const std::vector<T>& all) {
     return all[index(all.size())];
   }
-  bool chance(double share) { return random_.uniform() < share; }
+  bool chance(double share) { return uniform_() < share; }
 
  private:
-  sim::Random random_;
+  const Uniform& uniform_;
 };
 
 // Row X10: what no friction model of the daemon expects.
@@ -143,8 +139,8 @@ constexpr double kFallWithAFault_per_percent = 4e-3;
 constexpr double kNextCoast_s = 21.0;
 constexpr int kMostCoasts = 3;
 
-Surprise draw_surprise(std::uint64_t seed) {
-  Drawer draw(seed, "surprise");
+Surprise draw_surprise(const Uniform& uniform) {
+  Drawer draw(uniform);
   const double which = draw.between(0.0, 1.0);
   return which < 0.03   ? Surprise::kTwoPeaks
          : which < 0.06 ? Surprise::kFallAtOnce
@@ -284,7 +280,14 @@ void complete(CampaignCase& out) {
 }  // namespace
 
 CampaignCase draw_case(std::uint64_t seed) {
-  Drawer draw(seed);
+  sim::Random campaign(seed, "campaign"), surprise(seed, "surprise");
+  return draw_case(
+      seed, [&] { return campaign.uniform(); }, [&] { return surprise.uniform(); });
+}
+
+CampaignCase draw_case(std::uint64_t seed, const Uniform& uniform,
+                       const Uniform& uniform_of_surprise) {
+  Drawer draw(uniform);
   CampaignCase out;
   out.seed = seed;
   const double which = draw.between(0.0, 1.0);
@@ -292,7 +295,7 @@ CampaignCase draw_case(std::uint64_t seed) {
              : which < 0.92 ? "cruise-drive-torque"
              : which < 0.96 ? "coast-overdrive-unreachable"
                             : "coast-low";
-  const Surprise surprise = draw_surprise(seed);
+  const Surprise surprise = draw_surprise(uniform_of_surprise);
   if (surprise == Surprise::kEarlier) out.base = "demo";
   const int coasts = out.base == "coast-overdrive" && draw.chance(0.2)
                          ? 2 + static_cast<int>(draw.index(kMostCoasts - 1))

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,10 @@ struct CampaignCase {
 };
 
 CampaignCase draw_case(std::uint64_t seed);
+// The same from any source of numbers in [0, 1); the seed is that of the vehicle's noise.
+using Uniform = std::function<double()>;
+CampaignCase draw_case(std::uint64_t seed, const Uniform& uniform,
+                       const Uniform& uniform_of_surprise);
 // A kept case: file text whose first line is "# base NAME seed N".
 CampaignCase read_case(const std::string& text, const std::string& name);
 
