@@ -9,8 +9,7 @@ namespace beltgrip::estimator {
 namespace {
 
 constexpr double kFormTolerance = 0.003;  // of mu: friction that is not quite a curve
-constexpr double kDeformation_percent_per_N = 2e-4;
-constexpr double kLeastShare = 0.1;  // of the chord, on either side
+constexpr double kLeastShare = 0.1;       // of the chord, on either side
 constexpr double kLeastGap_percent = 0.02;
 constexpr std::size_t kFewest = 12;  // residuals
 

@@ -13,6 +13,9 @@
 
 namespace beltgrip::estimator {
 
+// By which a clamp force moves the ratio at its end stop, and with it the slip that is read.
+inline constexpr double kDeformation_percent_per_N = 2e-4;
+
 // Of all points before one, in the order of time.
 struct CurveSums {
   double weight = 0.0;                         // 1 / variance of mu

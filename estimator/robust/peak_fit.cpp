@@ -748,12 +748,36 @@ void PeakFit::sum_for_health() noexcept {
   }
 }
 
+// By more, from the first half to the second, than deformation alone moves it as the clamp force
+// falls: else mu* rises at one slip, and no function of slip runs through such points.
+bool PeakFit::slip_moves(double until_s) const noexcept {
+  struct Half {
+    double duration_s = 0.0, slip = 0.0, force_N = 0.0;
+  };
+  std::array<Half, 2> halves;
+  const double middle_s = 0.5 * (points_[first_].t_s + until_s);
+  for (std::size_t i = first_; i < point_count_ && points_[i].t_s < until_s; ++i) {
+    const Point& point = points_[i];
+    Half& half = halves[point.t_s < middle_s ? 0 : 1];
+    half.duration_s += point.duration_s;
+    half.slip += point.duration_s * point.slip;
+    half.force_N += point.duration_s * point.force_N;
+  }
+  if (!(halves[0].duration_s > 0.0) || !(halves[1].duration_s > 0.0)) return true;
+  const auto moved = [&halves](double Half::*what) {
+    return std::abs(halves[1].*what / halves[1].duration_s -
+                    halves[0].*what / halves[0].duration_s);
+  };
+  return moved(&Half::slip) > kDeformation_percent_per_N * moved(&Half::force_N);
+}
+
 void PeakFit::test_best_form() noexcept {
   const auto fitted_at = [this](double x) {
     const Eigen::Vector4d terms(1.0, -best_rise_.at(x), -x, -std::max(0.0, x - best_corner_));
     return mu_top_ + terms.dot(best_theta_);
   };
   const double until_s = tested_until_s();
+  if (!slip_moves(until_s)) return;
   std::size_t used = 0;
   for (std::size_t i = first_; i < point_count_ && points_[i].t_s < until_s; ++i) {
     const Point& point = points_[i];

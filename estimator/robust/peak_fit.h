@@ -142,6 +142,7 @@ class PeakFit {
   void find_end_spread() noexcept;
   double tested_until_s() const noexcept;
   void sum_for_health() noexcept;
+  bool slip_moves(double until_s) const noexcept;
   void test_best_form() noexcept;
   double speed_at_edge(std::size_t cell, double& t_s, double& weight_s) const noexcept;
 

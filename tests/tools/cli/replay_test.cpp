@@ -97,6 +97,27 @@ std::vector<std::vector<double>> rows_of(const std::string& csv) {
   return rows;
 }
 
+// While the clamp force falls and slip hardly moves there is no curve yet: what was carried is a
+// lower bound, the longer the log the higher.
+TEST_F(Replay, ALogThatIsCutShortGivesABound) {
+  double bound = 0.0;
+  for (const char* seconds : {"5", "12", "15", "20", "25", "30", "50"}) {
+    SCOPED_TRACE(seconds);
+    ASSERT_EQ(
+        beltgrip({"simulate", "--duration", seconds, "--out-dir", path("cut"), "--force"}).status,
+        0);
+    const auto result = parse(beltgrip({"replay", path("cut/trace.log"), "--config",
+                                        path("cut/beltgrip.toml"), "--json", "-"})
+                                  .out);
+    ASSERT_EQ(result.size(), 2u);
+    EXPECT_EQ(result[0].at("reason"), "the log ended");
+    ASSERT_TRUE(result[0].at("mu_max_lower_bound").is_number()) << result[0];
+    EXPECT_GT(result[0].at("mu_max_lower_bound").get<double>(), bound);
+    bound = result[0].at("mu_max_lower_bound").get<double>();
+    EXPECT_LT(bound, 0.105);  // the scenario's
+  }
+}
+
 TEST_F(Replay, SignalsOutAsCsvAndAsMf4SayTheSame) {
   for (const char* name : {"s.csv", "s.mf4"}) {
     const RunResult result = beltgrip(
