@@ -5,11 +5,12 @@
 #include <cmath>
 
 #include "daemon/core/experiment/reachability.h"
+#include "daemon/core/experiment/stop_of.h"
+#include "daemon/core/observe/reasons_now.h"
 #include "tools/check/thresholds.h"
 
 namespace beltgrip::check {
 
-using daemon::Inhibit;
 using daemon::inhibit_bit;
 
 namespace {
@@ -158,8 +159,10 @@ void BusView::take_arming(const daemon::SampleReport& report) {
     missing_counted_ = false;
   } else if (!missing_counted_ && report.t - missing_since_ >= daemon::Arming::kSettle) {
     missing_counted_ = true;
-    for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
-      prospects_.forbidden_by[i] += missing_ >> i & 1;
+    for (const auto& each : daemon::kInhibits) {
+      if ((missing_ & inhibit_bit(each.value)) == 0) continue;
+      ++prospects_.forbidden_by[static_cast<std::size_t>(each.value)];
+      note_figure(each.value, inhibits, arming_.obstacle(), report);
     }
   }
 
@@ -196,9 +199,21 @@ void BusView::take_arming(const daemon::SampleReport& report) {
   if (!settling_.settled()) return;
   settled_ = true;
   if (arming_.cleared()) now_.in_reach = true;
-  for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
-    unclear_samples_[i] += inhibits >> i & 1;
+  for (const auto& each : daemon::kInhibits) {
+    if ((inhibits & inhibit_bit(each.value)) == 0) continue;
+    ++unclear_samples_[static_cast<std::size_t>(each.value)];
+    note_figure(each.value, inhibits, arming_.obstacle(), report);
   }
+}
+
+// `report`: of a pipeline that holds no experiment back; what does comes from the arming here.
+void BusView::note_figure(Inhibit inhibit, std::uint32_t inhibits, const daemon::Obstacle& obstacle,
+                          daemon::SampleReport report) {
+  std::string& figure = prospects_.figures[static_cast<std::size_t>(inhibit)];
+  if (!figure.empty()) return;
+  report.inhibits = inhibits;
+  report.obstacle = daemon::stop_of(inhibits, obstacle).cause;
+  figure = daemon::figure_of(inhibit, config_, report, daemon::signals_of(pipeline_));
 }
 
 void BusView::end_opportunity() {
@@ -215,6 +230,8 @@ void BusView::end_opportunity() {
     ++prospects_.in_reach;
   } else if (by_reach_alone) {
     ++prospects_.forbidden_by[static_cast<std::size_t>(Inhibit::kUnreachable)];
+    note_figure(Inhibit::kUnreachable, inhibit_bit(Inhibit::kUnreachable),
+                {now_.floor_N, now_.floor_N * now_.torque_Nm / now_.needed_Nm}, {});
   } else {
     // The one that was in the way for the longest.
     const auto most = std::max_element(unclear_samples_.begin(), unclear_samples_.end());

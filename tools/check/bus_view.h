@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "daemon/core/config/options/config.h"
@@ -17,6 +18,8 @@
 #include "tools/check/thinned.h"
 
 namespace beltgrip::check {
+
+using daemon::Inhibit;
 
 // Means over the window, SI. NaN: no value of the role for all of it.
 struct Window {
@@ -45,6 +48,7 @@ struct Prospects {
   bool judged = false;  // triggers "coast_down" and "steady"
   std::uint64_t opportunities = 0, in_reach = 0;
   std::array<std::uint64_t, daemon::kInhibitCount> forbidden_by{};
+  std::array<std::string, daemon::kInhibitCount> figures;  // beside its limit, as each first stood
   std::optional<Opportunity> best;
   std::uint64_t experiments = 0;  // other triggers: that ran
   double carried_most = 0.0;      // and the highest friction that was carried in them
@@ -63,6 +67,8 @@ class BusView final : public daemon::SampleSink {
   void take_window(const daemon::SampleReport& report);
   void take_arming(const daemon::SampleReport& report);
   void end_opportunity();
+  void note_figure(Inhibit inhibit, std::uint32_t inhibits, const daemon::Obstacle& obstacle,
+                   daemon::SampleReport report);
   daemon::Duration slowest_stale() const;
   daemon::Conditions conditions() const;
   double value(Role role) const;

@@ -154,13 +154,10 @@ std::string text(const Checked& checked) {
     for (std::size_t i = 0; i < checked.prospects.forbidden_by.size(); ++i) {
       const std::uint64_t times = checked.prospects.forbidden_by[i];
       if (times == 0) continue;
-      const std::string name(daemon::kInhibits[i].name);
-      const std::string what = limit_text(static_cast<daemon::Inhibit>(i), checked.config);
-      std::string said = name;
-      if (what != name) said.append(": ").append(what);
-      out += wrapped(format("  kept away %llu time%s: ", static_cast<unsigned long long>(times),
-                            times == 1 ? "" : "s"),
-                     said);
+      out += wrapped(
+          format("  kept away %llu time%s: ", static_cast<unsigned long long>(times),
+                 times == 1 ? "" : "s"),
+          daemon::reason_text(reason_of(static_cast<daemon::Inhibit>(i), checked.prospects)));
     }
     const std::string reach = reach_text(checked.prospects, checked.config);
     if (!reach.empty()) out += wrapped("  ", reach);

@@ -43,35 +43,20 @@ void missing_for_command(const daemon::Config& config, std::vector<std::string>&
 
 }  // namespace
 
-std::string limit_text(daemon::Inhibit inhibit, const daemon::Config& config) {
-  using daemon::Inhibit;
-  const daemon::ExperimentSettings& limits = config.experiment;
-  switch (inhibit) {
-    case Inhibit::kPermission:
-      return "experiment_permitted is 0";
-    case Inhibit::kLockup:
-      return "the lock-up clutch is open";
-    case Inhibit::kRatio:
-      return format("the ratio is at no end stop (%.3g, %.3g)", config.variator.ratio_low,
-                    config.variator.ratio_overdrive);
-    case Inhibit::kTorque:
-      return format("torque outside %.0f to %.0f Nm", limits.torque_min_Nm, limits.torque_max_Nm);
-    case Inhibit::kSpeed:
-      return format("primary below %.0f rad/s", limits.primary_speed_min_rad_s);
-    case Inhibit::kOil:
-      return format("oil below %.0f degC", limits.oil_temperature_min_degC);
-    case Inhibit::kUnreachable:
-      return "the force floor lies above the peak's force";
-    case Inhibit::kRamp:
-      return "no crossing of the peak keeps the slip limits";
-    case Inhibit::kTime:
-      return "the ramp would last longer than the coast-down";
-    case Inhibit::kForce:
-      return "the controller's own force still moves";
-    default:
-      return std::string(daemon::kInhibits[static_cast<std::size_t>(inhibit)].name);
-  }
+daemon::Reason reason_of(daemon::Inhibit inhibit, const Prospects& prospects) {
+  return daemon::reason_of(inhibit, prospects.figures[static_cast<std::size_t>(inhibit)]);
 }
+
+namespace {
+
+// Without the remedy: a sentence goes on behind it.
+std::string cause_of(daemon::Inhibit inhibit, const Prospects& prospects) {
+  daemon::Reason reason = reason_of(inhibit, prospects);
+  reason.remedy.clear();
+  return daemon::reason_text(reason);
+}
+
+}  // namespace
 
 std::string reach_text(const Prospects& prospects, const daemon::Config& config) {
   if (!prospects.judged || !prospects.best) return {};
@@ -133,8 +118,8 @@ Verdict judge(const RoleWatch& watch, const std::vector<Window>& windows,
   if (prospects.best && prospects.best->forbidden != 0) {
     const auto limit = static_cast<daemon::Inhibit>(std::countr_zero(prospects.best->forbidden));
     if (limit != daemon::Inhibit::kUnreachable) {
-      forbidden = "with " + grouped(prospects.best->torque_Nm) + " Nm the peak is in reach, but " +
-                  limit_text(limit, config);
+      forbidden = "with " + grouped(prospects.best->torque_Nm) +
+                  " Nm the peak is in reach, but kept away by " + cause_of(limit, prospects);
     }
   }
   const std::string only_configuration = seen ? "" : " by the configuration alone";
@@ -168,7 +153,8 @@ Verdict judge(const RoleWatch& watch, const std::vector<Window>& windows,
         std::string why;
         for (std::size_t i = 0; most > 0 && i < prospects.forbidden_by.size(); ++i) {
           if (prospects.forbidden_by[i] < most) continue;
-          why += (why.empty() ? ": " : ", ") + limit_text(static_cast<daemon::Inhibit>(i), config);
+          why += (why.empty() ? "; kept away by " : ", and by ") +
+                 cause_of(static_cast<daemon::Inhibit>(i), prospects);
         }
         verdict.sentence += why;
       }

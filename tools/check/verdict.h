@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "daemon/core/config/options/config.h"
+#include "daemon/core/reasons/reasons.h"
 #include "tools/check/bus_view.h"
 #include "tools/check/finding.h"
 #include "tools/check/judge_role.h"
@@ -29,8 +30,8 @@ Verdict judge(const RoleWatch& watch, const std::vector<Window>& windows,
               const Prospects& prospects, const daemon::Config& config, const DbcUnits& units,
               bool seen);
 
-// What a limit means, with its number: "oil below 40 degC".
-std::string limit_text(daemon::Inhibit inhibit, const daemon::Config& config);
+// What kept experiments away, with its figure, in the words of every program.
+daemon::Reason reason_of(daemon::Inhibit inhibit, const Prospects& prospects);
 // "force floor 7,280 N: the peak is reached from 116 Nm on; this drive coasts with 31 Nm"
 std::string reach_text(const Prospects& prospects, const daemon::Config& config);
 

@@ -67,6 +67,13 @@ class Check : public testing::Test {
     EXPECT_EQ(result.status, 0) << result.err;
     return json::parse(result.out);
   }
+  std::string text_of(const Drive& drive) const {
+    place.write("trace.log", drive.log);
+    place.write("beltgrip.toml", drive.toml);
+    place.write("vehicle.dbc", drive.dbc);
+    return beltgrip({"check", place.path("trace.log"), "--config", place.path("beltgrip.toml")})
+        .out;
+  }
   static std::string with_role(const std::string& toml, const std::string& role,
                                const std::string& right) {
     const std::size_t at = toml.find("\n" + role + " ");
@@ -111,6 +118,13 @@ TEST_F(Check, TellsWhatADriveAllows) {
   // By hand: torque = 2 R_p mu F / cos 11 degrees, in overdrive.
   const double floor_N = far["experiments"]["floor_N"], needed = far["experiments"]["needed_Nm"];
   EXPECT_NEAR(needed, 2.0 * 0.07837 * 0.11 * floor_N / 0.981627, 0.01);
+  // In the words of every program, with the figure beside its limit.
+  EXPECT_TRUE(has(text_of(drive("coast-overdrive-unreachable")),
+                  "unreachable (the force floor lies above the peak's force "));
+  // The oil's temperature and its limit as the scenario has them.
+  EXPECT_TRUE(has(text_of(drive("cold-oil")), " oil (1"));
+  EXPECT_TRUE(has(text_of(drive("cold-oil")),
+                  "degC, limit 40 degC): the oil is colder than `oil_temperature_min_degC`;"));
   const json rig = check(drive("paper-rig"));
   EXPECT_EQ(rig["experiments"]["opportunities"], 1);
   EXPECT_TRUE(has(rig["sentence"], "lockup_closed")) << rig["sentence"];
