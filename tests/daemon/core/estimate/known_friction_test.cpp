@@ -103,6 +103,34 @@ TEST_F(Known, ABeltThatSlippedWithLessMayBeLoadedNoMore) {
   EXPECT_FALSE(doubtful());
 }
 
+// Of all experiments, as the history has them.
+estimator::LearnedFriction learned_of(double mu_max) {
+  estimator::LearnedFriction learned;
+  estimator::FusedFriction& fused = learned.groups[estimator::LearnedFriction::index(
+      estimator::Direction::kDrive, estimator::EndStop::kOverdrive)];
+  fused.known = true;
+  fused.mu_max = mu_max;
+  fused.mu_max_std = 0.01 * mu_max;
+  fused.ci95_low = 0.98 * mu_max;
+  fused.ci95_high = 1.02 * mu_max;
+  fused.repeatability_percent = 1.0;
+  return learned;
+}
+
+TEST_F(Known, ALastValueWithinTheNoiseOfAllCountsAsAll) {
+  known_.learn(learned_of(0.09));
+  take(value(0.0905));
+  EXPECT_EQ(known_.to_rest_on(curve_), 0.09);
+}
+
+TEST_F(Known, OfALastValueAndTheOthersTheLowerOneCounts) {
+  known_.learn(learned_of(0.09));
+  take(value(0.08));
+  EXPECT_EQ(known_.to_rest_on(curve_), 0.08);
+  take(value(0.1));
+  EXPECT_EQ(known_.to_rest_on(curve_), 0.09);
+}
+
 TEST_F(Known, UnderAnotherConfigurationOnlyTheCountGoesOn) {
   take(value(0.09));
   KnownFriction next(config_);

@@ -119,6 +119,29 @@ TEST_F(ArmingTest, EveryPreconditionAloneAtItsBoundary) {
   }
 }
 
+TEST_F(ArmingTest, WhatEndsAnExperimentUnderWay) {
+  const Conditions sound = coasting().conditions;
+  EXPECT_FALSE(arming_.ended_by(sound));
+  const auto reason = [&](auto change) {
+    Conditions now = sound;
+    change(now);
+    return arming_.ended_by(now).reason;
+  };
+  using estimator::StopReason;
+  EXPECT_EQ(reason([](Conditions& c) { c.permitted = false; }), StopReason::kPermission);
+  EXPECT_EQ(reason([](Conditions& c) { c.brake_pressed = true; }), StopReason::kDriver);
+  EXPECT_EQ(reason([](Conditions& c) { c.accelerator = 0.05; }), StopReason::kNone);
+  EXPECT_EQ(reason([](Conditions& c) { c.accelerator = 0.051; }), StopReason::kDriver);
+  EXPECT_EQ(reason([](Conditions& c) { c.lockup_closed = false; }), StopReason::kTorque);
+  // One kelvin below what it may begin with.
+  EXPECT_EQ(reason([](Conditions& c) { c.oil_degC = 39.0; }), StopReason::kNone);
+  EXPECT_EQ(reason([](Conditions& c) { c.oil_degC = 38.9; }), StopReason::kPermission);
+  // Whoever drives has the pedal down.
+  Conditions driving = sound;
+  driving.accelerator = 0.5;
+  EXPECT_FALSE(Arming(config(Trigger::kSteady)).ended_by(driving));
+}
+
 TEST_F(ArmingTest, AnInterruptionStartsTheSettlingAnew) {
   run(Arming::kSettle - kSample);
   run(kSample, [](Arming::Now& n) { n.conditions.brake_pressed = true; });

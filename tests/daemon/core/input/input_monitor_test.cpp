@@ -381,6 +381,10 @@ TEST(InputMonitor, StampsThatRunBackwardsAreCountedAndHeldBack) {
     EXPECT_EQ(bench.monitor.history(Role::kPrimarySpeed).newest(), 10 * kSecond);
     EXPECT_EQ(bench.monitor.history(Role::kPrimarySpeed).newest_value(), 2.0);
   }
+  // Later than the one that ran back, and still not in turn.
+  bench.faults = {};
+  bench.monitor.on_frame(at(10 * kSecond - kMillisecond, raw_frame(3)), bench.faults);
+  EXPECT_TRUE(bench.faults.has(Fault::kTimeStamp));
 }
 
 // --- frozen speeds ---

@@ -1,0 +1,43 @@
+"""A built test program once more, with one of its sources exchanged: what tests/mutate and
+tests/defects have in common. The program's own objects and libraries stay as they are."""
+import json
+import os
+import pathlib
+import shlex
+import subprocess
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+
+
+class Relink:
+    def __init__(self, build, folder):
+        self.build, self.folder = build, folder
+        commands = json.loads((build / "compile_commands.json").read_text())
+        self.commands = {each["file"]: shlex.split(each["command"]) for each in commands}
+
+    def compile(self, name, copy, target, optimisation):
+        """`copy` as the build compiles the source `name`, without its warnings. Its errors; '': done."""
+        line = self.commands[str(ROOT / name)][:]
+        line[line.index("-o") + 1] = str(target)
+        line[line.index("-c") + 1] = str(copy)
+        done = subprocess.run([*line, f"-I{ROOT}", "-w", optimisation], capture_output=True,
+                              text=True, cwd=self.build)
+        return done.stderr if done.returncode else ""
+
+    def link(self, program, out, objects):
+        """What an object defines is not taken from the libraries behind it."""
+        lines = subprocess.run(["ninja", "-C", self.build, "-t", "commands", program], check=True,
+                               capture_output=True, text=True).stdout.splitlines()
+        words = shlex.split(lines[-1])[2:-2]
+        at = words.index("-o")
+        words[at + 1] = str(out)
+        subprocess.run([*words[:at], *map(str, objects), *words[at:]], check=True, cwd=self.build)
+
+    def passes(self, program, limit_s, **environment):
+        try:
+            return subprocess.run([program, "--gtest_fail_fast", "--gtest_brief=1"], cwd=self.build,
+                                  env={**os.environ, **environment}, timeout=limit_s,
+                                  stdout=subprocess.DEVNULL,
+                                  stderr=subprocess.DEVNULL).returncode == 0
+        except subprocess.TimeoutExpired:
+            return False
