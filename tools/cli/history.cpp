@@ -7,14 +7,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "daemon/core/publish/names.h"
@@ -22,6 +19,7 @@
 #include "daemon/io/history_db.h"
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"
+#include "tools/cli/history_file.h"
 #include "tools/cli/history_from.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
@@ -42,11 +40,6 @@ using estimator::Direction;
 using estimator::EndStop;
 using estimator::PeakKind;
 
-constexpr const char* kDefaultFolder = "/var/lib/beltgrip";
-constexpr std::array<const char*, estimator::kNoteCount> kNoteNames{
-    "outlier",       "trend",  "wear", "directions_disagree", "end_stops_disagree",
-    "contradictory", "slipped"};
-
 struct Options {
   std::string file;
   std::string config;
@@ -54,159 +47,6 @@ struct Options {
   std::string json;
   std::string csv;
 };
-
-struct Group {
-  Direction direction;
-  EndStop end_stop;
-  estimator::FusedFriction fused;
-  estimator::WearTest wear;
-  const HistoryRow* since = nullptr;  // the first of those that the wear test compares
-};
-
-struct History {
-  std::string path;
-  std::vector<HistoryRow> rows;
-  std::int64_t damaged = 0;
-  std::string fingerprint;          // of the last row: its configuration is the one that counts
-  std::size_t comparable = 0;       // rows under it
-  std::vector<Group> groups;        // that hold a value
-  daemon::CarriedBounds carried{};  // under it
-};
-
-// history.db in the folder, or in the only one of its folders that has one: the service gives each
-// interface its own.
-std::string in_folder(const std::string& folder) {
-  namespace fs = std::filesystem;
-  const fs::path direct = fs::path(folder) / daemon::kHistoryFile;
-  std::error_code ignored;  // opening it says why
-  if (fs::exists(direct, ignored)) return direct.string();
-  std::vector<std::string> found;
-  for (const auto& each : fs::directory_iterator(folder, ignored)) {
-    const fs::path below = each.path() / daemon::kHistoryFile;
-    if (fs::exists(below, ignored)) found.push_back(below.string());
-  }
-  if (found.size() > 1) {
-    std::sort(found.begin(), found.end());
-    std::string all;
-    for (const std::string& each : found) all += (all.empty() ? "" : ", ") + each;
-    throw Failure{kUsage, "history: found several, name one of them: " + all};
-  }
-  return found.empty() ? direct.string() : found.front();
-}
-
-std::string path_of(const Options& options) {
-  namespace fs = std::filesystem;
-  std::string path = options.file;
-  if (path.empty() && !options.config.empty()) {
-    const std::string folder = load_configuration(options.config, "").state_dir;
-    if (!folder.empty()) path = (fs::path(options.config).parent_path() / folder).string();
-  }
-  if (path.empty()) path = kDefaultFolder;
-  std::error_code ignored;
-  return fs::is_directory(path, ignored) ? in_folder(path) : path;
-}
-
-// What was carried without slip, beside the history: under the configuration of its last
-// experiment, or the newest where there is none.
-daemon::CarriedBounds carried_beside(const History& history) {
-  const std::string beside = std::filesystem::path(history.path).parent_path().string();
-  const std::string folder = beside.empty() ? "." : beside;
-  const std::string fingerprint = history.rows.empty() ? "" : history.rows.back().fingerprint;
-  const auto found = daemon::read_carried(folder, fingerprint);
-  if (const auto* bounds = std::get_if<daemon::CarriedBounds>(&found)) return *bounds;
-  text::warn(folder + "/" + daemon::kCarriedFile + ": found no record of what was carried (" +
-             std::get<std::string>(found) + ")");
-  return {};
-}
-
-History read(const Options& options) {
-  History history;
-  history.path = path_of(options);
-  const auto opened = daemon::HistoryDb::open_to_read(history.path);
-  using daemon::HistoryTrouble;
-  if (opened.trouble == HistoryTrouble::kMissing) {
-    throw Failure{kNoInput, history.path + ": found no readable history (" + opened.text +
-                                "), expected the history.db of a daemon or its folder"};
-  }
-  if (opened.db == nullptr) {
-    throw Failure{kBadInput,
-                  history.path + ": found a history that cannot be used (" + opened.text + ")"};
-  }
-  daemon::HistoryContent content = opened.db->read();
-  if (opened.trouble == HistoryTrouble::kCorrupt) {
-    if (content.rows.empty()) {
-      throw Failure{kBadInput, history.path + ": found no history (" + opened.text +
-                                   "), expected the history.db of a daemon"};
-    }
-    text::warn(history.path + ": damaged (" + opened.text + ")");
-  }
-  if (content.trouble != HistoryTrouble::kNone) {
-    throw Failure{kBadInput,
-                  history.path + ": found a history that cannot be read (" + content.text + ")"};
-  }
-  history.damaged = content.damaged;
-  history.rows = std::move(content.rows);
-  if (history.damaged > 0) {
-    text::warn(history.path + ": " + std::to_string(history.damaged) + " rows damaged or missing");
-  }
-  history.carried = carried_beside(history);
-  return history;
-}
-
-// Of the values that the wear test holds against those before.
-const HistoryRow* first_of_the_last(const History& history, Direction direction, EndStop end_stop) {
-  std::size_t left = estimator::kWearAfter;
-  for (std::size_t i = history.rows.size(); i-- > 0;) {
-    const HistoryRow& row = history.rows[i];
-    if (row.fingerprint != history.fingerprint || row.result.direction != direction ||
-        row.result.end_stop != end_stop || belt_experiment(row).kind != PeakKind::kValue) {
-      continue;
-    }
-    if (--left == 0) return &row;
-  }
-  return nullptr;
-}
-
-// As of the last experiment, so that the same file gives the same answer on any day.
-void judge(History& history) {
-  if (history.rows.empty()) return;
-  history.fingerprint = history.rows.back().fingerprint;
-  std::vector<estimator::BeltExperiment> experiments;
-  for (const HistoryRow& row : history.rows) {
-    if (row.fingerprint == history.fingerprint) experiments.push_back(belt_experiment(row));
-  }
-  history.comparable = experiments.size();
-  for (const Direction direction : {Direction::kDrive, Direction::kOverrun}) {
-    for (const EndStop end_stop : {EndStop::kOverdrive, EndStop::kLow}) {
-      Group group{direction, end_stop,
-                  fuse(experiments, direction, end_stop, history.rows.back().time_s),
-                  wear(experiments, direction, end_stop)};
-      if (group.wear.judged) group.since = first_of_the_last(history, direction, end_stop);
-      if (group.fused.known) history.groups.push_back(group);
-    }
-  }
-}
-
-std::string utc(double time_s) {
-  constexpr double kLatest_s = 4e10;  // the year 3237
-  if (!(std::abs(time_s) < kLatest_s)) return "-";
-  const auto seconds = static_cast<std::time_t>(std::floor(time_s));
-  std::tm parts{};
-  gmtime_r(&seconds, &parts);
-  std::array<char, 32> text{};
-  std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &parts);
-  return text.data();
-}
-
-std::string notes_text(std::uint32_t notes, const char* separator) {
-  std::string text;
-  for (std::size_t i = 0; i < kNoteNames.size(); ++i) {
-    if ((notes >> i & 1U) == 0) continue;
-    if (!text.empty()) text += separator;
-    text += kNoteNames[i];
-  }
-  return text;
-}
 
 std::string lower(std::string_view name) { return text::snake_case(name); }
 
@@ -274,7 +114,7 @@ std::string json_lines(const History& history) {
     }
     out += json.end_object().take() + '\n';
   }
-  for (const Group& group : history.groups) {
+  for (const HistoryGroup& group : history.groups) {
     const estimator::FusedFriction& fused = group.fused;
     json.begin_object().field("type", "fused");
     json.field("direction", lower(direction_name(group.direction)));
@@ -340,33 +180,6 @@ std::string or_dash(double value, bool given, const char* pattern) {
   return given && std::isfinite(value) ? format(pattern, value) : "-";
 }
 
-// "  4.0 % less friction since experiment 7 (2023-11-15), 99.9 % sure"; nothing where it is not
-// less.
-std::string wear_words(const Group& group) {
-  const estimator::WearTest& wear = group.wear;
-  if (!wear.found || group.since == nullptr) return {};
-  constexpr double kSurest_percent = 99.9;  // more is said of no test
-  constexpr std::size_t kDate = 10;         // of the time
-  const double sure_percent = std::min(kSurest_percent, 100.0 * (1.0 - wear.p_value));
-  return format("  %.1f %% less friction since experiment %lld (%s), %.1f %% sure\n",
-                -wear.change_percent, static_cast<long long>(group.since->id),
-                utc(group.since->time_s).substr(0, kDate).c_str(), sure_percent);
-}
-
-std::string carried_lines(const History& history) {
-  std::string out;
-  for (std::size_t group = 0; group < history.carried.size(); ++group) {
-    const daemon::CarriedBound& bound = history.carried[group];
-    if (bound.known()) {
-      out += daemon::group_text(group) + ", " + utc(bound.time_s) + ": " +
-             daemon::carried_text(bound) + '\n';
-    } else if (bound.refused_mu_star > 0.0) {
-      out += daemon::group_text(group) + ": " + daemon::refused_text(bound) + '\n';
-    }
-  }
-  return out;
-}
-
 std::string table(const History& history) {
   if (history.rows.empty()) return history.path + ": no experiment yet\n" + carried_lines(history);
   std::string out = format("%5s  %-20s  %-12s  %-11s  %-7s  %-9s  %8s  %7s  %6s  %5s  %4s  %s\n",
@@ -395,27 +208,7 @@ std::string table(const History& history) {
                   or_dash(result.oil_degC, true, "%.0f").c_str());
     out += notes + '\n';
   }
-  for (const Group& group : history.groups) {
-    const estimator::FusedFriction& fused = group.fused;
-    out += format(
-        "%s, %s: mu_max %.4f, std %.4f, 95 %% %.4f .. %.4f, from %d experiments that "
-        "scatter by %.1f %%",
-        lower(direction_name(group.direction)).c_str(),
-        lower(end_stop_name(group.end_stop)).c_str(), fused.mu_max, fused.mu_max_std,
-        fused.ci95_low, fused.ci95_high, fused.experiments, fused.repeatability_percent);
-    if (fused.drift_percent_std > 0.0) {
-      out += format("; drift %+.3f +- %.3f %% an experiment", fused.drift_percent,
-                    fused.drift_percent_std);
-    }
-    out += '\n';
-    const estimator::WearTest& wear = group.wear;
-    if (wear.judged) {
-      out += format("  the last %d against %d before: %+.1f %%, 95 %% %+.1f .. %+.1f, p %.2g: %s\n",
-                    wear.after, wear.before, wear.change_percent, wear.ci95_low, wear.ci95_high,
-                    wear.p_value, wear.found ? "WEAR" : "no wear");
-      out += wear_words(group);
-    }
-  }
+  for (const HistoryGroup& group : history.groups) out += fused_text(group);
   if (history.comparable < history.rows.size()) {
     out += format("%zu experiments under other configurations are not compared\n",
                   history.rows.size() - history.comparable);
@@ -472,7 +265,7 @@ History read_logs(const Options& options, int& exit_code) {
     text::complain(line);
     exit_code = kBadInput;
   }
-  History history = read(filled);
+  History history = read_history(filled.file, options.config);
   if (scratch) history.path = std::to_string(options.from.size()) + " logs";
   return history;
 }
@@ -482,8 +275,8 @@ void run(const Options& options) {
     throw Failure{kUsage, "history: only one of --json and --csv can be standard output"};
   }
   int exit_code = kDone;
-  History history = options.from.empty() ? read(options) : read_logs(options, exit_code);
-  judge(history);
+  History history = options.from.empty() ? read_history(options.file, options.config)
+                                         : read_logs(options, exit_code);
   // SQLite's files beside it belong to it.
   Inputs inputs{
       options.config, history.path, history.path + "-wal", history.path + "-shm",
@@ -509,7 +302,7 @@ void add_history(command_line::Command app) {
   command
       .add_option("FILE", options->file,
                   "history.db or its folder (default: the configuration's state_dir, else " +
-                      std::string(kDefaultFolder) + ")")
+                      std::string(kHistoryFolder) + ")")
       .type_name("");
   command
       .add_option("--config", options->config,

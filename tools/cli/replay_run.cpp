@@ -332,7 +332,7 @@ std::optional<daemon::RecordedRequests> to_follow(const std::vector<std::string>
   std::optional<RecordedLog> recorded = recorded_requests(paths, interface, config);
   if (!recorded && as_recorded == AsRecorded::kAlways) recorded.emplace();
   if (!recorded) return {};
-  result.requests_followed = recorded->requests.size();
+  result.requests_followed = recorded->requests;
   result.notes.push_back(result.log + ": " + followed_text(*recorded));
   return daemon::RecordedRequests(std::move(recorded->requests));
 }
@@ -476,7 +476,7 @@ std::string summary_line(const ReplayResult& result) {
       .raw(text::seconds_text(result.duration_ns))
       .key("requests_followed");
   if (result.requests_followed) {
-    json.value(*result.requests_followed);
+    json.value(result.requests_followed->size());
   } else {
     json.null();
   }

@@ -14,6 +14,7 @@
 #include "daemon/core/base/port.h"
 #include "daemon/core/config/options/config.h"
 #include "daemon/core/experiment/arming.h"
+#include "daemon/core/experiment/recorded_requests.h"
 #include "daemon/core/loop/loop.h"
 #include "daemon/core/loop/pipeline.h"
 #include "daemon/core/observe/carried_record.h"
@@ -35,7 +36,7 @@ struct ReplayResult {
   std::uint64_t lines_bad = 0;
   std::int64_t duration_ns = 0;
   // Clamp requests of the log that were followed; none: it was decided anew when to ask.
-  std::optional<std::size_t> requests_followed;
+  std::optional<std::vector<daemon::RecordedRequest>> requests_followed;
   std::string unusable;      // what was wrong with the inputs in the end; empty: nothing
   daemon::BeyondBox beyond;  // while no experiment ran and the driver's feet did not forbid one
   // What was carried without slip.

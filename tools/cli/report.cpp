@@ -1,4 +1,4 @@
-// beltgrip report: the experiments of logs as one HTML file to look at.
+// beltgrip report: drives and their experiments, or a belt's history, as one HTML file to look at.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,9 +12,12 @@
 #include "estimator/physics/least_loss.h"
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"
+#include "tools/cli/history_page.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
+#include "tools/cli/report_courses.h"
 #include "tools/cli/stop_signals.h"
+#include "tools/report/drive_page.h"
 #include "tools/report/experiment_page.h"
 #include "tools/text/terminal.h"
 
@@ -24,7 +27,7 @@ namespace {
 
 struct Options {
   std::vector<std::string> logs;
-  std::string config, method, interface;
+  std::string config, method, interface, history;
   std::string out = "report.html";
 };
 
@@ -33,77 +36,6 @@ std::string number(const char* pattern, auto... values) {
   std::snprintf(buffer, sizeof buffer, pattern, values...);
   return buffer;
 }
-
-// The belt's last value, and where.
-struct LastValue {
-  std::string name;  // of its experiment
-  double mu_max = 0.0, sigma_peak_percent = 0.0;
-  estimator::EndStop end_stop = estimator::EndStop::kOverdrive;
-};
-
-// The samples of each experiment, and what came of it.
-class Courses final : public daemon::SampleSink {
- public:
-  explicit Courses(std::string log) : log_(std::move(log)) {}
-
-  void on_report(const daemon::SampleReport& report) noexcept override {
-    if (report.in_experiment && report.curve.usable) {
-      const estimator::CurveEstimate& curve = report.curve;
-      now_.t_s.push_back(static_cast<double>(report.t) * 1e-9);
-      now_.mu_star.push_back(curve.mu_star);
-      now_.sigma_star_percent.push_back(curve.sigma_star_percent);
-      now_.friction_slope_per_percent.push_back(curve.friction_slope);
-      now_.slip_variance.push_back(curve.slip_variance);
-      now_.clamp_force_N.push_back(curve.clamp_force_N);
-      sigma_most_percent_ = std::max(sigma_most_percent_, std::abs(curve.sigma_star_percent));
-      energy_J_ = std::max(energy_J_, curve.slip_energy_J);
-      now_.phase.push_back(static_cast<std::size_t>(curve.phase));
-      end_stop_ = curve.end_stop;
-    }
-    if (!report.new_result) return;
-    finish(report.result);
-    all_.push_back(std::move(now_));
-    now_ = {};
-    energy_sum_J_ += energy_J_;
-    energy_J_ = sigma_most_percent_ = 0.0;
-  }
-  std::vector<report::ExperimentCourse> take() { return std::move(all_); }
-  // Dissipated by slip in all experiments, up to their results.
-  double energy_sum_J() const { return energy_sum_J_; }
-  const std::optional<LastValue>& last_value() const { return last_value_; }
-
- private:
-  void finish(const daemon::ExperimentResult& result) {
-    const double begin_s = static_cast<double>(result.start) * 1e-9;
-    now_.name = log_ + number(", from %.2f s on", begin_s);
-    if (result.stopped) now_.stop_s = static_cast<double>(result.end) * 1e-9;
-    const bool value = result.outcome == daemon::Outcome::kCompleted;
-    const estimator::PeakEstimate& peak = result.peak;
-    if (value) {
-      now_.peak = {peak.mu_max, peak.ci95_low, peak.ci95_high};
-      last_value_ = {now_.name, peak.mu_max, peak.sigma_peak_percent, end_stop_};
-    }
-    const bool bound = !value && peak.kind == estimator::PeakKind::kLowerBound;
-    now_.verdict = {now_.name,
-                    outcome_text(result.outcome) + ", " + reason_text(result.stop_reason),
-                    daemon::cause_text(result.stop_reason, result.cause),
-                    value   ? number("%.4f", peak.mu_max)
-                    : bound ? number("at least %.4f", peak.mu_max)
-                            : "",
-                    value ? number("%.4f .. %.4f", peak.ci95_low, peak.ci95_high) : "",
-                    result.stopped ? number("%.2f", result.sigma_stop_percent) : "",
-                    value ? number("%.2f", peak.sigma_peak_percent) : "",
-                    number("%.1f", sigma_most_percent_),
-                    number("%.0f", energy_J_)};
-  }
-
-  std::string log_;
-  report::ExperimentCourse now_;
-  std::vector<report::ExperimentCourse> all_;
-  double energy_J_ = 0.0, sigma_most_percent_ = 0.0, energy_sum_J_ = 0.0;
-  estimator::EndStop end_stop_ = estimator::EndStop::kOverdrive;
-  std::optional<LastValue> last_value_;
-};
 
 // What torque_reserve_Nm would cost least: shown, nothing chooses it.
 void add_least_loss(report::HtmlPage& page, const daemon::Config& config, const LastValue& value) {
@@ -137,35 +69,33 @@ void add_least_loss(report::HtmlPage& page, const daemon::Config& config, const 
              rows);
 }
 
-void run(const Options& options) {
+void report_logs(const Options& options) {
+  if (options.config.empty()) throw Failure{kUsage, "report: --config is required for logs"};
   end_streams_when_stopped(options.logs);
   Inputs inputs(options.logs);
   const daemon::Config config = load_configuration(options.config, options.method);
   inputs.add(config.files);
   inputs.demand_apart(options.out);
   std::vector<report::ExperimentCourse> experiments;
+  std::vector<report::Drive> drives;
   std::optional<LastValue> last_value;
-  std::string none;
-  double energy_J = 0.0;
+  report::HtmlPage page("BeltGrip: drives and experiments");
   for (const std::string& log : options.logs) {
-    Courses courses(log.substr(log.rfind('/') + 1));
+    ReportCourses courses(log.substr(log.rfind('/') + 1), config);
     ReplayOutputs outputs;
     outputs.also = &courses;
     const ReplayResult result = replay({log}, options.interface, config, outputs);
-    for (const std::string& warning : result.warnings) {
-      text::warn(warning);
-    }
-    if (result.experiments.empty()) none += log + ": " + no_experiment(result) + "\n";
+    courses.finish(result);
+    for (const std::string& warning : result.warnings) text::warn(warning);
+    if (result.experiments.empty()) page.paragraph(log + ": " + no_experiment(result));
     if (courses.last_value()) last_value = courses.last_value();
-    energy_J += courses.energy_sum_J();
-    for (auto& each : courses.take()) experiments.push_back(std::move(each));
+    drives.push_back(courses.take_drive());
+    for (auto& each : courses.take_experiments()) experiments.push_back(std::move(each));
   }
-  report::HtmlPage page("BeltGrip: experiments");
   std::array<std::string, report::kPhaseCount> phases;
   for (std::size_t i = 0; i < phases.size(); ++i) {
     phases[i] = daemon::phase_name(static_cast<estimator::Phase>(i));
   }
-  if (!none.empty()) page.paragraph(none);
   if (!config.assumed.empty()) {
     std::string assumed =
         "Assumed, as the configuration leaves them out, and inside the interval: ";
@@ -174,32 +104,45 @@ void run(const Options& options) {
     }
     page.paragraph(assumed);
   }
-  if (!experiments.empty()) {
-    page.paragraph(std::to_string(experiments.size()) + " experiments; the belt slipped away " +
-                   number("%.0f", energy_J) +
-                   " J in them, creep included, from each start to its result.");
-  }
   std::optional<report::PhaseThresholds> thresholds;
   if (config.estimator.method == estimator::Method::kPaper) {
     thresholds = {config.estimator.excitation_threshold, config.estimator.stop_slope,
                   config.estimator.peak_slope};
   }
+  for (report::Drive& drive : drives) report::add_drive(page, std::move(drive));
   report::add_experiments(page, experiments, phases, thresholds);
   if (last_value) add_least_loss(page, config, *last_value);
   write_file(options.out, inputs, page.text());
   text::print(stdout, std::to_string(experiments.size()) + " experiments: " + options.out + "\n");
 }
 
+void report_history(const Options& options) {
+  const History history = read_history(options.history, options.config);
+  write_file(options.out, {options.config, history.path}, history_page(history));
+  text::print(stdout, std::to_string(history.rows.size()) + " experiments: " + options.out + "\n");
+}
+
+void run(const Options& options) {
+  if (options.logs.empty() == options.history.empty()) {
+    throw Failure{kUsage, "report: expected logs, or --history FILE"};
+  }
+  if (!options.history.empty()) return report_history(options);
+  report_logs(options);
+}
+
 }  // namespace
 
 void add_report(command_line::Command app) {
-  const command_line::Command command =
-      app.add_subcommand("report", "The experiments of logs as one HTML file");
+  const command_line::Command command = app.add_subcommand(
+      "report", "Drives and their experiments, or a belt's history, as one HTML file");
   auto options = std::make_shared<Options>();
-  command.add_option("LOG", options->logs, "Logs as for replay").type_name("").required();
-  command.add_option("--config", options->config, "BeltGrip's configuration")
-      .type_name("FILE")
-      .required();
+  command.add_option("LOG", options->logs, "Logs as for replay").type_name("");
+  command.add_option("--config", options->config, "BeltGrip's configuration; required for logs")
+      .type_name("FILE");
+  command
+      .add_option("--history", options->history,
+                  "Instead of logs: a history.db or its folder, as for history")
+      .type_name("FILE");
   command.add_option("--method", options->method, "Instead of the configuration's")
       .type_name("METHOD")
       .one_of({"robust", "paper"});
@@ -209,6 +152,7 @@ void add_report(command_line::Command app) {
       .type_name("FILE")
       .capture_default_str();
   command.example("beltgrip report drive/trace.log --config drive/beltgrip.toml --out report.html");
+  command.example("beltgrip report --history /var/lib/beltgrip --out belt.html");
   command.callback([options] { run(*options); });
 }
 

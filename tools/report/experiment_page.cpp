@@ -5,59 +5,35 @@
 namespace beltgrip::report {
 namespace {
 
-constexpr std::size_t kPointsMax = 1500;  // per series: a browser stays quick
+constexpr std::size_t kPointsMax = 1500;  // of a curve: a browser stays quick
 
 std::size_t stride_of(const ExperimentCourse& course) {
   return std::max<std::size_t>(1, (course.t_s.size() + kPointsMax - 1) / kPointsMax);
 }
 
-Series level(std::string name, double from, double to, double y) {
-  return {std::move(name), {from, to}, {y, y}, true, true};
-}
-
-// The value and its interval across the chart.
-void add_peak(const ExperimentCourse& course, double from, double to, Chart& chart) {
-  if (!course.peak) return;
-  chart.series.push_back(level("mu_max", from, to, course.peak->mu_max));
-  chart.series.push_back(level("95 %, lower end", from, to, course.peak->low));
-  chart.series.push_back(level("95 %, upper end", from, to, course.peak->high));
-}
-
-Chart over_time(const ExperimentCourse& course, const char* title, const char* y_label,
-                const std::vector<double>& y) {
-  Chart chart{title, "time, s", y_label, {}};
-  Series line{"estimate", {}, {}, true};
-  for (std::size_t i = 0; i < course.t_s.size(); i += stride_of(course)) {
-    line.x.push_back(course.t_s[i]);
-    line.y.push_back(y[i]);
+// What the method judged by, over time: the paper's Figure 6.
+Courses over_time(const ExperimentCourse& course,
+                  const std::optional<PhaseThresholds>& thresholds) {
+  Panel traction{"traction coefficient", {{"mu*", course.mu_star}}, {}, {}, {}};
+  if (course.peak) {
+    traction.levels = {{"mu_max", course.peak->mu_max}};
+    traction.band = {course.peak->low, course.peak->high};
   }
-  if (course.stop_s && !line.y.empty()) {
-    const auto [least, most] = std::minmax_element(line.y.begin(), line.y.end());
-    chart.series.push_back({"stop", {*course.stop_s, *course.stop_s}, {*least, *most}, true, true});
-  }
-  chart.series.insert(chart.series.begin(), std::move(line));
-  return chart;
-}
-
-void add_level(Chart& chart, const ExperimentCourse& course, const char* name, double y) {
-  chart.series.push_back(level(name, course.t_s.front(), course.t_s.back(), y));
-}
-
-// What the method judged by, over time.
-std::vector<Chart> courses(const ExperimentCourse& course,
-                           const std::optional<PhaseThresholds>& thresholds) {
-  Chart traction = over_time(course, "Traction coefficient mu*", "mu*", course.mu_star);
-  add_peak(course, course.t_s.front(), course.t_s.back(), traction);
-  Chart variance = over_time(course, "Slip variance", "(%)^2", course.slip_variance);
-  Chart slope = over_time(course, "Friction slope", "1/%", course.friction_slope_per_percent);
+  Panel slip{"slip, %", {{"sigma*", course.sigma_star_percent}}, {}, {}, {}};
+  Panel force{"clamping force, N", {{"force", course.clamp_force_N}}, {}, {}, {}};
+  Panel variance{"slip variance, (%)^2", {{"variance", course.slip_variance}}, {}, {}, {}};
+  Panel slope{"friction slope, 1/%", {{"slope", course.friction_slope_per_percent}}, {}, {}, {}};
   if (thresholds) {
-    add_level(variance, course, "excited above", thresholds->excitation);
-    add_level(slope, course, "peak below", thresholds->peak_slope);
-    add_level(slope, course, "stop below", thresholds->stop_slope);
+    variance.levels = {{"excited above", thresholds->excitation}};
+    slope.levels = {{"peak below", thresholds->peak_slope}, {"stop below", thresholds->stop_slope}};
   }
-  return {std::move(traction), over_time(course, "Slip sigma*", "%", course.sigma_star_percent),
-          over_time(course, "Clamping force", "N", course.clamp_force_N), std::move(variance),
-          std::move(slope)};
+  Courses courses;
+  courses.t_s = course.t_s;
+  courses.period_s = course.period_s;
+  courses.panels = {std::move(traction), std::move(slip), std::move(force), std::move(variance),
+                    std::move(slope)};
+  if (course.stop_s) courses.marks = {{*course.stop_s, "stop"}};
+  return courses;
 }
 
 // The sample of the stop, on the curve.
@@ -69,6 +45,16 @@ void add_stop(const ExperimentCourse& course, Chart& chart) {
   chart.series.push_back({"stop", {course.sigma_star_percent[i]}, {course.mu_star[i]}});
 }
 
+// The value and its interval across the chart.
+void add_peak(const ExperimentCourse& course, double from, double to, Chart& chart) {
+  if (!course.peak) return;
+  const auto [mu_max, low, high] = *course.peak;
+  chart.series.push_back({"mu_max", {from, to}, {mu_max, mu_max}, true, true});
+  chart.series.push_back({"", {from, to}, {low, low}, true, false, true});
+  chart.series.push_back({"95 % interval", {from, to}, {high, high}, true, false, true});
+}
+
+// The paper's Figure 7.
 Chart traction_curve(const ExperimentCourse& course,
                      const std::array<std::string, kPhaseCount>& phase_names) {
   Chart chart{"Traction curve, by phase", "slip sigma*, %", "traction coefficient mu*", {}};
@@ -94,6 +80,8 @@ Chart traction_curve(const ExperimentCourse& course,
 void add_experiments(HtmlPage& page, const std::vector<ExperimentCourse>& experiments,
                      const std::array<std::string, kPhaseCount>& phase_names,
                      const std::optional<PhaseThresholds>& thresholds) {
+  if (experiments.empty()) return;
+  page.heading("Experiments");
   std::vector<std::vector<std::string>> rows;
   rows.reserve(experiments.size());
   for (const ExperimentCourse& course : experiments) rows.push_back(course.verdict);
@@ -104,9 +92,7 @@ void add_experiments(HtmlPage& page, const std::vector<ExperimentCourse>& experi
       page.paragraph("No sample of it could be used.");
       continue;
     }
-    std::vector<Chart> charts = courses(course, thresholds);
-    charts.insert(charts.begin(), traction_curve(course, phase_names));
-    page.charts(charts);
+    page.beside({traction_curve(course, phase_names)}, over_time(course, thresholds));
   }
 }
 

@@ -1,5 +1,5 @@
 // The experiments of a log as a page to look at: results in a table, and for each experiment its
-// course over time and its traction curve (the paper's Figures 6 and 7). Tools only.
+// traction curve beside its course over time (the paper's Figures 7 and 6). Tools only.
 #pragma once
 
 #include <array>
@@ -20,17 +20,25 @@ struct ExperimentCourse {
   std::vector<double> t_s, mu_star, sigma_star_percent, slip_variance, friction_slope_per_percent,
       clamp_force_N;
   std::vector<std::size_t> phase;  // 0 .. kPhaseCount - 1
+  double period_s = 0.0;           // of the samples
   std::optional<double> stop_s;
   struct Peak {
     double mu_max, low, high;  // and the 95 % interval
   };
   std::optional<Peak> peak;  // where there is a value
 };
-inline const std::vector<std::string> kVerdictHeader{"experiment",          "outcome",
-                                                     "why it ended",        "mu_max",
-                                                     "95 % interval",       "slip at the stop, %",
-                                                     "slip at the peak, %", "slip up to, %",
-                                                     "slip energy, J"};
+inline const std::vector<std::string> kVerdictHeader{"experiment",
+                                                     "outcome",
+                                                     "why it ended",
+                                                     "torque",
+                                                     "ratio",
+                                                     "mu_max",
+                                                     "95 % interval",
+                                                     "slip at the stop, %",
+                                                     "slip at the peak, %",
+                                                     "slip up to, %",
+                                                     "slip energy, J",
+                                                     "slip path, m"};
 
 // Of the paper's phases; method "robust" has none.
 struct PhaseThresholds {

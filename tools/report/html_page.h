@@ -1,10 +1,12 @@
-// A report as one HTML file that needs nothing beside it: text, tables and plots, the library that
-// draws the plots included. Tools only.
+// A report as one HTML file that needs nothing beside it: text, tables and plots, the libraries
+// that draw the plots included. Tools only.
 #pragma once
 
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "tools/report/courses.h"
 
 namespace beltgrip::report {
 
@@ -13,6 +15,7 @@ struct Series {
   std::vector<double> x, y;  // same length; what is not finite is a gap
   bool line = false;         // else points
   bool dashed = false;
+  bool band = false;  // shaded from the series before it, which is drawn only for this: no name
 };
 
 struct Chart {
@@ -28,10 +31,12 @@ class HtmlPage {
   void table(const std::vector<std::string>& header,
              const std::vector<std::vector<std::string>>& rows);
   void charts(const std::vector<Chart>& charts);  // side by side as far as there is room
-  std::string text() const;                       // the whole file
+  void courses(const Courses& courses);
+  void beside(const std::vector<Chart>& left, const Courses& right);
+  std::string text() const;  // the whole file
 
  private:
-  std::string title_, body_, data_;
+  std::string title_, body_, curves_, courses_;
   int count_ = 0;
 };
 

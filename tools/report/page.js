@@ -1,0 +1,374 @@
+'use strict';
+// Draws what the page's data say: `curves` by Chart.js, `courses` over time by dygraphs.
+
+// Told apart without red and green (Okabe and Ito); points differ in shape as well.
+const colours = ['#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00', '#56B4E9', '#000000',
+                 '#8C8C8C'];
+const shapes = ['circle', 'triangle', 'rect', 'crossRot', 'star'];
+const dashes = [5, 4];
+const bandColour = 'rgba(0, 0, 0, 0.10)', spanColour = 'rgba(0, 114, 178, 0.10)';
+// What bears the same name has the same colour in every chart of the page.
+const names = [];
+const colourOf = (name) => {
+  if (!names.includes(name)) names.push(name);
+  return colours[names.indexOf(name) % colours.length];
+};
+
+// What is not in sight is drawn once it comes there, or before it is printed.
+const waiting = new Map();
+const drawWaiting = (element) => {
+  const draw = waiting.get(element);
+  waiting.delete(element);
+  observer.unobserve(element);
+  if (draw) draw();
+};
+const observer = new IntersectionObserver(
+  (entries) => entries.filter((e) => e.isIntersecting).forEach((e) => drawWaiting(e.target)),
+  {rootMargin: '600px'});
+const drawInSight = (element, draw) => {
+  waiting.set(element, draw);
+  observer.observe(element);
+};
+
+const drawCurve = ([id, title, xLabel, yLabel, series]) => {
+  const datasets = series.map(([label, line, dashed, band, xy], place) => {
+    const points = [];
+    for (let k = 0; k + 1 < xy.length; k += 2) points.push({x: xy[k], y: xy[k + 1]});
+    const colour = band ? 'transparent' : colourOf(label);
+    return {label, data: points, showLine: line, borderColor: colour,
+            backgroundColor: band ? bandColour : colour, fill: band && label ? '-1' : false,
+            borderWidth: line ? 1.5 : 1, borderDash: dashed ? dashes : [],
+            pointStyle: shapes[place % shapes.length],
+            pointRadius: line ? 0 : points.length === 1 ? 7 : 2.5};
+  });
+  return new Chart(document.getElementById(id), {
+    type: 'scatter',
+    data: {datasets},
+    options: {
+      animation: false, maintainAspectRatio: false, normalized: true,
+      interaction: {mode: 'nearest', intersect: false},
+      plugins: {title: {display: true, text: title},
+                legend: {display: datasets.length > 1,
+                         labels: {boxWidth: 12, filter: (item) => item.text !== ''}}},
+      scales: {x: {title: {display: true, text: xLabel}}, y: {title: {display: true, text: yLabel}}}
+    }
+  });
+};
+const charts = [];
+for (const curve of curves) {
+  drawInSight(document.getElementById(curve[0]), () => charts.push(drawCurve(curve)));
+}
+
+const missing = 65535;  // code of no value
+
+// First index whose time is not before t.
+const lowerBound = (times, t) => {
+  let from = 0, to = times.length;
+  while (from < to) {
+    const middle = (from + to) >> 1;
+    if (times[middle] < t) from = middle + 1; else to = middle;
+  }
+  return from;
+};
+
+const decoded = ([name, style, low, step, text]) => {
+  const bytes = atob(text);
+  const codes = new Uint16Array(bytes.length / 2);
+  for (let i = 0; i < codes.length; ++i) {
+    codes[i] = bytes.charCodeAt(2 * i) | bytes.charCodeAt(2 * i + 1) << 8;
+  }
+  return {name, style, low, step, codes};
+};
+
+// Panels over one time axis. A view shows each sample; where they outnumber the pixels, the least
+// and the greatest of each pixel.
+class Courses {
+  constructor(spec) {
+    this.spec = spec;
+    this.times = new Float64Array(spec.count);
+    this.begins = new Set();  // of runs without a gap
+    spec.runs.forEach(([first, t], r) => {
+      const end = r + 1 < spec.runs.length ? spec.runs[r + 1][0] : spec.count;
+      for (let i = first; i < end; ++i) this.times[i] = t + (i - first) * spec.period;
+      this.begins.add(first);
+    });
+    this.panels = spec.panels.map((panel) => ({...panel, series: panel.series.map(decoded)}));
+    this.named = this.panels.find((panel) => panel.lanes.length === 0);  // has the marks' names
+    this.from = this.times[0];
+    this.to = this.times[spec.count - 1];
+    this.gap = (spec.period || 1) / 2;
+    if (!spec.period || this.from === this.to) { this.from -= this.gap; this.to += this.gap; }
+    this.graphs = [];
+    this.busy = false;
+  }
+
+  // Ranges of samples, one a pixel; null: a gap.
+  pieces(first, end, from, width) {
+    const out = [];
+    for (let i = first; i < end;) {
+      if (i > 0 && this.begins.has(i)) out.push(null);
+      const limit = from + (Math.floor((this.times[i] - from) / width) + 1) * width;
+      let j = i + 1;
+      while (j < end && this.times[j] < limit && !this.begins.has(j)) ++j;
+      out.push([i, j]);
+      i = j;
+    }
+    return out;
+  }
+  // Beside the view, as coarse as a view of everything: what one may move to.
+  view(from, to, pixels) {
+    const {times} = this;
+    const first = Math.max(0, lowerBound(times, from) - 1);
+    const end = Math.min(times.length, lowerBound(times, to) + 2);
+    const coarse = (this.to - this.from) / pixels;
+    return [...this.pieces(0, first, this.from, coarse),
+            ...this.pieces(first, end, from, (to - from) / pixels),
+            ...this.pieces(end, times.length, this.from, coarse)];
+  }
+  rows(panel, pieces) {
+    const {series, levels} = panel;
+    const heights = panel.lanes.length ? [0] : levels.map((level) => level[1]);  // lanes have no line
+    const out = [];
+    let before = this.from;
+    for (const piece of pieces) {
+      if (piece === null) {
+        out.push([before + this.gap, ...series.map(() => null), ...heights]);
+        continue;
+      }
+      const [i, end] = piece;
+      before = this.times[end - 1];
+      const head = [this.times[i]], tail = [before];
+      for (const {low, step, codes} of series) {
+        let least = missing, greatest = -1, atLeast = 0, atGreatest = 0;
+        for (let k = i; k < end; ++k) {
+          const code = codes[k];
+          if (code === missing) continue;
+          if (code < least) { least = code; atLeast = k; }
+          if (code > greatest) { greatest = code; atGreatest = k; }
+        }
+        const value = (code) => greatest < 0 ? null : low + code * step;
+        const rises = atLeast <= atGreatest;
+        head.push(value(rises ? least : greatest));
+        tail.push(value(rises ? greatest : least));
+      }
+      out.push(head.concat(heights));
+      if (end - i > 1) out.push(tail.concat(heights));
+    }
+    return out;
+  }
+
+  show(from, to) {
+    this.busy = true;
+    this.shown = [from, to];
+    const pieces = this.view(from, to, this.pixels());
+    this.graphs.forEach((graph, p) => {
+      graph.updateOptions({file: this.rows(this.panels[p], pieces), dateWindow: [from, to]});
+    });
+    this.busy = false;
+  }
+  pixels() { return Math.max(100, this.element.clientWidth - 60); }
+
+  draw(element) {
+    this.element = element;
+    this.shown = [this.from, this.to];
+    const pieces = this.view(this.from, this.to, this.pixels());
+    this.time = element.appendChild(document.createElement('div'));
+    this.time.className = 'time';
+    this.panels.forEach((panel, p) => this.drawPanel(panel, p, pieces));
+    this.tellTime();
+  }
+  tellTime(t) {
+    const {spec} = this;
+    this.time.textContent = t === undefined
+      ? matchMedia('(pointer: coarse)').matches
+        ? 'two fingers: zoom; bar below: move' : 'drag: zoom, shift and drag: move, double click: everything'
+      : spec.names.length > 0 ? spec.names[lowerBound(this.times, t)]
+      : (t + spec.offset).toFixed(3) + ' s';
+  }
+  drawPanel(panel, p, pieces) {
+    const {spec, element} = this;
+    const last = p + 1 === this.panels.length;
+    const legend = element.appendChild(document.createElement('div'));
+    legend.className = 'legend';
+    const place = element.appendChild(document.createElement('div'));
+    place.className = 'course';
+    const {lanes} = panel;
+    place.style.height = (lanes.length ? 26 * lanes.length : 120 + (last ? 0 : 16)) + (last ? 66 : 4) + 'px';
+    const labels = [...panel.series.map((s) => s.name), ...panel.levels.map((level) => level[0])];
+    if (lanes.length) labels.push('lanes');
+    const series = {};
+    panel.series.forEach(({name, style}) => {
+      series[name] = {
+        strokePattern: style === 'dashed' ? dashes : null, stepPlot: style === 'steps',
+        ...(style === 'points' ? {plotter: pointsOf, pointSize: 4} : {}),
+        ...(style === 'whiskers' ? {plotter: whiskersOf} : {}),
+        ...(style === 'hidden' ? {plotter: () => {}} : {})};
+    });
+    panel.levels.forEach(([name]) => { series[name] = {strokePattern: dashes}; });
+    if (lanes.length) series.lanes = {plotter: () => {}, pointSize: 0, highlightCircleSize: 0};
+    const axes = {
+      x: {drawAxis: last, axisLabelFormatter: (t) => String(Number(t.toPrecision(9))),
+          ticker: spec.names.length ? wholeTicks : Dygraph.numericTicks, valueFormatter: String},
+      y: {axisLabelWidth: 55, pixelsPerLabel: 22, valueFormatter: (y) => String(Number(y.toPrecision(4))),
+          ...(lanes.length ? {ticker: () => [], drawGrid: false} : {})}};
+    const graph = new Dygraph(place, this.rows(panel, pieces), {
+      labels: [spec.label, ...labels], series, axes,
+      colors: labels.map(colourOf), labelsDiv: legend, legend: 'always',
+      legendFormatter: (data) => this.legend(panel, data), strokeWidth: 1.2, xRangePad: 0,
+      dateWindow: [this.from, this.to], valueRange: lanes.length ? [0, lanes.length] : null,
+      xlabel: last ? spec.label : null, xLabelHeight: 16, highlightCircleSize: 3,
+      yRangePad: lanes.length ? 0 : 6, connectSeparatedPoints: false, drawGapEdgePoints: true,
+      showRangeSelector: last && spec.period > 0, rangeSelectorHeight: 22,
+      interactionModel: interaction,
+      underlayCallback: (context, area, g) => this.underlay(panel, context, area, g),
+      highlightCallback: (event, t, points, row) => this.point(graph, t, row),
+      unhighlightCallback: () => this.point(graph),
+      drawCallback: (g, initial) => {
+        if (this.busy || initial) return;
+        const [from, to] = g.xAxisRange();
+        if (from !== this.shown[0] || to !== this.shown[1]) {
+          this.show(Math.max(from, this.from), Math.min(to, this.to));
+        }
+      }});
+    this.graphs.push(graph);
+  }
+  // The same instant in every panel.
+  point(graph, t, row) {
+    this.tellTime(t);
+    for (const each of this.graphs) {
+      if (each === graph) continue;
+      if (t === undefined) each.clearSelection(); else each.setSelection(row);
+    }
+  }
+  legend(panel, data) {
+    const what = '<span class="what">' + escaped(panel.label) + '</span>';
+    if (panel.lanes.length) {
+      const standing = data.x === undefined ? [] : panel.lanes.filter(([, , spans]) =>
+        spans.some((t, i) => i % 2 === 0 && t <= data.x && data.x <= spans[i + 1]));
+      return what + standing.map(([name]) => '<span class="series">' + escaped(name) +
+                                 '</span>').join('');
+    }
+    const hidden = panel.series.filter((s) => s.style === 'hidden').map((s) => s.name);
+    return what + data.series.filter((s) => !hidden.includes(s.label)).map((s) =>
+      '<span class="series" style="color:' + s.color + '">' + s.dashHTML + ' ' +
+      escaped(s.label) + (s.yHTML === undefined ? '' : ' <b>' + s.yHTML + '</b>') +
+      '</span>').join('');
+  }
+  underlay(panel, context, area, graph) {
+    const {spec} = this;
+    const box = (from, to, top, height, colour) => {
+      const left = Math.max(area.x, graph.toDomXCoord(from));
+      const right = Math.min(area.x + area.w, graph.toDomXCoord(to));
+      if (right < left) return;
+      context.fillStyle = colour;
+      context.fillRect(left, top, Math.max(1, right - left), height);
+    };
+    context.save();
+    for (let i = 0; i < spec.spans.length; i += 2) {
+      box(spec.spans[i], spec.spans[i + 1], area.y, area.h, spanColour);
+    }
+    for (const [low, high] of panel.bands) {
+      const top = graph.toDomYCoord(high);
+      context.fillStyle = bandColour;
+      context.fillRect(area.x, top, area.w, graph.toDomYCoord(low) - top);
+    }
+    panel.lanes.forEach(([name, kind, spans], lane) => {
+      const top = area.y + 26 * lane;
+      let drawn = -1;  // pixel: thousands of spans are as many as there are pixels
+      for (let i = 0; i < spans.length; i += 2) {
+        const right = graph.toDomXCoord(spans[i + 1]);
+        if (right < drawn) continue;
+        box(spans[i], spans[i + 1], top + 15, 9, colours[kind]);
+        drawn = right + 0.5;
+      }
+      context.fillStyle = '#222';
+      context.font = '11px sans-serif';
+      context.fillText(name, area.x + 3, top + 12);
+    });
+    context.strokeStyle = '#222';
+    context.fillStyle = '#222';
+    context.font = '11px sans-serif';
+    context.setLineDash(dashes);
+    for (const [t, name] of spec.marks) {
+      const x = graph.toDomXCoord(t);
+      if (x < area.x || x > area.x + area.w) continue;
+      context.beginPath();
+      context.moveTo(x, area.y);
+      context.lineTo(x, area.y + area.h);
+      context.stroke();
+      const right = x + 4 + context.measureText(name).width < area.x + area.w;
+      context.textAlign = right ? 'left' : 'right';
+      if (panel === this.named) context.fillText(name, x + (right ? 3 : -3), area.y + 11);
+    }
+    context.restore();
+  }
+}
+
+const escaped = (text) =>
+  text.replace(/[&<>"]/g, (c) => ({'&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;'})[c]);
+
+// A value with its interval, in the two series after it.
+const pointsOf = (e) => {
+  e.drawingContext.fillStyle = e.color;
+  for (const p of e.points) {
+    if (!Number.isFinite(p.canvasy)) continue;
+    e.drawingContext.beginPath();
+    e.drawingContext.arc(p.canvasx, p.canvasy, 3, 0, 2 * Math.PI);
+    e.drawingContext.fill();
+  }
+};
+const whiskersOf = (e) => {
+  const {drawingContext: context, allSeriesPoints: all, seriesIndex: at} = e;
+  context.strokeStyle = e.color;
+  context.lineWidth = 1;
+  e.points.forEach((p, i) => {
+    const low = all[at + 1][i], high = all[at + 2][i];
+    if (!low || !high || !Number.isFinite(low.canvasy) || !Number.isFinite(high.canvasy)) return;
+    context.beginPath();
+    context.moveTo(p.canvasx, low.canvasy);
+    context.lineTo(p.canvasx, high.canvasy);
+    context.stroke();
+  });
+  pointsOf(e);
+};
+
+const wholeTicks = (...all) => Dygraph.numericTicks(...all).filter(({v}) => Number.isInteger(v));
+
+// One finger scrolls the page, two zoom.
+const interaction = {
+  ...Dygraph.defaultInteractionModel,
+  touchstart: (event, graph, context) => {
+    if (event.touches.length > 1) {
+      Dygraph.defaultInteractionModel.touchstart(event, graph, context);
+    }
+  }
+};
+
+const stacks = [];
+for (const spec of courses) {
+  const element = document.getElementById(spec.id);
+  drawInSight(element, () => {
+    const stack = new Courses(spec);
+    stacks.push(stack);
+    stack.draw(element);
+  });
+}
+
+// A page of paper is narrower than most windows.
+const paperWidth = 660;
+window.addEventListener('beforeprint', () => {
+  [...waiting.keys()].forEach(drawWaiting);
+  for (const {graphs} of stacks) {
+    for (const graph of graphs) graph.resize(paperWidth, graph.graphDiv.parentElement.clientHeight);
+  }
+  for (const chart of charts) chart.resize(paperWidth / 2, 250);
+});
+window.addEventListener('afterprint', () => {
+  for (const {graphs} of stacks) {
+    for (const graph of graphs) {
+      graph.graphDiv.parentElement.style.width = '';
+      graph.resize();
+    }
+  }
+  for (const chart of charts) chart.resize();
+});

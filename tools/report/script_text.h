@@ -1,0 +1,16 @@
+// Text that stands in a page: as HTML, and in its script. Tools only.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace beltgrip::report {
+
+std::string escaped(std::string_view text);  // for HTML
+// A JavaScript string that cannot end the script element either.
+std::string quoted(std::string_view text);
+// What is not finite is null. Six digits suffice for a place on a plot, not for a time.
+inline constexpr int kPlotDigits = 6, kTimeDigits = 17;
+void append_number(std::string& out, double value, int digits = kPlotDigits);
+
+}  // namespace beltgrip::report
