@@ -83,6 +83,7 @@ class Across {
     return std::find(config_.assumed.begin(), config_.assumed.end(), std::string(key)) !=
            config_.assumed.end();
   }
+  std::string swapped_too() const { return either_way_ ? ", or the two speeds are swapped" : ""; }
   void one_signal_twice();
   bool speeds();
   void lockup();
@@ -95,6 +96,7 @@ class Across {
   const daemon::Config& config_;
   Findings found_;
   bool doubtful_ = false;
+  bool either_way_ = false;  // the speeds could be swapped, and nothing else tells
 };
 
 void Across::one_signal_twice() {
@@ -136,7 +138,7 @@ bool Across::speeds() {
   const auto inside = [&](double factor, bool inverted) {
     return share_of(ratio, [&](double r) {
       const double as_meant = factor * (inverted ? 1.0 / r : r);
-      return as_meant > low * (1.0 - kStopBand) && as_meant < overdrive * (1.0 + kStopBand);
+      return as_meant > low * (1.0 - kLowBand) && as_meant < overdrive * (1.0 + kStopBand);
     });
   };
   const double least = quantile(ratio, 0.01), most = quantile(ratio, 0.99);
@@ -195,15 +197,17 @@ bool Across::speeds() {
         format("speed ratio %.3g to %.3g, end stops %s: ", least, most, stops.c_str());
     if (!causes.empty()) {
       wrong(text + causes + "?");
-    } else if (quantile(ratio, 0.5) < low * (1.0 - kStopBand) ||
+    } else if (quantile(ratio, 0.5) < low * (1.0 - kLowBand) ||
                quantile(ratio, 0.5) > overdrive * (1.0 + kStopBand)) {
       wrong(text + "a scale of one speed, or the end stops are another variator's");
     } else {
       doubt(text + format("%.0f %% of the time beyond them; a scale, or another variator's stops",
                           100.0 * (1.0 - inside_share)));
+      return false;
     }
     return true;
   }
+  either_way_ = inside(1.0, true) > kExplains && by_secondary.empty() && engine_primary.empty();
 
   // A ratio that stays where a stop would be if the shafts were swapped.
   const auto near = [](double a, double b) { return std::abs(a / b - 1.0) < kStopBand; };
@@ -237,7 +241,9 @@ bool Across::speeds() {
   // The engine against the primary.
   if (engine_primary.size() >= kWindowsLeast && closed_only && !is_one(engine_primary)) {
     const double usual_engine = quantile(engine_primary, 0.5);
-    if (near(usual_engine, kPerMinute) || near(usual_engine, 1.0 / kPerMinute)) {
+    const bool steady =
+        share_of(engine_primary, [&](double r) { return near(r, usual_engine); }) > kMostly;
+    if (steady && (near(usual_engine, kPerMinute) || near(usual_engine, 1.0 / kPerMinute))) {
       wrong(
           format("the engine turns %.3f times as fast as the primary with the lock-up closed: "
                  "1/min and rad/s mixed up?",
@@ -357,11 +363,18 @@ void Across::carried() {
       "%.2f",
       high, estimator::kBeltLeast, estimator::kBeltMost);
   const std::string causes =
-      ": unit of pressure (kPa for bar?) or torque, another pressure, piston area or radius";
+      ": unit of pressure (kPa for bar?) or torque, another pressure, piston area or radius" +
+      swapped_too();
   if (high > most) {
     wrong(text + causes);
   } else if (high > estimator::kBeltMost) {
     doubt(text + causes);
+  } else if (high < kCarriedLeast) {
+    doubt(
+        format("the belt is read as carrying a friction of %.2g at an end stop, never more: the "
+               "clamp force would be %.0f times what it needs: unit of pressure (MPa for bar?) "
+               "or torque, piston area",
+               high, estimator::kBeltLeast / high));
   }
 }
 
@@ -395,10 +408,10 @@ void Across::pressure_course() {
   const double rest = pp - by_ratio * rp - by_torque * tp;
   const double explained = pp > 0.0 ? 1.0 - rest / pp : 0.0;
   if (by_ratio > kPressureRises && explained > kCorrelationSure * kCorrelationSure) {
-    doubt(
-        format("secondary_pressure rises toward overdrive at equal torque (as ratio to the power "
-               "%.2f); there it falls: primary for secondary pressure?",
-               by_ratio));
+    doubt(format("secondary_pressure rises toward overdrive at equal torque (as ratio to the power "
+                 "%.2f); there it falls: primary for secondary pressure",
+                 by_ratio) +
+          swapped_too() + "?");
   } else if (by_torque < -kPressureRises && explained > kCorrelationSure * kCorrelationSure) {
     doubt(
         format("secondary_pressure falls where torque rises (as torque to the power %.2f): "

@@ -8,8 +8,19 @@
 
 namespace beltgrip::check {
 
-Findings judge_constants(std::span<const calibrate::Finding> measured,
-                         const daemon::Config& config) {
+namespace {
+
+double period_of(const std::string& role, const Periods& periods_s) {
+  for (std::size_t i = 0; i < periods_s.size(); ++i) {
+    if (daemon::role_name(static_cast<daemon::Role>(i)) == role) return periods_s[i];
+  }
+  return 0.0;
+}
+
+}  // namespace
+
+Findings judge_constants(std::span<const calibrate::Finding> measured, const daemon::Config& config,
+                         const Periods& periods_s) {
   Findings found;
   // Where nothing shows that the converter is closed, slip in it passes for inertia and delay.
   const bool closed_shows = std::any_of(
@@ -28,9 +39,11 @@ Findings judge_constants(std::span<const calibrate::Finding> measured,
     const double value = *each.value;
     const double sure = kConstantDeviations * each.std;
     if (each.key.starts_with("delay.")) {
-      if (std::abs(value) < std::max(sure, kDelayTold_s)) continue;
+      const std::string role = each.key.substr(6);
+      const double told_s = std::max(kDelayTold_s, kDelayToldPeriods * period_of(role, periods_s));
+      if (std::abs(value) < std::max(sure, told_s)) continue;
       found.push_back(
-          {Weight::kNote, each.key.substr(6) +
+          {Weight::kNote, role +
                               format(" tells %.0f ms %s (+- %.0f)", 1e3 * std::abs(value),
                                      value > 0.0 ? "late" : "early", 1e3 * each.std) +
                               ": delay_ms, as beltgrip calibrate writes it"});
@@ -42,8 +55,12 @@ Findings judge_constants(std::span<const calibrate::Finding> measured,
       const bool assumed =
           std::find(config.assumed.begin(), config.assumed.end(), each.key) != config.assumed.end();
       found.push_back(
-          {Weight::kDoubt, each.key + format(" reads as %.4g +- %.2g, %s %.4g", value, each.std,
-                                             assumed ? "assumed" : "configured", each.configured)});
+          {Weight::kDoubt, each.key +
+                               format(" reads as %.4g +- %.2g, %s %.4g", value, each.std,
+                                      assumed ? "assumed" : "configured", each.configured) +
+                               (ratio ? ""
+                                      : "; or the torque is read by that factor too small or too "
+                                        "large (percent of a reference torque?)")});
     } else if (std::abs(value) > std::max(sure, kZeroTold_Pa)) {
       found.push_back(
           {Weight::kDoubt, each.key + format(" reads %.3g kPa where all stands still: offset, as "

@@ -2,6 +2,7 @@
 // Tools only.
 #pragma once
 
+#include <array>
 #include <span>
 
 #include "daemon/core/config/options/config.h"
@@ -10,7 +11,9 @@
 
 namespace beltgrip::check {
 
-Findings judge_constants(std::span<const calibrate::Finding> measured,
-                         const daemon::Config& config);
+// periods_s: of each role's messages, 0 where it is not known.
+using Periods = std::array<double, daemon::kRoleCount>;
+Findings judge_constants(std::span<const calibrate::Finding> measured, const daemon::Config& config,
+                         const Periods& periods_s);
 
 }  // namespace beltgrip::check

@@ -64,6 +64,11 @@ class Judge {
   }
   double at(double share) const { return quantile(course_.spread.values(), share); }
   std::string text(double si) const { return in_unit_.text(si); }
+  // In the user's unit, and in another one beside it where that is another.
+  std::string with_unit(double si, double per_si, const char* unit) const {
+    const std::string own = text(si);
+    return binding_.unit == unit ? own : own + format(" (%.3g %s)", per_si * si, unit);
+  }
 
   void dbc_unit();
   void not_seen();
@@ -301,14 +306,15 @@ void Judge::level() {
     case Role::kPrimaryPressure:
     case Role::kSecondaryPressureCommand:
       if (at(0.99) > kPressureMost_Pa) {
-        wrong(text(at(0.99)) +
-              format(" is %.3g MPa: beyond every CVT's pump; unit or scale?", 1e-6 * at(0.99)));
+        wrong(with_unit(at(0.99), 1e-6, "MPa") + ": beyond every CVT's pump; unit or scale?");
       }
       if (at(0.5) < -kPressureLeast_Pa) {
         wrong("below zero for most of the time (" + text(at(0.5)) + "): offset or sign?");
       } else if (at(0.99) < kPressureLeast_Pa && binding_.role == Role::kSecondaryPressure) {
-        wrong("never above " + text(at(0.99)) +
-              format(" (%.3g kPa): no belt is held so; unit?", 1e-3 * at(0.99)));
+        wrong("never above " + with_unit(at(0.99), 1e-3, "kPa") + ": no belt is held so; unit?");
+      } else if (at(0.99) < kPressureUsual_Pa && binding_.role == Role::kSecondaryPressure) {
+        doubt("never above " + with_unit(at(0.99), 1e-3, "kPa") +
+              ": less than a CVT has at idle (0.1 MPa and more); unit?");
       }
       break;
     case Role::kEngineTorque:
@@ -333,12 +339,12 @@ void Judge::level() {
       break;
     case Role::kOilTemperature:
       if (at(0.5) < kOilLeast_degC || at(0.5) > kOilMost_degC) {
-        wrong(text(at(0.5)) + format(" is %.0f degC: offset or unit?", at(0.5)));
+        wrong("mostly " + with_unit(at(0.5), 1.0, "degC") + ": offset or unit?");
       }
       break;
     case Role::kVehicleSpeed:
       if (at(0.99) > kSpeedMost_m_s) {
-        wrong(text(at(0.99)) + format(" is %.0f km/h: unit?", 3.6 * at(0.99)));
+        wrong(with_unit(at(0.99), 3.6, "km/h") + ": no such car goes so fast; unit?");
       }
       break;
     case Role::kAcceleratorPedal:

@@ -36,6 +36,7 @@ inline constexpr double kPressureMost_Pa = 10e6;
 // Derived: no pump idles its secondary pulley below 0.1 MPa in drive; 20 kPa leaves room for a
 // bench (variator-facts 2.2: 0.1 to 0.65 MPa at idle).
 inline constexpr double kPressureLeast_Pa = 10e3;
+inline constexpr double kPressureUsual_Pa = 100e3;
 inline constexpr double kTorqueMost_Nm = 1000.0;
 inline constexpr double kSpeedMost_m_s = 90.0;
 inline constexpr double kOilLeast_degC = -50.0, kOilMost_degC = 170.0;
@@ -55,6 +56,8 @@ inline constexpr double kWindow_s = 0.5;
 inline constexpr std::size_t kWindowsLeast = 6;
 // Derived: slip, deformation and wear move the ratio by less beyond its end stops.
 inline constexpr double kStopBand = 0.04;
+// Derived: in LOW some 45 kN bend the pulleys by 8 % more (1.8e-6 / N, variator of the scenarios).
+inline constexpr double kLowBand = 0.12;
 // Measured (city): 2 % of the windows, at walking speed, lie beyond the stops of a healthy car.
 inline constexpr double kInStopsLeast = 0.95, kExplains = 0.95;
 // Chosen: a car stays at an end stop for long, and passes other ratios.
@@ -80,6 +83,9 @@ inline constexpr double kTorqueSigned_Nm = 8.0;
 // Derived: at the belt's best friction (0.15) a belt would slip; as read beyond it, a unit or a
 // constant is wrong. estimator/method/possible_friction.h.
 inline constexpr double kCarriedShare = 0.05;  // of the windows
+// Chosen: half of what the highest known force floor leaves in a coast-down (7.6 kN at 33 Nm in
+// overdrive: 0.027); a bar read as MPa gives a tenth of 0.03 to 0.1.
+inline constexpr double kCarriedLeast = 0.015;
 // Measured (city): secondary pressure at equal torque falls toward overdrive by -0.2 and less,
 // primary pressure rises by +0.3 and more, in log(pressure) a log(ratio).
 inline constexpr double kPressureRises = 0.15;
@@ -91,6 +97,7 @@ inline constexpr double kConstantDeviations = 3.0;
 // Derived: a delay of the torque of 5 ms is within one sample; a ratio that is off by 1 % is half
 // the slip at the peak; an inertia off by 15 % is some newton metres in a coast-down.
 inline constexpr double kDelayTold_s = 5e-3;
+inline constexpr double kDelayToldPeriods = 0.25;  // chosen: less is how a signal is sampled
 inline constexpr double kRatioOff = 0.01, kInertiaOff = 0.15;
 // Derived: 10 kPa are 113 N of clamp force, a twentieth of it in a coast-down.
 inline constexpr double kZeroTold_Pa = 10e3;

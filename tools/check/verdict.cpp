@@ -164,4 +164,19 @@ Verdict judge(const RoleWatch& watch, const std::vector<Window>& windows,
   return verdict;
 }
 
+void tell_doubts(Verdict& verdict) {
+  std::size_t doubts = 0;
+  const auto add = [&doubts](const Findings& findings) {
+    doubts += static_cast<std::size_t>(
+        std::count_if(findings.begin(), findings.end(),
+                      [](const Finding& each) { return each.weight == Weight::kDoubt; }));
+  };
+  for (const Findings& each : verdict.roles) add(each);
+  add(verdict.across);
+  if (doubts == 0 || verdict.ready == Ready::kNone) return;
+  verdict.sentence +=
+      doubts == 1 ? " But first look at the \"may be\" above."
+                  : " But first look at the " + std::to_string(doubts) + " \"may be\" above.";
+}
+
 }  // namespace beltgrip::check

@@ -30,6 +30,9 @@ Verdict judge(const RoleWatch& watch, const std::vector<Window>& windows,
               const Prospects& prospects, const daemon::Config& config, const DbcUnits& units,
               bool seen);
 
+// When all findings are there: the sentence says how many of them are doubts.
+void tell_doubts(Verdict& verdict);
+
 // What kept experiments away, with its figure, in the words of every program.
 daemon::Reason reason_of(daemon::Inhibit inhibit, const Prospects& prospects);
 // "force floor 7,280 N: the peak is reached from 116 Nm on; this drive coasts with 31 Nm"

@@ -1,6 +1,7 @@
 // beltgrip check: is a configuration fit for a car? What a log or a bus shows of every role, what
 // belongs together, which experiments the driving allows, and what is missing.
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -27,6 +28,7 @@
 #include "tools/cli/log_trouble.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
+#include "tools/cli/role_guess.h"
 #include "tools/cli/stop_signals.h"
 #include "tools/ports/replay_port.h"
 #include "tools/text/terminal.h"
@@ -42,16 +44,24 @@ struct Options {
   double live_s = 0.0;
 };
 
-// Units as the DBC files say them; the configuration keeps its own alone.
-check::DbcUnits dbc_units(const daemon::Config& config) {
-  check::DbcUnits units;
+std::vector<can::Database> databases_of(const daemon::Config& config) {
+  std::vector<can::Database> databases;
   for (const std::string& path : config.files) {
     if (!path.ends_with(".dbc")) continue;
     std::ifstream file(path, std::ios::binary);
     std::ostringstream text;
     text << file.rdbuf();
-    const can::DbcParseResult parsed = can::parse_dbc(text.str());
-    for (const can::MessageDef& message : parsed.database.messages) {
+    databases.push_back(can::parse_dbc(text.str()).database);
+  }
+  return databases;
+}
+
+// Units as the DBC files say them; the configuration keeps its own alone.
+check::DbcUnits dbc_units(const daemon::Config& config,
+                          const std::vector<can::Database>& databases) {
+  check::DbcUnits units;
+  for (const can::Database& database : databases) {
+    for (const can::MessageDef& message : database.messages) {
       for (const daemon::RoleBinding& role : config.roles) {
         if (role.uds || role.id != message.id) continue;
         const can::SignalDef* signal = message.find_signal(role.signal_name);
@@ -60,6 +70,46 @@ check::DbcUnits dbc_units(const daemon::Config& config) {
     }
   }
   return units;
+}
+
+// One shaft, or one torque, where a lock-up is closed: a name of the one for the other is no
+// mistake.
+bool may_stand_in(daemon::Role a, daemon::Role b) {
+  using daemon::Role;
+  const auto either = [a, b](Role x, Role y) { return (a == x && b == y) || (a == y && b == x); };
+  return either(Role::kPrimarySpeed, Role::kEngineSpeed) ||
+         either(Role::kPrimaryTorque, Role::kEngineTorque) ||
+         either(Role::kExperimentActive, Role::kExperimentPermitted);
+}
+
+// Signals that by their names have another role: "init" would take them for that one, and not for
+// the one that they have.
+void judge_names(const daemon::Config& config, const std::vector<can::Database>& databases,
+                 std::vector<check::Findings>& findings) {
+  std::array<std::vector<RoleCandidate>, daemon::kRoleCount> candidates;
+  for (std::size_t i = 0; i < daemon::kRoleCount; ++i) {
+    candidates[i] = guess_role(static_cast<daemon::Role>(i), databases);
+  }
+  for (std::size_t i = 0; i < config.roles.size(); ++i) {
+    const daemon::RoleBinding& role = config.roles[i];
+    const auto is_called = [&](std::size_t other) {
+      return std::any_of(
+          candidates[other].begin(), candidates[other].end(), [&role](const RoleCandidate& each) {
+            return each.message->id == role.id && each.signal->name == role.signal_name;
+          });
+    };
+    if (role.uds || is_called(static_cast<std::size_t>(role.role))) continue;
+    for (std::size_t other = 0; other < daemon::kRoleCount; ++other) {
+      const auto its = static_cast<daemon::Role>(other);
+      if (daemon::role_dimension(its) != daemon::role_dimension(role.role)) continue;
+      if (may_stand_in(its, role.role) || !is_called(other)) continue;
+      findings[i].push_back({check::Weight::kDoubt, "by its name " + role.signal_name + " is " +
+                                                        std::string(daemon::role_name(its)) +
+                                                        ", not " +
+                                                        std::string(daemon::role_name(role.role))});
+      break;
+    }
+  }
 }
 
 // The same inputs, with nothing asked of anybody. Where the car's conditions begin an experiment,
@@ -118,7 +168,12 @@ check::Findings constants(const std::vector<std::string>& logs, const daemon::Co
   std::vector<diagnose::SignalTable> tables;
   tables.reserve(logs.size());
   for (const std::string& log : logs) tables.push_back(read_log(log, config, true));
-  return check::judge_constants(calibrate::calibrate(tables, config), config);
+  check::Periods periods_s{};
+  for (const check::RoleCourse& course : watch.roles()) {
+    const double rate_Hz = course.rate_Hz();
+    if (rate_Hz > 0.0) periods_s[static_cast<std::size_t>(course.binding->role)] = 1.0 / rate_Hz;
+  }
+  return check::judge_constants(calibrate::calibrate(tables, config), config, periods_s);
 }
 
 void run(const Options& options) {
@@ -147,11 +202,14 @@ void run(const Options& options) {
     look_at_log(log, config, watch, seen);
     what += (what.empty() ? "" : ", ") + log;
   }
+  const std::vector<can::Database> databases = databases_of(config);
   check::Verdict verdict = check::judge(watch, seen.windows.values(), seen.prospects, config,
-                                        dbc_units(config), !what.empty());
+                                        dbc_units(config, databases), !what.empty());
+  judge_names(config, databases, verdict.roles);
   for (check::Finding& each : constants(options.logs, config, watch, verdict)) {
     verdict.across.push_back(std::move(each));
   }
+  check::tell_doubts(verdict);
   const check::Checked checked{config, watch, seen.prospects, verdict, what};
   if (json) {
     json->write(check::json(checked));

@@ -103,6 +103,86 @@ TEST_F(Check, FindsNothingWrongWithAnyShippedDrive) {
   }
 }
 
+// A car of another make: stops that are each other's inverse, coarse and noisy signals, a small
+// converter, much force in LOW, which bends the pulleys.
+constexpr const char* kOtherCar = R"(
+plant = "vehicle"
+name  = "other-car"
+[variator]
+ratio_low                  = 0.55
+ratio_overdrive            = 1.9
+belt_length_m              = 0.62
+centre_distance_m          = 0.150
+secondary_piston_area_m2   = 0.0095
+secondary_spring_force_N   = 800.0
+[vehicle]
+wheel_radius_m = 0.33
+final_drive    = 5.9
+mass_kg        = 1600.0
+[engine]
+overrun_torque_Nm = 28.0
+inertia_kg_m2     = 0.12
+[sensors]
+torque_noise_Nm           = 2.0
+torque_resolution_Nm      = 1.0
+primary_speed_noise_rad_s = 0.4
+pressure_noise_Pa         = 8000.0
+[driver]
+pattern          = "city"
+start_speed_km_h = 0.0
+)";
+
+TEST_F(Check, AnotherCarWithFewSignals) {
+  place.write("other.toml", kOtherCar);
+  Drive car = drive(place.path("other.toml"), "420");
+  json found = check(car);
+  EXPECT_EQ(count(found["across"], "may be: ") + count(found["across"], "wrong: "), 0)
+      << found["across"];
+  EXPECT_FALSE(has(found["sentence"], "may be")) << found["sentence"];
+  car.toml = replaced(car.toml, "control = \"command\"", "control = \"observe\"");
+  for (const char* role : {"engine_speed", "vehicle_speed", "accelerator_pedal", "brake_pressed",
+                           "lockup_closed", "experiment_permitted", "oil_temperature"}) {
+    car.toml = with_role(car.toml, role, "");
+  }
+  for (const char* message : {"TCU_State", "ESP_Vehicle"}) {  // of no role any more
+    const std::size_t at = car.toml.find(message);
+    car.toml.erase(at, car.toml.find('\n', at) - at);
+  }
+  found = check(car);
+  EXPECT_EQ(count(found["across"], "may be: ") + count(found["across"], "wrong: "), 0)
+      << found["across"];
+  EXPECT_EQ(found["ready"], "observe");
+
+  // Speeds that swapped are in the same range: what they carry and how pressure goes tell it.
+  Drive wrong = car;
+  wrong.toml = with_role(wrong.toml, "primary_speed", "\"TCU_Speed.SecondarySpeed\"");
+  wrong.toml = with_role(wrong.toml, "secondary_speed", "\"TCU_Speed.PrimarySpeed\"");
+  found = check(wrong);
+  EXPECT_GE(count(found["across"], "or the two speeds are swapped"), 1) << found["across"];
+  EXPECT_EQ(count(found["roles"]["primary_speed"]["findings"], "by its name"), 1);
+  EXPECT_TRUE(has(found["sentence"], "\"may be\" above.")) << found["sentence"];
+
+  wrong.toml = with_role(car.toml, "secondary_pressure",
+                         "{ signal = \"TCU_Pressure.SecondaryPressure\", unit = \"kPa\" }");
+  found = check(wrong);
+  EXPECT_EQ(count(found["roles"]["secondary_pressure"]["findings"], "never above"), 1)
+      << found["roles"]["secondary_pressure"];
+  EXPECT_EQ(count(found["across"], "kPa for bar?"), 1) << found["across"];
+}
+
+TEST_F(Check, PressureAndTorqueOfAnotherScale) {
+  Drive wrong = drive("coast-overdrive-unreachable");
+  wrong.toml = with_role(wrong.toml, "secondary_pressure",
+                         "{ signal = \"TCU_Pressure.SecondaryPressure\", unit = \"MPa\" }");
+  EXPECT_EQ(count(check(wrong)["across"], "MPa for bar?"), 1) << check(wrong)["across"];
+  // Half the torque: the inertia that goes with it is half as well.
+  wrong = city();
+  wrong.toml = with_role(wrong.toml, "engine_torque",
+                         "{ signal = \"ECU_Engine.EngineTorque\", scale = 0.5 }");
+  EXPECT_EQ(count(check(wrong)["across"], "percent of a reference torque?"), 1)
+      << check(wrong)["across"];
+}
+
 TEST_F(Check, TellsWhatADriveAllows) {
   // The daemon ran two experiments in these 34 s.
   const json demo = check(drive("demo"));
@@ -251,6 +331,12 @@ TEST_F(Check, BrakeAsLockUp) {
   EXPECT_EQ(count(found["across"], "brake_pressed and lockup_closed are one signal"), 1)
       << found["across"];
   EXPECT_EQ(count(found["across"], "would stall the engine"), 1) << found["across"];
+  // The wrong way round: an engine that idles is not one of another unit.
+  wrong.toml = with_role(city().toml, "lockup_closed",
+                         "{ signal = \"TCU_State.LockupClosed\", scale = -1, offset = 1 }");
+  found = check(wrong);
+  EXPECT_EQ(count(found["across"], "would stall the engine"), 1) << found["across"];
+  EXPECT_EQ(count(found["across"], "mixed up"), 0) << found["across"];
 }
 
 TEST_F(Check, AStuckCounter) {

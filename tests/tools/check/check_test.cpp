@@ -77,15 +77,19 @@ TEST(Constants, AreHeldAgainstTheConfigurationWhereTheyCanBeTrusted) {
       finding("variator.ratio_low", 0.406, 0.0002, 0.405),
       finding("variator.primary_inertia_kg_m2", 0.13, 0.005, 0.18),
       finding("delay.engine_torque", 0.03, 0.004, 0.0)};
-  EXPECT_EQ(judge_constants(measured, with_engine_speed(true)).size(), 3U);
-  const Findings found = judge_constants(measured, with_engine_speed(false));
+  EXPECT_EQ(judge_constants(measured, with_engine_speed(true), {}).size(), 3U);
+  // 30 ms are no delay of a signal that comes every 200 ms.
+  Periods slow{};
+  slow[static_cast<std::size_t>(Role::kEngineTorque)] = 0.2;
+  EXPECT_EQ(judge_constants(measured, with_engine_speed(true), slow).size(), 2U);
+  const Findings found = judge_constants(measured, with_engine_speed(false), {});
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].weight, Weight::kDoubt);
   EXPECT_EQ(found[0].text, "variator.ratio_overdrive reads as 2.31 +- 0.001, configured 2.25");
   // The inertia refused: its delay says nothing.
   const std::vector<calibrate::Finding> refused{
       finding("variator.primary_inertia_kg_m2", {}, 0.0, 0.18), measured[3]};
-  EXPECT_TRUE(judge_constants(refused, with_engine_speed(true)).empty());
+  EXPECT_TRUE(judge_constants(refused, with_engine_speed(true), {}).empty());
 }
 
 }  // namespace
