@@ -15,12 +15,12 @@ class Relink:
         commands = json.loads((build / "compile_commands.json").read_text())
         self.commands = {each["file"]: shlex.split(each["command"]) for each in commands}
 
-    def compile(self, name, copy, target, optimisation):
+    def compile(self, name, copy, target, *options):
         """`copy` as the build compiles the source `name`, without its warnings. Its errors; '': done."""
         line = self.commands[str(ROOT / name)][:]
         line[line.index("-o") + 1] = str(target)
         line[line.index("-c") + 1] = str(copy)
-        done = subprocess.run([*line, f"-I{ROOT}", "-w", optimisation], capture_output=True,
+        done = subprocess.run([*line, f"-I{ROOT}", "-w", *options], capture_output=True,
                               text=True, cwd=self.build)
         return done.stderr if done.returncode else ""
 
