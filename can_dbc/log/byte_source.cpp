@@ -37,7 +37,9 @@ class PlainSource : public ByteSource {
       throw LogOpenError{path + ": " + std::strerror(errno)};
     }
     if (S_ISDIR(status.st_mode)) throw LogOpenError{path + ": is a directory, expected a log"};
-    if (S_ISREG(status.st_mode)) ::posix_fadvise(descriptor_, 0, 0, POSIX_FADV_SEQUENTIAL);
+    if (!S_ISREG(status.st_mode)) return;
+    size_ = static_cast<double>(status.st_size);
+    ::posix_fadvise(descriptor_, 0, 0, POSIX_FADV_SEQUENTIAL);
   }
   ~PlainSource() override {
     if (owned_ && descriptor_ >= 0) ::close(descriptor_);
@@ -52,7 +54,11 @@ class PlainSource : public ByteSource {
         return 0;
       }
       const ssize_t count = ::read(descriptor_, out.data(), out.size());
-      if (count >= 0) return static_cast<std::size_t>(count);
+      if (count >= 0) {
+        taken_ += static_cast<double>(count);
+        if (size_ > 0.0) *share_read_ = std::min(1.0, taken_ / size_);
+        return static_cast<std::size_t>(count);
+      }
       if (errno == EINTR) continue;
       fault_ = std::string("cannot be read on: ") + std::strerror(errno);
       return 0;
@@ -76,6 +82,8 @@ class PlainSource : public ByteSource {
 
   static constexpr const char* kStopped = "ended by a signal, what may have followed is not read";
   int descriptor_ = -1;
+  double size_ = 0.0;  // of a file
+  double taken_ = 0.0;
   int stop_ = stop_descriptor.load();
   bool owned_ = false;
   std::string fault_;
@@ -85,7 +93,7 @@ class PlainSource : public ByteSource {
 class PeekedSource : public ByteSource {
  public:
   PeekedSource(std::unique_ptr<ByteSource> inner, std::string peeked)
-      : inner_(std::move(inner)), peeked_(std::move(peeked)) {}
+      : ByteSource(*inner), inner_(std::move(inner)), peeked_(std::move(peeked)) {}
   std::size_t read(std::span<char> out) override {
     if (given_ == peeked_.size()) return inner_->read(out);
     const std::size_t count = std::min(out.size(), peeked_.size() - given_);
@@ -108,7 +116,7 @@ class PeekedSource : public ByteSource {
 class PackedSource : public ByteSource {
  public:
   explicit PackedSource(std::unique_ptr<ByteSource> inner)
-      : inner_(std::move(inner)), packed_(kBlock) {}
+      : ByteSource(*inner), inner_(std::move(inner)), packed_(kBlock) {}
   const std::string& fault() const override { return fault_; }
   bool ready(int timeout_ms) override { return begin_ < end_ || inner_->ready(timeout_ms); }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -20,6 +21,9 @@ class ByteSource {
   // True if read() has something (or the end) within that time.
   virtual bool ready(int timeout_ms) = 0;
 
+  // How much of the file below is read, 0 to 1; no number: it is none. It outlives the source.
+  std::shared_ptr<const double> share_read() const { return share_read_; }
+
   // The next bytes, at most `most`; fewer only at the end. They are taken: with_front() gives them
   // back.
   std::string front(std::size_t most);
@@ -30,6 +34,12 @@ class ByteSource {
   static std::unique_ptr<ByteSource> open(const std::string& path);
   // Every source that is opened from now on ends with a fault once this descriptor is readable.
   static void end_with(int descriptor);
+
+ protected:
+  ByteSource() = default;
+  explicit ByteSource(const ByteSource& below) : share_read_(below.share_read_) {}
+  std::shared_ptr<double> share_read_ =
+      std::make_shared<double>(std::numeric_limits<double>::quiet_NaN());
 };
 
 }  // namespace beltgrip::can

@@ -319,8 +319,10 @@ std::string BadLine::place() const {
   return line > 0 ? std::to_string(line) : "byte " + std::to_string(byte);
 }
 
-std::unique_ptr<LogReader> LogReader::open(const std::string& path, bool notes) {
-  auto source = ByteSource::open(path);
+namespace {
+
+std::unique_ptr<LogReader> make_reader(std::unique_ptr<ByteSource> source, const std::string& path,
+                                       bool notes) {
   std::string front = source->front(kMagicMost);
   for (const BinaryFormat& format : kBinaryFormats) {
     if (!std::string_view(front).starts_with(format.magic)) continue;
@@ -329,6 +331,16 @@ std::unique_ptr<LogReader> LogReader::open(const std::string& path, bool notes) 
   }
   return std::make_unique<TextLogReader>(
       ByteSource::with_front(std::move(source), std::move(front)), notes);
+}
+
+}  // namespace
+
+std::unique_ptr<LogReader> LogReader::open(const std::string& path, bool notes) {
+  auto source = ByteSource::open(path);
+  const std::shared_ptr<const double> share_read = source->share_read();
+  auto reader = make_reader(std::move(source), path, notes);
+  reader->share_read_ = share_read;
+  return reader;
 }
 
 std::string frame_text(const CanFrame& frame) {

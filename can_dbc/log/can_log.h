@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -42,11 +43,17 @@ class LogReader {
   virtual ~LogReader() = default;
   virtual bool next(LogRecord& record) = 0;  // false at the end
   virtual const LogStats& stats() const = 0;
+  // How much of its file is read, 0 to 1; no number: it is a stream.
+  double share_read() const { return *share_read_; }
 
   // path "-" is standard input. .gz and .zst are unpacked by content, the format is found from the
   // content. Throws LogOpenError when the file is missing or unreadable.
   // notes: lines that begin with "# " come as records with a note, without that beginning.
   static std::unique_ptr<LogReader> open(const std::string& path, bool notes = false);
+
+ private:
+  std::shared_ptr<const double> share_read_ =
+      std::make_shared<double>(std::numeric_limits<double>::quiet_NaN());
 };
 
 struct LogOpenError {

@@ -4,7 +4,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <fstream>
 #include <stdexcept>
 
@@ -18,7 +17,7 @@ constexpr Milliseconds kLimit{120'000};  // a busy machine, with sanitizers
 // Chromium takes commands from descriptor 3 and answers on 4: its standard input and output here.
 std::vector<std::string> command_line(const std::string& folder) {
   const std::string exec =
-      "exec chromium --headless --no-sandbox --disable-gpu --disable-dev-shm-usage "
+      "exec chromium-headless-shell --no-sandbox --disable-gpu --disable-dev-shm-usage "
       "--no-first-run --disable-extensions --disable-background-networking "
       "--remote-debugging-pipe --user-data-dir=\"$1\" about:blank "
       "3<&0 4>&1 0</dev/null 1>/dev/null";
@@ -66,8 +65,13 @@ Browser::Browser(const std::string& folder)
   }
 }
 
+// Closed by its own means it waits for its other processes, which write into its folder.
 Browser::~Browser() {
-  chromium_.signal(SIGTERM);
+  session_.clear();
+  try {
+    call("Browser.close", json::object());
+  } catch (const std::runtime_error&) {  // it is gone already, and the test has said so
+  }
   chromium_.wait(Milliseconds{10'000});
   close(commands_);
 }

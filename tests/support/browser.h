@@ -1,4 +1,4 @@
-// A headless Chromium that a test drives as a user would: pages opened, the mouse moved, pictures
+// Headless Chromium that a test drives as a user would: pages opened, the mouse moved, pictures
 // taken; what the page complains of is kept. Spoken to over a pipe (DevTools protocol).
 #pragma once
 

@@ -17,6 +17,7 @@
 #include "tools/cli/configuration.h"
 #include "tools/cli/log_table.h"
 #include "tools/cli/output_file.h"
+#include "tools/cli/progress.h"
 #include "tools/cli/stop_signals.h"
 #include "tools/text/json_writer.h"
 #include "tools/text/terminal.h"
@@ -211,7 +212,7 @@ void run(const Options& options) {
   if (options.json == "-" && options.out == "-") {
     throw Failure{kUsage, "calibrate: only one of --json and --out can be standard output"};
   }
-  end_streams_when_stopped(options.logs);
+  end_logs_when_stopped(options.logs);
   const daemon::Config config = load_configuration(options.config, "");
   Inputs inputs(options.logs);
   inputs.add(config.files);
@@ -219,8 +220,18 @@ void run(const Options& options) {
   if (!options.json.empty()) json.emplace(options.json, inputs);
   if (!options.out.empty()) out.emplace(options.out, inputs, unless_forced(options.force));
   std::vector<diagnose::SignalTable> logs;
+  Progress progress;
+  double read_s = 0.0, newest_s = 0.0;
   for (const std::string& path : options.logs) {
-    logs.push_back(read_log(path, config, true));
+    if (!logs.empty() && stop_asked()) break;
+    logs.push_back(read_log(path, config, true, [&](double log_s, double share) {
+      const double before = static_cast<double>(logs.size());
+      progress.tell(read_s + log_s, "s of the logs", "times real time",
+                    (before + share) / static_cast<double>(options.logs.size()));
+      newest_s = log_s;
+    }));
+    read_s += newest_s;
+    progress.clear();
     for (const std::string& note : logs.back().notes) {
       text::warn(note);
     }

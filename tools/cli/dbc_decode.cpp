@@ -286,7 +286,7 @@ Output output_of(const DecodeOptions& options, const Decoder& decoder) {
 
 // One log after the other; one that cannot be used does not hide the rest.
 void decode(const DecodeOptions& options) {
-  end_streams_when_stopped(options.log_paths);
+  end_logs_when_stopped(options.log_paths);
   Decoder decoder(options);
   const Output output = output_of(options, decoder);
   Inputs inputs(options.dbc_paths);
@@ -296,6 +296,7 @@ void decode(const DecodeOptions& options) {
   std::optional<Failure> failure;
   bool any = false;
   for (const std::string& log_path : options.log_paths) {
+    if (any && stop_asked()) break;
     try {
       decode_log(decoder, options, log_path, *output.writer, out);
       any = true;

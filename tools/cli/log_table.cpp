@@ -10,8 +10,12 @@
 
 namespace beltgrip::cli {
 
-diagnose::SignalTable read_log(const std::string& path, const daemon::Config& config,
-                               bool as_read) {
+namespace {
+constexpr std::uint64_t kFramesPerWord = 1024;
+}  // namespace
+
+diagnose::SignalTable read_log(const std::string& path, const daemon::Config& config, bool as_read,
+                               const std::function<void(double, double)>& on_read) {
   const auto timeline = open_timeline({path}, "", config.identifiers, further_interface(config));
   daemon::InputMonitor inputs(config);
   if (as_read) {
@@ -24,10 +28,13 @@ diagnose::SignalTable read_log(const std::string& path, const daemon::Config& co
   diagnose::SignalTable table;
   table.name = path;
   std::optional<std::int64_t> first_ns;
-  std::uint64_t bad = 0;
+  std::uint64_t bad = 0, frames = 0;
   can::StampedFrame frame;
   while (timeline->next(frame)) {
     if (!first_ns) first_ns = frame.t_ns;
+    if (on_read && ++frames % kFramesPerWord == 0) {
+      on_read(static_cast<double>(frame.t_ns - *first_ns) * 1e-9, timeline->share_read());
+    }
     daemon::RxFrame received{frame.t_ns, frame.frame};
     received.bus = frame.bus;
     const daemon::FrameUse use = inputs.on_frame(received, faults);

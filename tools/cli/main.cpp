@@ -106,7 +106,9 @@ int run(std::vector<char*> words) {
 int main(int argc, char** argv) {
   beltgrip::cli::take_stop_signals();
   try {
-    return beltgrip::cli::run(beltgrip::cli::without_help_word(argc, argv));
+    const int exit_code = beltgrip::cli::run(beltgrip::cli::without_help_word(argc, argv));
+    beltgrip::cli::end_if_cut();
+    return exit_code;
   } catch (const std::exception& error) {
     beltgrip::text::complain(std::string("internal error: ") + error.what());
     return beltgrip::kInternal;

@@ -1,6 +1,5 @@
 // beltgrip replay: the daemon's pipeline over logs, as fast as the machine can.
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -18,6 +17,7 @@
 #include "tools/cli/configuration.h"
 #include "tools/cli/log_trouble.h"
 #include "tools/cli/output_file.h"
+#include "tools/cli/progress.h"
 #include "tools/cli/replay_run.h"
 #include "tools/cli/resumed_lines.h"
 #include "tools/cli/signals_out.h"
@@ -70,7 +70,8 @@ void run_task(Task& task, const Options& options, const daemon::Config& config,
   }
 }
 
-// Runs the tasks on some threads, reports each in its turn as soon as it is done.
+// Runs the tasks on some threads, reports each in its turn as soon as it is done. Those that a stop
+// finds unfinished are not reported.
 template <typename Report>
 void run_all(std::vector<Task>& tasks, unsigned jobs, const auto& work, const Report& report) {
   std::atomic<std::size_t> next = 0;
@@ -80,6 +81,7 @@ void run_all(std::vector<Task>& tasks, unsigned jobs, const auto& work, const Re
   const auto worker = [&] {
     for (std::size_t i = next++; i < tasks.size(); i = next++) {
       work(tasks[i]);
+      if (stop_asked() && tasks.size() > 1) return;
       const std::lock_guard lock(mutex);
       done[i] = true;
       for (; reported < tasks.size() && done[reported]; ++reported) {
@@ -132,57 +134,23 @@ class Teller {
   std::size_t told_ = 0;
 };
 
-// How far a run has come, on a terminal, where it takes longer than people wait without a word.
-class Progress final : public daemon::SampleSink {
+// How far a single run has come.
+class RunProgress final : public daemon::SampleSink {
  public:
-  explicit Progress(bool shown) : shown_(shown && isatty(STDERR_FILENO) != 0) {}
+  explicit RunProgress(Progress& progress) : progress_(progress) {}
+  void reads(const ports::LogTimeline& timeline) { timeline_ = &timeline; }
 
-  // Of a single run.
   void on_report(const daemon::SampleReport& report) noexcept override {
-    if (!shown_ || ++samples_ % kSamples != 0) return;
     if (first_ns_ == 0) first_ns_ = report.t;
-    const double log_s = static_cast<double>(report.t - first_ns_) * 1e-9;
-    const double wall_s = passed_s();
-    if (is_due(wall_s)) show(log_s, "s of the log", log_s / wall_s, "times real time", 0.0);
-  }
-  // Of several, under the lock of their reports.
-  void on_done(std::size_t done, std::size_t all) {
-    const double wall_s = passed_s();
-    if (!shown_ || !is_due(wall_s)) return;
-    const double rate = static_cast<double>(done) / wall_s;
-    show(static_cast<double>(done), ("of " + std::to_string(all) + " logs").c_str(), rate, "logs/s",
-         static_cast<double>(all - done) / rate);
-  }
-  // Before other text.
-  void clear() {
-    if (on_screen_) std::fputs("\r\x1b[K", stderr);
-    on_screen_ = false;
+    if (!progress_.steps()) return;
+    const double share = timeline_ != nullptr ? timeline_->share_read() : 0.0;
+    progress_.tell(static_cast<double>(report.t - first_ns_) * 1e-9, "s of the log",
+                   "times real time", share);
   }
 
  private:
-  static constexpr std::uint64_t kSamples = 1024;
-  static constexpr double kPatience_s = 2.0, kPause_s = 0.2;
-
-  double passed_s() const {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
-  }
-  bool is_due(double wall_s) {
-    if (wall_s < std::max(kPatience_s, next_s_)) return false;
-    next_s_ = wall_s + kPause_s;
-    return true;
-  }
-  void show(double count, const char* what, double rate, const char* unit, double left_s) {
-    std::fprintf(stderr, "\r\x1b[Kbeltgrip: %.0f %s, %.3g %s", count, what, rate, unit);
-    if (left_s > 0.0) std::fprintf(stderr, ", %.0f s left", left_s);
-    std::fflush(stderr);
-    on_screen_ = true;
-  }
-
-  bool shown_;
-  bool on_screen_ = false;
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-  double next_s_ = 0.0;
-  std::uint64_t samples_ = 0;
+  Progress& progress_;
+  const ports::LogTimeline* timeline_ = nullptr;
   std::int64_t first_ns_ = 0;
 };
 
@@ -205,6 +173,7 @@ void print_speed(std::uint64_t frames, std::chrono::steady_clock::time_point beg
 
 // The logs as one timeline onto a bus in real time; BeltGrip's own frames stay out.
 void play_logs(const Options& options) {
+  end_streams_when_stopped(options.logs);
   if (!options.json.empty() || !options.trace.empty() || !options.signals.empty() ||
       !options.log_out.empty()) {
     throw Failure{kUsage,
@@ -254,8 +223,8 @@ std::unique_ptr<signals::SignalWriter> signal_writer(const std::string& path, Ou
 }
 
 void run(const Options& options) {
-  end_streams_when_stopped(options.logs);
   if (!options.bus.empty()) return play_logs(options);
+  end_logs_when_stopped(options.logs);
   if (options.config.empty()) throw Failure{kUsage, "replay: --config is required"};
   const bool separate = options.logs.size() > 1 && !options.join;
   if (separate &&
@@ -308,12 +277,14 @@ void run(const Options& options) {
 
   Teller teller(json ? json->get() : nullptr, text_to_stdout);
   Progress progress(!options.quiet);
+  RunProgress run_progress(progress);
   ReplayOutputs outputs;
   if (trace) outputs.trace = trace->get();
   outputs.signals = signals.get();
   if (log_out) outputs.log_out = log_out->get();
   if (tasks.size() == 1) {
-    outputs.also = &progress;
+    outputs.also = &run_progress;
+    outputs.on_log = [&](const ports::LogTimeline& timeline) { run_progress.reads(timeline); };
     outputs.on_result = [&](const ReplayResult& result) {
       progress.clear();
       teller.tell(result);
@@ -329,7 +300,10 @@ void run(const Options& options) {
       tasks, std::max(jobs, 1u), [&](Task& task) { run_task(task, options, config, outputs); },
       [&](Task& task) {
         progress.clear();
-        if (++done < tasks.size()) progress.on_done(done, tasks.size());
+        if (++done < tasks.size()) {
+          progress.tell(static_cast<double>(done), "of " + std::to_string(tasks.size()) + " logs",
+                        "logs/s", static_cast<double>(done) / static_cast<double>(tasks.size()));
+        }
         if (task.failure) {
           text::complain(task.failure->text);
           if (exit_code == kDone) exit_code = task.failure->exit_code;
@@ -343,13 +317,18 @@ void run(const Options& options) {
         }
         any = true;
         frames += task.result->frames;
-        if (resumed &&
+        if (resumed && !stop_asked() &&
             !resumed->append(experiment_lines(*task.result) + summary_line(*task.result))) {
           text::complain(options.json + ": cannot write");
           exit_code = kCannotWrite;
         }
         teller.end(*task.result);
       });
+  progress.clear();
+  if (done < tasks.size()) {
+    text::complain("stopped: " + std::to_string(done) + " of " + std::to_string(tasks.size()) +
+                   " logs are done");
+  }
   if (!any && !tasks.empty()) throw Failure{exit_code, ""};  // what earlier runs left stays
   if (json) json->close();
   if (trace) trace->close();

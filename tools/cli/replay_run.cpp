@@ -372,6 +372,7 @@ ReplayResult replay(const std::vector<std::string>& paths, const std::string& in
   }
   const auto timeline =
       open_timeline(paths, interface, config.identifiers, further, daemon::wanted_frames(config));
+  if (outputs.on_log) outputs.on_log(*timeline);
   ports::ReplayPort port(*timeline, std::move(receiver));
   const can::LogStats head = timeline->stats();
   if (head.frames == 0 || port.empty()) throw no_frames(result, head, interface);

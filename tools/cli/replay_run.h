@@ -54,6 +54,7 @@ struct ReplayOutputs {
   std::FILE* log_out = nullptr;                        // candump, what the daemon would have sent
   daemon::SampleSink* also = nullptr;                  // sees every report, after the results
   std::function<void(const ReplayResult&)> on_result;  // at each, then the last
+  std::function<void(const ports::LogTimeline&)> on_log;  // before its first sample
 };
 
 // The logs as one timeline, without BeltGrip's own frames where `own` is given; those of an

@@ -71,7 +71,7 @@ void add_least_loss(report::HtmlPage& page, const daemon::Config& config, const 
 
 void report_logs(const Options& options) {
   if (options.config.empty()) throw Failure{kUsage, "report: --config is required for logs"};
-  end_streams_when_stopped(options.logs);
+  end_logs_when_stopped(options.logs);
   Inputs inputs(options.logs);
   const daemon::Config config = load_configuration(options.config, options.method);
   inputs.add(config.files);

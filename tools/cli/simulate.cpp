@@ -1,6 +1,7 @@
 // beltgrip simulate: the virtual rig or the virtual vehicle. In virtual time with the daemon's own
 // objects on the other side, as log, DBC, fitting configuration, truth and results; or in real time
 // on a bus.
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -12,6 +13,7 @@
 #include "tools/cli/configuration.h"
 #include "tools/cli/machine_model.h"
 #include "tools/cli/output_file.h"
+#include "tools/cli/progress.h"
 #include "tools/cli/replay_run.h"
 #include "tools/cli/scenario_options.h"
 #include "tools/cli/simulate_vehicle.h"
@@ -69,7 +71,8 @@ bool next_frame(sim::RigSource& source, can::StampedFrame& frame) {
 // The rig's frames as a log, written into a file as they are read.
 class RigLog final : public can::LogReader {
  public:
-  RigLog(sim::RigSource& source, std::FILE* copy) : source_(source) {
+  RigLog(sim::RigSource& source, double duration_s, std::FILE* copy)
+      : source_(source), duration_s_(duration_s) {
     if (copy != nullptr) copy_.emplace(copy);
   }
   bool next(can::LogRecord& record) override {
@@ -77,6 +80,10 @@ class RigLog final : public can::LogReader {
     if (!next_frame(source_, stamped)) return false;
     if (copy_) copy_->write(stamped.t_ns, kInterface, stamped.frame);
     if (stats_.frames++ == 0) first_ns_ = stamped.t_ns;
+    if (progress_.steps()) {
+      const double t_s = static_cast<double>(stamped.t_ns - first_ns_) * 1e-9;
+      progress_.tell(t_s, "s of the run", "times real time", t_s / duration_s_);
+    }
     record = {stamped.t_ns, stamped.frame, kInterface, false, {}};
     return true;
   }
@@ -85,6 +92,8 @@ class RigLog final : public can::LogReader {
 
  private:
   sim::RigSource& source_;
+  double duration_s_;
+  Progress progress_;
   std::optional<can::CandumpWriter> copy_;
   can::LogStats stats_;
   std::int64_t first_ns_ = 0;
@@ -99,7 +108,8 @@ Run run_rig(const Options& options, std::FILE* log, bool results) {
   Run run;
   run.configuration = sim::rig_configuration(scenario, kInterface, "vehicle.dbc");
   run.dbc = sim::shipped("paper-rig.dbc");
-  auto reader = std::make_unique<RigLog>(source, log);
+  const double end_s = std::min(machine.duration_s * machine.cycles, options.scenario.end_s());
+  auto reader = std::make_unique<RigLog>(source, end_s - options.scenario.start_s, log);
   const RigLog& frames = *reader;
   if (results) {
     std::vector<std::unique_ptr<can::LogReader>> logs;

@@ -11,6 +11,7 @@
 #include "tools/cli/bus.h"
 #include "tools/cli/configuration.h"
 #include "tools/cli/failure.h"
+#include "tools/cli/progress.h"
 #include "tools/cli/stop_signals.h"
 #include "tools/sim/configuration.h"
 #include "tools/sim/resources.h"
@@ -120,7 +121,12 @@ DriveResult drive_with_daemon(const sim::VehicleScenario& believed,
   std::optional<can::CandumpWriter> writer;
   if (log != nullptr) writer.emplace(log);
   sim::VehiclePort::Observers observers;
+  Progress progress;
   observers.on_received = [&](const daemon::RxFrame& frame) {
+    if (progress.steps()) {
+      const double t_s = static_cast<double>(frame.t) * 1e-9;
+      progress.tell(t_s, "s of the drive", "times real time", t_s / machine.duration_s);
+    }
     if (writer) writer->write(frame.t, kInterface, frame.frame);
     ++result.daemon.frames;
   };

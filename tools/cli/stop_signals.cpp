@@ -15,6 +15,7 @@
 #include <initializer_list>
 
 #include "can_dbc/log/byte_source.h"
+#include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
 
@@ -31,7 +32,8 @@ struct Slot {
 std::array<Slot, 16> slots;
 
 std::atomic<bool> in_good_order{false};
-std::atomic<int> asked{0};  // the signal
+std::atomic<bool> of_files{false};  // their end is not this signal
+std::atomic<int> asked{0};          // the signal
 std::atomic<int> descriptor{-1};
 std::atomic<void (*)()> before_end{nullptr};
 
@@ -56,6 +58,7 @@ static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_alw
 void on_signal(int number) {
   const int error = errno;
   if (!in_good_order.load() || number == SIGHUP || number == SIGPIPE) end(number);
+  if (number == SIGTERM && of_files.load()) end(number);
   if (number == SIGINT && asked.load() == SIGINT) end(number);
   asked.store(number);
   const itimerval limit{{0, 0}, number == SIGTERM ? kAfterTerm : kAfterInterrupt};
@@ -101,13 +104,30 @@ int stop_descriptor() {
   return descriptor.load();
 }
 
+namespace {
+
+bool is_stream(const std::string& log) {
+  struct stat found {};
+  const int error = log == "-" ? fstat(STDIN_FILENO, &found) : stat(log.c_str(), &found);
+  return error == 0 && !S_ISREG(found.st_mode) && !S_ISDIR(found.st_mode);
+}
+
+}  // namespace
+
 void end_streams_when_stopped(const std::vector<std::string>& logs) {
-  const bool any = std::any_of(logs.begin(), logs.end(), [](const std::string& log) {
-    struct stat found {};
-    const int error = log == "-" ? fstat(STDIN_FILENO, &found) : stat(log.c_str(), &found);
-    return error == 0 && !S_ISREG(found.st_mode) && !S_ISDIR(found.st_mode);
-  });
-  if (any) can::ByteSource::end_with(stop_descriptor());
+  if (std::any_of(logs.begin(), logs.end(), is_stream))
+    can::ByteSource::end_with(stop_descriptor());
+}
+
+void end_logs_when_stopped(const std::vector<std::string>& logs) {
+  of_files.store(!logs.empty() && std::none_of(logs.begin(), logs.end(), is_stream));
+  can::ByteSource::end_with(stop_descriptor());
+}
+
+void end_if_cut() {
+  if (!of_files.load() || !stop_asked()) return;
+  text::complain("stopped: what was read until then is used, what follows is not");
+  end(asked.load());
 }
 
 void call_when_stopped(void (*last)()) { before_end.store(last); }

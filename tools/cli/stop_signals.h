@@ -22,6 +22,10 @@ int stop_descriptor();
 // A log that comes through a pipe or standard input has no other end than such a signal: it is
 // taken as the end, and what came before is used as ever. Files only: nothing changes.
 void end_streams_when_stopped(const std::vector<std::string>& logs);
+// And logs that are all files end with SIGINT: what was read until then is used.
+void end_logs_when_stopped(const std::vector<std::string>& logs);
+// Once all is written: says that logs which are files have been cut, and ends as the signal would.
+void end_if_cut();
 
 // Called where a signal ends the program; async-signal-safe.
 void call_when_stopped(void (*last)());

@@ -33,6 +33,7 @@ class LogTimeline::Source {
     advance();
   }
   const can::LogStats& stats() const { return log_->stats(); }
+  double share_read() const { return log_->share_read(); }
 
  private:
   struct Ahead {
@@ -125,6 +126,12 @@ bool LogTimeline::next(can::StampedFrame& frame) {
   counters_.last_ns = frame.t_ns;
   ++counters_.frames;
   return true;
+}
+
+double LogTimeline::share_read() const {
+  double sum = 0.0;
+  for (const auto& source : sources_) sum += source->share_read();
+  return sum / static_cast<double>(sources_.size());
 }
 
 can::LogStats LogTimeline::stats() const {

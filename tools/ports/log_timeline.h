@@ -41,6 +41,8 @@ class LogTimeline {
   const TimelineCounters& counters() const { return counters_; }
   // Sums over the logs; first_bad of each in turn.
   can::LogStats stats() const;
+  // How much of the logs is read, 0 to 1; no number: one is a stream.
+  double share_read() const;
 
  private:
   class Source;

@@ -14,6 +14,7 @@
 #include <chrono>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <thread>
@@ -306,7 +307,64 @@ TEST_F(Stop, KeepsWhatCameThroughAPipe) {
   }
 }
 
-// One in a file has an end of its own: what an earlier run left stays.
+// What an empty line takes in it is one bit: much to read, and read in small pieces.
+std::string packed_empty_lines(std::size_t count) {
+  const std::string text(count, '\n');
+  std::string packed(count / 4 + 1000, '\0');
+  z_stream stream{};
+  constexpr int kGzip = 15 + 16, kMemory = 8;
+  EXPECT_EQ(deflateInit2(&stream, 1, Z_DEFLATED, kGzip, kMemory, Z_HUFFMAN_ONLY), Z_OK);
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
+  stream.avail_in = static_cast<uInt>(text.size());
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  return packed;
+}
+
+// Ctrl-C within a log that is a file, after its first experiment: what came before it is used,
+// whole, and the end is that by the signal. A log that had not ended is none of those that are
+// done.
+TEST_F(Stop, ByCtrlCKeepsWhatAFileGaveUntilThen) {
+  ASSERT_EQ(beltgrip({"simulate", "--scenario", "demo", "--out-dir", place.path("drive")}).status,
+            0);
+  const std::string trace = place.read("drive/trace.log");
+  const std::string whole = place.path("drive/trace.log"), long_log = place.path("long.log.gz");
+  gzFile gz = gzopen(long_log.c_str(), "wb");
+  ASSERT_EQ(gzwrite(gz, trace.data(), static_cast<unsigned>(trace.size())),
+            static_cast<int>(trace.size()));
+  ASSERT_EQ(gzclose(gz), Z_OK);
+  std::ofstream tail(long_log, std::ios::app | std::ios::binary);
+  const std::string lines_of_nothing = packed_empty_lines(std::size_t{1} << 24U);
+  for (int i = 0; i < 12; ++i) tail << lines_of_nothing;
+  tail.close();
+  const auto cut = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(),
+                     {program_path(), "replay", "--config", place.path("drive/beltgrip.toml")});
+    arguments.insert(arguments.end(), {"--json", place.path("out.json")});
+    Process process(arguments);
+    EXPECT_TRUE(process.wait_for_output("completed, overrun", kLimit)) << process.err();
+    process.signal(SIGINT);
+    EXPECT_EQ(process.wait(kLimit), 128 + SIGINT) << process.err();
+    EXPECT_NE(process.err().find("stopped: what was read until then is used"), std::string::npos);
+    return process.err();
+  };
+  const std::string said = cut({long_log, "--signals-out", place.path("signals.csv")});
+  EXPECT_NE(said.find("ended by a signal, what may have followed is not read"), std::string::npos);
+  EXPECT_TRUE(place.read("signals.csv").ends_with('\n'));
+  const std::string results = place.read("out.json");
+  EXPECT_GE(lines(results), 2);  // an experiment and the summary
+  const std::size_t last = results.rfind('\n', results.size() - 2) + 1;
+  EXPECT_TRUE(results.substr(last).starts_with("{\"type\":\"summary\"")) << results;
+  EXPECT_NE(cut({whole, long_log, "--jobs", "1"}).find("stopped: 1 of 2 logs are done"),
+            std::string::npos);
+  EXPECT_EQ(lines(place.read("out.json")), 3);
+  EXPECT_EQ(place.read("out.json").find("long.log"), std::string::npos);
+}
+
+// SIGTERM leaves nothing of a log that is a file: what an earlier run left stays.
 TEST_F(Stop, KeepsTheEarlierResultOfAFile) {
   std::string log;
   for (int i = 0; i < 2000; ++i) {

@@ -1,0 +1,36 @@
+// How far a command has come, on a terminal, where it takes longer than people wait without a word:
+// what is done, how fast, and how long the rest takes. Tools only.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+namespace beltgrip::cli {
+
+class Progress {
+ public:
+  explicit Progress(bool shown = true);
+  ~Progress() { clear(); }
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  // For loops of many short steps: true at one in a thousand of them.
+  bool steps() { return shown_ && ++steps_ % kSteps == 0; }
+  // share: of the whole, 0 to 1; no number: not known. "12 s of the log, 340 times real time, 5 s
+  // left"
+  void tell(double done, const std::string& what, const char* rate_unit, double share);
+  // Before other text.
+  void clear();
+
+ private:
+  static constexpr std::uint64_t kSteps = 1024;
+
+  bool shown_;
+  bool on_screen_ = false;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  double next_s_;
+  std::uint64_t steps_ = 0;
+};
+
+}  // namespace beltgrip::cli
