@@ -201,7 +201,7 @@ Stored stored_of(const HistoryRow& row) {
   stored.result = row.result;
   stored.samples = row.result.samples;
   stored.notes = row.notes;
-  stored.duration_s = static_cast<double>(row.result.end - row.result.start) * 1e-9;
+  stored.duration_s = seconds(row.result.end - row.result.start);
   stored.outcome = outcome_name(row.result.outcome);
   stored.stop_reason = stop_reason_name(row.result.stop_reason);
   stored.kind = kind_name(row.result.peak.kind);

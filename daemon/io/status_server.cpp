@@ -27,8 +27,6 @@ using Json = nlohmann::ordered_json;  // NaN and infinity become null
 constexpr double kMicrosecond = 1e3;
 constexpr int kWaitingMost = 8;
 
-double seconds(Duration duration) { return static_cast<double>(duration) / double{kSecond}; }
-
 Json latency(const LatencyHistogram& histogram) {
   const auto us = [](Duration duration) { return static_cast<double>(duration) / kMicrosecond; };
   Json classes = Json::array();

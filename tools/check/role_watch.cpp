@@ -17,8 +17,6 @@ constexpr std::size_t kRefusedKept = 8;
 constexpr std::size_t kIdentifiersMost = 4096;
 constexpr double kPerMedian = 1.0 / (0.6745 * 2.449489742783178);  // of second differences
 
-double seconds(MonoTime t) { return static_cast<double>(t) * 1e-9; }
-
 bool has_range(const daemon::RoleBinding& binding) { return binding.minimum < binding.maximum; }
 
 bool is_in_range(const daemon::RoleBinding& binding, std::uint64_t raw, double physical) {
@@ -63,7 +61,7 @@ void RoleWatch::end_log() {
   for (std::size_t i = 0; i < courses_.size(); ++i) {
     RoleCourse& course = courses_[i];
     if (!states_[i].heard) continue;
-    const double end_s = last_span_s_ - seconds(states_[i].heard_at - *first_);
+    const double end_s = last_span_s_ - daemon::seconds(states_[i].heard_at - *first_);
     const double before_s = states_[i].begun_s;
     if (end_s > course.silent_s) {
       course.silent_s = end_s;
@@ -87,7 +85,7 @@ void RoleWatch::on_frame(const daemon::RxFrame& frame) {
   if (frame.frame.error) return;
   ++frames_;
   if (!first_) first_ = frame.t;
-  last_span_s_ = std::max(last_span_s_, seconds(frame.t - first_.value_or(frame.t)));
+  last_span_s_ = std::max(last_span_s_, daemon::seconds(frame.t - first_.value_or(frame.t)));
   const std::pair key{frame.bus, frame.frame.id};
   if (census_.size() < kIdentifiersMost || census_.contains(key)) {
     Heard& heard = census_[key];
@@ -112,7 +110,8 @@ void RoleWatch::take_frame(RoleCourse& course, State& state, const daemon::RxFra
     ++course.values;
     ++course.in_range;
     take_time(course, state, frame.t);
-    take_value(course, state, history.newest_value(), seconds(frame.t - first_.value_or(frame.t)));
+    take_value(course, state, history.newest_value(),
+               daemon::seconds(frame.t - first_.value_or(frame.t)));
     return;
   }
   if (frame.bus != binding.bus) return;
@@ -162,7 +161,7 @@ void RoleWatch::take_frame(RoleCourse& course, State& state, const daemon::RxFra
     course.step = static_cast<double>(std::gcd(so_far, least)) * unit;
   }
   state.raw = raw;
-  take_value(course, state, value, seconds(frame.t - first_.value_or(frame.t)));
+  take_value(course, state, value, daemon::seconds(frame.t - first_.value_or(frame.t)));
 }
 
 // Counts what the daemon would refuse. False: what the frame says is not believed either.
@@ -203,13 +202,13 @@ bool RoleWatch::protection_holds(RoleCourse& course, State& state, const can::Ca
 }
 
 void RoleWatch::take_time(RoleCourse& course, State& state, MonoTime t) {
-  const double t_s = seconds(t - first_.value_or(t));
+  const double t_s = daemon::seconds(t - first_.value_or(t));
   if (!state.heard) {
     state.heard = true;
     state.begun_s = t_s;
     course.first_s = course.span_s == 0.0 ? t_s : course.first_s;
   } else {
-    const double interval_s = seconds(t - state.heard_at);
+    const double interval_s = daemon::seconds(t - state.heard_at);
     course.intervals_s.add(interval_s);
     course.span_s += interval_s;
     course.longest_gap_s = std::max(course.longest_gap_s, interval_s);

@@ -17,8 +17,6 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-double seconds(std::int64_t t_ns) { return static_cast<double>(t_ns) * 1e-9; }
-
 std::string number(const char* pattern, auto... values) {
   char buffer[64];
   std::snprintf(buffer, sizeof buffer, pattern, values...);
@@ -56,7 +54,7 @@ ReportCourses::ReportCourses(std::string log, const daemon::Config& config)
 }
 
 void ReportCourses::on_report(const daemon::SampleReport& report) noexcept {
-  const double t_s = seconds(report.t);
+  const double t_s = daemon::seconds(report.t);
   take_wear(report);
   take_drive_sample(report, t_s);
   take_lanes(report, t_s);
@@ -136,8 +134,8 @@ void ReportCourses::take_lanes(const daemon::SampleReport& report, double t_s) {
 }
 
 void ReportCourses::take_result(const daemon::ExperimentResult& result) {
-  now_.name = log_ + number(", from %.2f s on", seconds(result.start));
-  if (result.stopped) now_.stop_s = seconds(result.end);
+  now_.name = log_ + number(", from %.2f s on", daemon::seconds(result.start));
+  if (result.stopped) now_.stop_s = daemon::seconds(result.end);
   const bool value = result.outcome == daemon::Outcome::kCompleted;
   const estimator::PeakEstimate& peak = result.peak;
   if (value) {
@@ -161,7 +159,7 @@ void ReportCourses::take_result(const daemon::ExperimentResult& result) {
                   number("%.0f", of_this_.energy_J),
                   number("%.2f", of_this_.path_m)};
   drive_.results.push_back(
-      {seconds(result.end), mu_max.empty() ? outcome_text(result.outcome) : mu_max});
+      {daemon::seconds(result.end), mu_max.empty() ? outcome_text(result.outcome) : mu_max});
   experiments_.push_back(std::move(now_));
   now_ = {};
   now_.period_s = period_s_;

@@ -74,6 +74,6 @@ static_assert(kRequestLongest <= kMonitorLongest &&
               kMonitorLongest < static_cast<Duration>(kGateFrames) * kClampPeriod);
 static_assert(kGateStartShare < kMonitorStartShare && kMonitorStartShare < 1.0);
 static_assert(kMonitorSpeedShare < kRequestSpeedShare && kRequestSpeedShare < 1.0);
-static_assert(static_cast<double>(kClampPeriod) * 1e-9 < kGateFramePeriod_s);
+static_assert(seconds(kClampPeriod) < kGateFramePeriod_s);
 
 }  // namespace beltgrip::daemon::limits

@@ -12,4 +12,8 @@ using Duration = std::int64_t;  // ns
 inline constexpr Duration kMillisecond = 1'000'000;
 inline constexpr Duration kSecond = 1'000'000'000;
 
+constexpr double seconds(Duration duration) noexcept {
+  return static_cast<double>(duration) / double{kSecond};
+}
+
 }  // namespace beltgrip::daemon

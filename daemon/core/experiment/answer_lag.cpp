@@ -6,7 +6,6 @@
 namespace beltgrip::daemon {
 
 namespace {
-constexpr double kSecondsPerTick = 1e-9;
 // Larger ones tell the lag later or not at all. What a fifth more or less of each changes has not
 // been measured.
 // Derived: of the configured lag; e^-3, 5 % of the first answer, is left.
@@ -25,10 +24,10 @@ void AnswerLag::begin(MonoTime t, double configured_s) noexcept {
 }
 
 void AnswerLag::step(MonoTime t, double rate_N_per_s, double behind_N) noexcept {
-  const double step_s = static_cast<double>(t - last_) * kSecondsPerTick;
+  const double step_s = seconds(t - last_);
   last_ = t;
   rate_N_per_s_ -= std::expm1(-step_s / configured_s_) * (rate_N_per_s - rate_N_per_s_);
-  if (static_cast<double>(t - begun_) * kSecondsPerTick < kSettle * configured_s_) return;
+  if (seconds(t - begun_) < kSettle * configured_s_) return;
   n_ += 1.0;
   const double rate_off = rate_N_per_s_ - rate_mean_, behind_off = behind_N - behind_mean_;
   rate_mean_ += rate_off / n_;

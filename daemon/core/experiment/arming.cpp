@@ -37,7 +37,6 @@ constexpr double kFallLeast = 0.4;  // per unit of slip
 // its crossing. With the whole of it 34 of 60 drawn cars were not asked.
 constexpr double kFaultShare = 0.5;
 constexpr double kSlipMean = 5e8;  // ns
-constexpr double kSecondsPerTick = 1e-9;
 constexpr double kPercent = 100.0;
 // A request begins at the own force and falls from there: what that falls by itself within the
 // actuator's answer must stay far inside the band in which a force counts as following. A coasting
@@ -155,7 +154,7 @@ void Arming::look(const Now& now) noexcept {
   const RampPoint soon = point_at(now, std::max(least_rad_s, now.omega_p_rad_s - ramp_rad_s));
   const double spare_rad_s = slowing * (kBeyondPeak_s + kSpare_s);
   // What a request that began now could ride the floor to.
-  const double longest_s = static_cast<double>(limits::kRequestLongest) * kSecondsPerTick;
+  const double longest_s = seconds(limits::kRequestLongest);
   const double ridden_rad_s =
       std::max(least_rad_s + spare_rad_s, now.omega_p_rad_s - slowing * longest_s);
   const RampPoint latest = point_at(now, std::min(ridden_rad_s, soon.omega_p_rad_s));
@@ -196,7 +195,7 @@ RampPoint Arming::point_at(const Now& now, double omega_p_rad_s) const noexcept 
 Reaction Arming::reaction(const Now& now) const noexcept {
   Reaction reaction;
   reaction.detection_s = kDetection_s;
-  reaction.stale_s = static_cast<double>(now.stale) * kSecondsPerTick;
+  reaction.stale_s = seconds(now.stale);
   reaction.dead_time_s = settings_.actuator_dead_time_s;
   reaction.lag_s = settings_.actuator_lag_s;
   return reaction;
@@ -217,7 +216,7 @@ double Arming::ramp_s(const RampPoint& point, double slip_rate_1_s) const noexce
 
 // Of the primary, since the trigger held.
 double Arming::slowing_rad_s2(const Now& now) const noexcept {
-  const double held_s = static_cast<double>(now.t - held_since_) * kSecondsPerTick;
+  const double held_s = seconds(now.t - held_since_);
   return held_s > 0.0 ? std::max(0.0, (omega_p_since_ - now.omega_p_rad_s) / held_s) : 0.0;
 }
 
@@ -229,7 +228,7 @@ std::uint32_t Arming::clearance(const Now& now) noexcept {
       slowing > 0.0 ? (now.omega_p_rad_s - settings_.primary_speed_min_rad_s) / slowing : 1e9;
   const double planned_1_s = crossing.slip_rate_1_s > 0.0 ? crossing.slip_rate_1_s : kPlanned_1_s;
   const double needed_s = ramp_s(point, planned_1_s) + kBeyondPeak_s;
-  const double patience_s = static_cast<double>(kPatience) * kSecondsPerTick;
+  const double patience_s = seconds(kPatience);
   const bool slows = slowing * patience_s > (1.0 - kFurther) * now.omega_p_rad_s;
   const bool waits = slows && now.t - held_since_ < kSettle + kWaits &&
                      needed_s + kSpare_s < left_s &&
@@ -241,7 +240,7 @@ std::uint32_t Arming::clearance(const Now& now) noexcept {
     return inhibit_bit(Inhibit::kRamp);
   }
   plan_ = {crossing, point.mu_expected, point.mu_least, point.primary_radius_m};
-  const double longest_s = static_cast<double>(limits::kRequestLongest) * kSecondsPerTick;
+  const double longest_s = seconds(limits::kRequestLongest);
   if (needed_s <= std::min(left_s, longest_s)) return 0U;
   obstacle_ = {needed_s, std::min(left_s, longest_s)};
   return inhibit_bit(Inhibit::kTime);
@@ -276,7 +275,7 @@ double Arming::force_noise_N() const noexcept {
 // shows in the short ones, a slow one in the long ones. Each less what noise may have made of it.
 bool Arming::force_at_rest() const noexcept {
   if (force_count_ < kForceBlocks) return false;
-  constexpr double kBlock_s = static_cast<double>(kForceBlock) * kSecondsPerTick;
+  constexpr double kBlock_s = seconds(kForceBlock);
   const double noise_N = force_noise_N();
   for (std::size_t length = 2; length <= kForceLookMost; ++length) {
     const double n = static_cast<double>(length), middle = 0.5 * (n - 1.0);

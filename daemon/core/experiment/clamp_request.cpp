@@ -8,7 +8,6 @@ namespace beltgrip::daemon {
 using estimator::StopReason;
 
 namespace {
-constexpr double kSecondsPerTick = 1e-9;
 constexpr double kPercent = 100.0;
 // What the slip since the start leaves out: slip at the start, and the deformation that is gone.
 constexpr double kSlipAtStart = 0.01;
@@ -159,7 +158,7 @@ Stop ClampRequest::judge_room(const Now& now) const noexcept {
 
 // The floor falls by itself with the speed: a request rides on it for as long as it does.
 Stop ClampRequest::judge_floor(const Now& now, double floor_N) const noexcept {
-  const double rode_s = rides_ ? static_cast<double>(now.t - rides_since_) * kSecondsPerTick : 0.0;
+  const double rode_s = rides_ ? seconds(now.t - rides_since_) : 0.0;
   const bool stays =
       rode_s > kFloorPatience_s && floor_first_N_ - floor_N < kFloorFalls_N_per_s * rode_s;
   const bool over =
@@ -181,8 +180,8 @@ Stop ClampRequest::judge(const Now& now, double floor_N) const noexcept {
   if (now.t - begun_ >= limits::kRequestLongest) {
     return {StopReason::kTime,
             {.what = "request stood for",
-             .figure = static_cast<double>(now.t - begun_) * kSecondsPerTick,
-             .limit = static_cast<double>(limits::kRequestLongest) * kSecondsPerTick,
+             .figure = seconds(now.t - begun_),
+             .limit = seconds(limits::kRequestLongest),
              .unit = "s"}};
   }
   if (const Stop stop = judge_course(now)) return stop;
@@ -252,7 +251,7 @@ std::optional<Role> ClampRequest::untrue_speed(const Now& now, double drift) con
 
 // The force that the ramp has come to, not below the floor.
 double ClampRequest::lowered_N(const Now& now, double floor_N) noexcept {
-  const double step_s = static_cast<double>(now.t - last_) * kSecondsPerTick;
+  const double step_s = seconds(now.t - last_);
   far_ = far_ && peak_is_far(law_, std::abs(now.mu_star), slip_.rate_1_s());
   const double wanted_N_per_s =
       far_ ? law_.rate_max_N_per_s
@@ -261,7 +260,7 @@ double ClampRequest::lowered_N(const Now& now, double floor_N) noexcept {
 }
 
 void ClampRequest::go_to(const Now& now, double floor_N, double force_N) noexcept {
-  const double step_s = static_cast<double>(now.t - last_) * kSecondsPerTick;
+  const double step_s = seconds(now.t - last_);
   const double before_N = force_N_;
   const bool rode = rides_;
   rides_ = force_N_ <= floor_N + kFloorNoise_N;
@@ -273,7 +272,7 @@ void ClampRequest::go_to(const Now& now, double floor_N, double force_N) noexcep
   rate_N_per_s_ = step_s > 0.0 ? (before_N - force_N_) / step_s : 0.0;
   const Asked& before = asked(0);
   if (now.t - before.t >= kCoursePeriod) {
-    const double over_s = static_cast<double>(now.t - before.t) * kSecondsPerTick;
+    const double over_s = seconds(now.t - before.t);
     asked_[asked_count_ % kAsked] = {now.t, force_N_, (before.force_N - force_N_) / over_s};
     ++asked_count_;
   }
@@ -300,7 +299,7 @@ void ClampRequest::follow(const Now& now, double floor_N, double force_N) noexce
 double ClampRequest::follow_band_N() const noexcept {
   const std::size_t age =
       std::min(asked_count_, static_cast<std::size_t>(kRecent / kCoursePeriod)) - 1;
-  const double over_s = static_cast<double>(last_ - asked(age).t) * kSecondsPerTick;
+  const double over_s = seconds(last_ - asked(age).t);
   const double behind_N =
       over_s > 0.0 ? std::min(1.0, answer_s() / over_s) * (asked(age).force_N - force_N_) : 0.0;
   return kFollowBand * force_N_ + kFollowBand_N + behind_N;
@@ -357,7 +356,7 @@ bool ClampRequest::stuck(const Now& now) const noexcept {
 
 void ClampRequest::travel(MonoTime t, double speed_m_s) noexcept {
   if (travelled_) {
-    const double step_s = static_cast<double>(t - last_travel_) * kSecondsPerTick;
+    const double step_s = seconds(t - last_travel_);
     rest_s_ += step_s;
     rest_m_ += std::max(0.0, speed_m_s) * step_s;
   }

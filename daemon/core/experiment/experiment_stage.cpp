@@ -300,7 +300,7 @@ void ExperimentStage::judge_following(const Now& now, RoleSet& still) noexcept {
     still.set(static_cast<std::size_t>(Role::kSecondaryPressure));
     withdraw({StopReason::kInputFrozen,
               {.what = "stands still while the request falls, for",
-               .figure = static_cast<double>(pressure.stood_for()) * 1e-9,
+               .figure = seconds(pressure.stood_for()),
                .unit = "s",
                .role = Role::kSecondaryPressure}});
     return;

@@ -7,7 +7,6 @@
 namespace beltgrip::daemon {
 
 namespace {
-constexpr double kSecondsPerTick = 1e-9;
 constexpr Duration kSlipMean = 15 * kMillisecond;
 constexpr double kWhole = 0.8;          // of kRateOver: a rate is known
 constexpr double kSquares = 100.0;      // half a second at 200 Hz
@@ -36,7 +35,7 @@ void SlipCourse::step(MonoTime t, double ratio) noexcept {
     const Point& each = point(age);
     const Duration before = t - each.t;
     if (before > kRateOver) break;
-    const double at_s = -static_cast<double>(before) * kSecondsPerTick;
+    const double at_s = -seconds(before);
     const double slip = each.slip;
     oldest_s = at_s;
     n += 1.0;
@@ -50,7 +49,7 @@ void SlipCourse::step(MonoTime t, double ratio) noexcept {
   }
   slip_ = recent / recent_n;
   slip_max_ = std::max(slip_max_, slip_);
-  const bool whole = -oldest_s > kWhole * static_cast<double>(kRateOver) * kSecondsPerTick;
+  const bool whole = -oldest_s > kWhole * seconds(kRateOver);
   rate_1_s_ = whole ? (n * sum_tx - sum_t * sum_x) / (n * sum_tt - sum_t * sum_t) : 0.0;
   newest.rate_1_s = rate_1_s_;
   // The rate of the window before: noise apart, slip hardly changes its rate from one to the next.

@@ -16,7 +16,6 @@ constexpr double kRateMean_s = 0.04;
 // Chosen, ns: ten frames of the pressure; the own force moves by 15 N within it before a request.
 constexpr double kActingMean = 1e8;
 constexpr double kRounding_N = 1.0;  // requests are whole newtons on the wire
-constexpr double kSecondsPerTick = 1e-9;
 }  // namespace
 
 void SafetyMonitor::end(MonoTime t) noexcept {
@@ -141,8 +140,7 @@ SafetyVerdict SafetyMonitor::judge_motion(MonoTime t, const SafetySignals& signa
 
 // The rate of a lag that follows the drift, through another.
 bool SafetyMonitor::slips_away(MonoTime t, double drift) noexcept {
-  const double share =
-      std::min(1.0, static_cast<double>(t - last_) * kSecondsPerTick / kRateMean_s);
+  const double share = std::min(1.0, seconds(t - last_) / kRateMean_s);
   slip_rate_1_s_ += share * ((drift - slip_mean_) / kRateMean_s - slip_rate_1_s_);
   slip_mean_ += share * (drift - slip_mean_);
   return drift > limits_.slip_rate_from && slip_rate_1_s_ > limits_.slip_rate_max_1_s;
@@ -152,8 +150,7 @@ SafetyVerdict SafetyMonitor::judge_request(MonoTime t, double request_N, double 
   if (t - begun_ > limits_.duration_max) return SafetyVerdict::kDuration;
   if (request_N < floor_N) return beyond(SafetyVerdict::kFloor, request_N, floor_N);
   if (request_N > last_request_N_) return SafetyVerdict::kRise;
-  const double fall_max_N =
-      limits_.rate_max_N_per_s * static_cast<double>(t - last_) * kSecondsPerTick;
+  const double fall_max_N = limits_.rate_max_N_per_s * seconds(t - last_);
   if (last_request_N_ - request_N > fall_max_N + kRounding_N) return SafetyVerdict::kRate;
   last_request_N_ = request_N;
   return SafetyVerdict::kAllowed;

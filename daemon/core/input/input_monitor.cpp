@@ -24,7 +24,6 @@ constexpr Duration kSpikeLongest = 60 * kMillisecond;
 constexpr std::array kWatched{Role::kPrimarySpeed, Role::kSecondarySpeed, Role::kEngineSpeed,
                               Role::kSecondaryPressure};
 constexpr double kOtherDeviations = 3.0;  // taken off what another signal says of a motion
-constexpr double kSecondsPerTick = 1e-9;
 
 std::size_t spike_values(Duration period) noexcept {
   const Duration whole = std::max<Duration>(period, 1);
@@ -320,8 +319,7 @@ double InputMonitor::should_have_moved(Role role, MonoTime t) const noexcept {
   const MonoTime since = row(role).course.since();
   if (role == Role::kSecondaryPressure) {
     const Duration asked = t - watch_.answer - std::max(since, watch_.request_begun);
-    return watch_.fall_Pa_per_s * static_cast<double>(std::max<Duration>(0, asked)) *
-           kSecondsPerTick;
+    return watch_.fall_Pa_per_s * seconds(std::max<Duration>(0, asked));
   }
   if (role == Role::kEngineSpeed) return std::abs(moved_since(Role::kPrimarySpeed, since));
   const double ratio = secondary.course.value() / primary.course.value();
@@ -446,9 +444,6 @@ std::optional<Role> InputMonitor::frozen() const noexcept {
 
 Stop InputMonitor::lost(MonoTime t) const noexcept {
   using estimator::StopReason;
-  const auto seconds = [](Duration duration) {
-    return static_cast<double>(duration) * kSecondsPerTick;
-  };
   if (const auto role = frozen()) {
     return {StopReason::kInputFrozen,
             {.what = "stands still for",

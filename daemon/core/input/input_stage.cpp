@@ -91,7 +91,7 @@ bool InputStage::starved(MonoTime t) const noexcept {
 Stop InputStage::starved_for(MonoTime t) const noexcept {
   return {StopReason::kInputs,
           {.what = "reads what gives no sample for",
-           .figure = static_cast<double>(t - last_usable_) * 1e-9,
+           .figure = seconds(t - last_usable_),
            .unit = "s",
            .role = Role::kPrimarySpeed}};
 }

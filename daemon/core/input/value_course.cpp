@@ -26,7 +26,6 @@ constexpr Duration kSpan = 2 * kSecond;
 // What has no inertia rests between two steps for as long as it likes.
 constexpr double kTimesLongest = 1.2, kTimesLongestRest = 3.0, kTimesHeld = 3.0;
 constexpr std::size_t kHolds = 8;
-constexpr double kSecondsPerTick = 1e-9;
 constexpr int kMeans = 8;  // along the motion
 // A value that goes to and fro between two neighbouring steps lies near their edge. How large its
 // noise is it does not say: in the middle of a step it may rest for ever.
@@ -100,7 +99,7 @@ double ValueCourse::slope_per_s() const noexcept {
   for (std::size_t age = 0; age < std::min(count_, kPoints); ++age) {
     const Point& each = point(age);
     if (since_ - each.t > kSlopeOver) break;
-    const double t = static_cast<double>(each.t - since_) * kSecondsPerTick;
+    const double t = seconds(each.t - since_);
     const double x = each.value - value_;
     n += 1.0;
     sum_t += t;
@@ -155,9 +154,9 @@ std::optional<Duration> ValueCourse::shown_after(Duration period) const noexcept
   double by_motion = kNotAtAll, by_noise = kNotAtAll;
   if (const double slope = has_inertia_ ? slope_per_s() : 0.0; slope > 0.0) {
     const double after_s = moving(sigma) / slope;
-    if (after_s < static_cast<double>(kSlopeOver) * kSecondsPerTick) {
+    if (after_s < seconds(kSlopeOver)) {
       by_motion =
-          std::max(after_s / kSecondsPerTick, kTimesHeld * static_cast<double>(usual_hold()));
+          std::max(after_s * double{kSecond}, kTimesHeld * static_cast<double>(usual_hold()));
     }
   }
   if (sigma > 0.0) {
@@ -179,8 +178,8 @@ bool ValueCourse::stands_still(double moved, bool goes_on) const noexcept {
   if (!rests()) return false;
   const Duration stood = stood_for();
   const double sigma = noise();
-  const double seconds = static_cast<double>(std::min(stood, kSlopeOver)) * kSecondsPerTick;
-  const double most = std::max(moved, goes_on && has_inertia_ ? slope_per_s() * seconds : 0.0);
+  const double stood_s = seconds(std::min(stood, kSlopeOver));
+  const double most = std::max(moved, goes_on && has_inertia_ ? slope_per_s() * stood_s : 0.0);
   const auto times = [stood](Duration duration) {
     return static_cast<double>(stood) / static_cast<double>(std::max<Duration>(duration, 1));
   };

@@ -19,8 +19,8 @@ namespace fs = std::filesystem;
 
 // What is not a name of a file that is written.
 // Inputs; and what status_test looks at, with a server.
-const std::set<std::string> kNoOutputs{"--config", "--model", "--held-out",
-                                       "--truth",  "--dbc",   "--prometheus"};
+const std::set<std::string> kNoOutputs{"--config", "--model",   "--held-out",  "--truth",
+                                       "--dbc",    "--history", "--prometheus"};
 constexpr const char* kMark = "not to be lost\n";
 
 struct Output {

@@ -19,8 +19,6 @@ constexpr Duration kSample = 5 * kMillisecond;
 constexpr double kRate_1_s = 0.025;
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
-double seconds(Duration d) { return 1e-9 * static_cast<double>(d); }
-
 // Slip that grows by kRate_1_s from the start on, and noise on it.
 struct Ramp {
   explicit Ramp(Duration sample, double noise = 0.0, unsigned seed = 1)
