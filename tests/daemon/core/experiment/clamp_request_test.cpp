@@ -70,6 +70,20 @@ TEST_F(Request, FallsFastThenSlowlyToTheFloorAndEndsThere) {
   EXPECT_NEAR(at_floor, 201, 2);
 }
 
+// 0.85 of the largest friction expected is near, once for all; below 0.8 of the least none lies.
+TEST_F(Request, IsSlowWhereAPeakMayLie) {
+  const auto fallen_N = [&](double mu_star) {
+    const double before_N = request_.force_N();
+    now_.mu_star = mu_star;
+    sample();
+    return before_N - request_.force_N();
+  };
+  EXPECT_NEAR(fallen_N(0.0934), 3.0, 1e-6);
+  EXPECT_NEAR(fallen_N(0.0936), 1.0, 1e-6);
+  EXPECT_NEAR(fallen_N(0.0681), 1.0, 1e-6);
+  EXPECT_NEAR(fallen_N(0.0679), 3.0, 1e-6);
+}
+
 TEST_F(Request, RidesAFloorThatFalls) {
   double floor = 3900.0;
   for (int i = 0; i < 600; ++i) {
