@@ -11,7 +11,6 @@ constexpr double kPedalMoved =
     0.05;  // chosen: in an experiment, above the noise of a pedal at rest
 constexpr double kOilBand_K =
     1.0;  // chosen: in an experiment, below what it may begin with; oil cools slower
-constexpr Duration kSampleLeast = kMillisecond;
 constexpr double kKnownMargin = 1.05;  // the belt may have run in since its last value
 constexpr double kPeakSlipOverdrive = 0.020;
 constexpr double kPeakSlipLow = 0.035;
@@ -306,7 +305,6 @@ void Arming::step(const Now& now) noexcept {
     ratio_since_ = now.omega_s_rad_s / now.omega_p_rad_s;
     torque_since_ = now.torque_Nm;
     omega_p_since_ = now.omega_p_rad_s;
-    next_look_ = now.t + kSettle;
     unclear_ = 0;
     looked_ = cleared_ = false;
     search_ = later_ = {};
@@ -315,7 +313,6 @@ void Arming::step(const Now& now) noexcept {
     force_rests_ = false;
     block_since_ = now.t;
     block_sum_N_ = block_samples_ = 0.0;
-    last_ = now.t - kSampleLeast;
   }
   const double step = static_cast<double>(now.t - last_);
   last_ = now.t;
