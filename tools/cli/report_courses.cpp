@@ -72,11 +72,15 @@ void ReportCourses::on_report(const daemon::SampleReport& report) noexcept {
   if (report.new_result) take_result(report.result);
 }
 
-// Between the end stops the ratio itself changes: nothing is known of slip there, nor where the
-// inputs cannot be used.
+// Away from an end stop the ratio itself changes, and near one it settles for a while: slip is
+// known in experiments and where they could begin.
 void ReportCourses::take_wear(const daemon::SampleReport& report) {
+  using daemon::Inhibit;
   constexpr std::uint32_t kUnknown =
-      daemon::inhibit_bit(daemon::Inhibit::kRatio) | daemon::inhibit_bit(daemon::Inhibit::kInputs);
+      daemon::inhibit_bit(Inhibit::kInputs) | daemon::inhibit_bit(Inhibit::kPedal) |
+      daemon::inhibit_bit(Inhibit::kBrake) | daemon::inhibit_bit(Inhibit::kLockup) |
+      daemon::inhibit_bit(Inhibit::kRatio) | daemon::inhibit_bit(Inhibit::kTorque) |
+      daemon::inhibit_bit(Inhibit::kSpeed);
   const estimator::CurveEstimate& curve = report.curve;
   slip_known_ = curve.usable && (report.in_experiment || (report.inhibits & kUnknown) == 0);
   if (!curve.usable) return;
@@ -90,7 +94,7 @@ void ReportCourses::take_wear(const daemon::SampleReport& report) {
     wear.known_s += period_s_;
     wear.energy_J += more_J >= 0.0 ? more_J : curve.slip_energy_J;  // less: it began anew
     wear.path_m += slip_share * report.sample.omega_p_rad_s * point.primary_radius_m * period_s_;
-    wear.slip_most_percent = std::max(wear.slip_most_percent, std::abs(curve.sigma_star_percent));
+    wear.slip_most_percent = std::max(wear.slip_most_percent, curve.sigma_star_percent);
   };
   add(drive_.whole);
   if (!report.in_experiment) return;

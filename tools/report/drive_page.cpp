@@ -46,8 +46,8 @@ void add_drive(HtmlPage& page, Drive drive) {
   page.courses(courses);
   page.table({"what the belt went through", "slip known for, s", "slip energy, J", "slip path, m",
               "slip up to, %"},
-             {wear_row("the whole drive, creep included", drive.whole),
-              wear_row("its experiments", drive.in_experiments)});
+             {wear_row("while an experiment ran or could have begun", drive.whole),
+              wear_row("while one ran", drive.in_experiments)});
   if (!drive.reasons.empty()) page.table(kReasonHeader, drive.reasons);
 }
 

@@ -38,6 +38,7 @@ const drawCurve = ([id, title, xLabel, yLabel, series]) => {
     return {label, data: points, showLine: line, borderColor: colour,
             backgroundColor: band ? bandColour : colour, fill: band && label ? '-1' : false,
             borderWidth: line ? 1.5 : 1, borderDash: dashed ? dashes : [],
+            order: points.length === 1 ? -1 : 0, pointBorderWidth: points.length === 1 ? 2 : 1,
             pointStyle: shapes[place % shapes.length],
             pointRadius: line ? 0 : points.length === 1 ? 7 : 2.5};
   });
@@ -61,9 +62,8 @@ for (const curve of curves) {
 
 const missing = 65535;  // code of no value
 
-// First index whose time is not before t.
-const lowerBound = (times, t) => {
-  let from = 0, to = times.length;
+// First index from `from` on whose time is not before t.
+const lowerBound = (times, t, from = 0, to = times.length) => {
   while (from < to) {
     const middle = (from + to) >> 1;
     if (times[middle] < t) from = middle + 1; else to = middle;
@@ -86,11 +86,10 @@ class Courses {
   constructor(spec) {
     this.spec = spec;
     this.times = new Float64Array(spec.count);
-    this.begins = new Set();  // of runs without a gap
+    this.begins = spec.runs.map(([first]) => first);  // of runs without a gap
     spec.runs.forEach(([first, t], r) => {
       const end = r + 1 < spec.runs.length ? spec.runs[r + 1][0] : spec.count;
       for (let i = first; i < end; ++i) this.times[i] = t + (i - first) * spec.period;
-      this.begins.add(first);
     });
     this.panels = spec.panels.map((panel) => ({...panel, series: panel.series.map(decoded)}));
     this.named = this.panels.find((panel) => panel.lanes.length === 0);  // has the marks' names
@@ -104,26 +103,26 @@ class Courses {
 
   // Ranges of samples, one a pixel; null: a gap.
   pieces(first, end, from, width) {
+    const {times, begins} = this;
     const out = [];
+    let run = lowerBound(begins, first);
     for (let i = first; i < end;) {
-      if (i > 0 && this.begins.has(i)) out.push(null);
-      const limit = from + (Math.floor((this.times[i] - from) / width) + 1) * width;
-      let j = i + 1;
-      while (j < end && this.times[j] < limit && !this.begins.has(j)) ++j;
+      if (i > 0 && begins[run] === i) out.push(null);
+      if (begins[run] === i) ++run;
+      const most = Math.min(end, run < begins.length ? begins[run] : end);
+      const limit = from + (Math.floor((times[i] - from) / width) + 1) * width;
+      const j = lowerBound(times, limit, i + 1, most);
       out.push([i, j]);
       i = j;
     }
     return out;
   }
-  // Beside the view, as coarse as a view of everything: what one may move to.
-  view(from, to, pixels) {
+  // What is in view, a sample beyond either side.
+  view(from, to) {
     const {times} = this;
     const first = Math.max(0, lowerBound(times, from) - 1);
     const end = Math.min(times.length, lowerBound(times, to) + 2);
-    const coarse = (this.to - this.from) / pixels;
-    return [...this.pieces(0, first, this.from, coarse),
-            ...this.pieces(first, end, from, (to - from) / pixels),
-            ...this.pieces(end, times.length, this.from, coarse)];
+    return this.pieces(first, end, from, (to - from) / this.pixels());
   }
   rows(panel, pieces) {
     const {series, levels} = panel;
@@ -157,12 +156,17 @@ class Courses {
     return out;
   }
 
+  // Beside the view what one may move to, as coarse as a view of everything.
   show(from, to) {
     this.busy = true;
     this.shown = [from, to];
-    const pieces = this.view(from, to, this.pixels());
+    const pieces = this.view(from, to);
     this.graphs.forEach((graph, p) => {
-      graph.updateOptions({file: this.rows(this.panels[p], pieces), dateWindow: [from, to]});
+      const rows = this.rows(this.panels[p], pieces), all = this.overview[p];
+      const first = rows[0][0], last = rows[rows.length - 1][0];
+      const file = [...all.filter((row) => row[0] < first), ...rows,
+                    ...all.filter((row) => row[0] > last)];
+      graph.updateOptions({file, dateWindow: [from, to]});
     });
     this.busy = false;
   }
@@ -171,10 +175,11 @@ class Courses {
   draw(element) {
     this.element = element;
     this.shown = [this.from, this.to];
-    const pieces = this.view(this.from, this.to, this.pixels());
+    const pieces = this.view(this.from, this.to);
+    this.overview = this.panels.map((panel) => this.rows(panel, pieces));
     this.time = element.appendChild(document.createElement('div'));
     this.time.className = 'time';
-    this.panels.forEach((panel, p) => this.drawPanel(panel, p, pieces));
+    this.panels.forEach((panel, p) => this.drawPanel(panel, p));
     this.tellTime();
   }
   tellTime(t) {
@@ -185,7 +190,7 @@ class Courses {
       : spec.names.length > 0 ? spec.names[lowerBound(this.times, t)]
       : (t + spec.offset).toFixed(3) + ' s';
   }
-  drawPanel(panel, p, pieces) {
+  drawPanel(panel, p) {
     const {spec, element} = this;
     const last = p + 1 === this.panels.length;
     const legend = element.appendChild(document.createElement('div'));
@@ -211,13 +216,13 @@ class Courses {
           ticker: spec.names.length ? wholeTicks : Dygraph.numericTicks, valueFormatter: String},
       y: {axisLabelWidth: 55, pixelsPerLabel: 22, valueFormatter: (y) => String(Number(y.toPrecision(4))),
           ...(lanes.length ? {ticker: () => [], drawGrid: false} : {})}};
-    const graph = new Dygraph(place, this.rows(panel, pieces), {
+    const graph = new Dygraph(place, this.overview[p], {
       labels: [spec.label, ...labels], series, axes,
       colors: labels.map(colourOf), labelsDiv: legend, legend: 'always',
       legendFormatter: (data) => this.legend(panel, data), strokeWidth: 1.2, xRangePad: 0,
       dateWindow: [this.from, this.to], valueRange: lanes.length ? [0, lanes.length] : null,
       xlabel: last ? spec.label : null, xLabelHeight: 16, highlightCircleSize: 3,
-      yRangePad: lanes.length ? 0 : 6, connectSeparatedPoints: false, drawGapEdgePoints: true,
+      yRangePad: lanes.length ? 0 : 6, connectSeparatedPoints: false, drawGapEdgePoints: false,
       showRangeSelector: last && spec.period > 0, rangeSelectorHeight: 22,
       interactionModel: interaction,
       underlayCallback: (context, area, g) => this.underlay(panel, context, area, g),
@@ -285,10 +290,11 @@ class Courses {
       context.font = '11px sans-serif';
       context.fillText(name, area.x + 3, top + 12);
     });
-    context.strokeStyle = '#222';
+    context.strokeStyle = '#888';
     context.fillStyle = '#222';
     context.font = '11px sans-serif';
     context.setLineDash(dashes);
+    let named = area.x;  // up to there a name stands already
     for (const [t, name] of spec.marks) {
       const x = graph.toDomXCoord(t);
       if (x < area.x || x > area.x + area.w) continue;
@@ -296,9 +302,12 @@ class Courses {
       context.moveTo(x, area.y);
       context.lineTo(x, area.y + area.h);
       context.stroke();
-      const right = x + 4 + context.measureText(name).width < area.x + area.w;
-      context.textAlign = right ? 'left' : 'right';
-      if (panel === this.named) context.fillText(name, x + (right ? 3 : -3), area.y + 11);
+      if (panel !== this.named) continue;
+      const width = context.measureText(name).width + 6;
+      const left = x + width < area.x + area.w ? x : x - width;
+      if (left < named) continue;
+      context.fillText(name, left + 3, area.y + 11);
+      named = left + width;
     }
     context.restore();
   }

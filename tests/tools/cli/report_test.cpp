@@ -42,7 +42,7 @@ TEST_F(Report, ShowsEveryExperimentOfTheLog) {
   }
   EXPECT_EQ(count(page, "<h2>Reserve of least loss</h2>"), 1);
   EXPECT_NE(page.find("Configured: 0 Nm."), std::string::npos);
-  EXPECT_EQ(count(page, "<td>the whole drive, creep included</td>"), 1);
+  EXPECT_EQ(count(page, "<td>while an experiment ran or could have begun</td>"), 1);
   EXPECT_EQ(count(page, "<td>cool-down</td>"), 1);
 }
 
