@@ -17,6 +17,7 @@
 #include "tools/cli/output_file.h"
 #include "tools/cli/role_evidence.h"
 #include "tools/cli/role_guess.h"
+#include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
 
@@ -301,11 +302,17 @@ void run(const Options& options) {
       "role.\n";
   append_assumed(text, measured ? Role::kPrimaryTorque : Role::kEngineTorque);
   text +=
-      "\n# [estimator], [experiment] and the end-stop ratios of [variator] have defaults; see the\n"
-      "# documented default file. beltgrip calibrate finds the ratios.\n";
+      "\n# [estimator], [experiment] and the end-stop ratios of [variator] have defaults;\n"
+      "# beltgripd --print-default-config shows every key. beltgrip calibrate finds the ratios.\n";
   file.write(options.out == "-" ? can::printable_lines(text) : text);
   file.close();
-  if (proposal.missing.empty()) return;
+  if (proposal.missing.empty()) {
+    if (options.out == "-") return;
+    text::print(stdout, options.out +
+                            ": every role that is needed has a line; look at each, then " +
+                            "beltgrip check LOG --config " + options.out + "\n");
+    return;
+  }
   throw Failure{kBadInput, options.dbc.front() + (options.dbc.size() > 1 ? ", ..." : "") +
                                ": found no signal for " + proposal.missing +
                                "; expected one for each, to be entered in " +
