@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "can_dbc/text/printable.h"
+#include "estimator/physics/units.h"
 #include "tools/monitor/plot.h"
 
 namespace beltgrip::monitor {
@@ -166,6 +167,23 @@ std::string force_text(const std::optional<double>& force_N) {
   return force_N ? format("%.0f N", *force_N) : "-";
 }
 
+// What the belt has carried without slip: a line for all directions and end stops that are known.
+void add_carried(const daemon::CarriedBounds& bounds, int columns, std::vector<Line>& lines) {
+  std::string text;
+  for (std::size_t group = 0; group < bounds.size(); ++group) {
+    const daemon::CarriedBound& bound = bounds[group];
+    if (!bound.known()) continue;
+    text += (text.empty() ? "without slip, " : "; ") + daemon::group_text(group) +
+            format(": mu_max at least %.4f", bound.mu_max_least);
+    if (const auto share = daemon::reserve_share(bound)) {
+      text += format(", reserve %.0f %%", estimator::kPercent * *share);
+    }
+  }
+  if (text.empty()) return;
+  lines.push_back(labelled("carried", text));
+  cut(lines.back(), columns);
+}
+
 Line now_line(const View& view) {
   std::string text = "mu* ";
   text += view.mu_star ? format("%.4f", *view.mu_star) : "-";
@@ -298,6 +316,7 @@ std::vector<Line> layout(const View& view, Size size) {
       "mu_max",
       friction_text(view.friction) + format("; results since its start: %u", view.experiment_count),
       Tone::kStrong));
+  add_carried(view.carried, columns, lines);
   const int left = size.rows - static_cast<int>(lines.size()) - 1;  // the keys
   const int shown = static_cast<int>(view.experiments.size()) + 1;
   const int wanted =

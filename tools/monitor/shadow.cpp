@@ -21,8 +21,9 @@ Shadow::Shadow(const daemon::Config& config, Sent sent)
     : config_(config),
       pipeline_(config),
       sent_(std::move(sent)),
-      period_(
-          std::llround(static_cast<double>(daemon::kSecond) / config.estimator.sample_rate_hz)) {}
+      period_(std::llround(static_cast<double>(daemon::kSecond) / config.estimator.sample_rate_hz)),
+      carried_watch_(config.control == daemon::Control::kCommand),
+      carried_(config) {}
 
 void Shadow::on_frame(const daemon::RxFrame& frame) {
   begin(frame.t);
@@ -57,6 +58,9 @@ void Shadow::sample() {
   link_said_ = link_;
   outbox_.size = 0;
   pipeline_.on_sample(next_, outbox_);
+  if (const daemon::CarriedWindow* window = carried_watch_.step(pipeline_.report())) {
+    carried_.take(*window, static_cast<double>(window->end) / double{daemon::kSecond});
+  }
   for (std::size_t i = 0; i < outbox_.size; ++i) {
     if (outbox_.bus[i] == 0) sent_(next_, outbox_.frames[i]);
     // A bus confirms what it has taken.
@@ -69,6 +73,7 @@ void Shadow::show(View& view, MonoTime now) const {
   view.inputs.clear();
   view.inhibits.clear();
   view.inhibits_known = begun_;
+  view.carried = carried_.bounds();
   const daemon::SampleReport& report = pipeline_.report();
   view.force_given_N.reset();
   if (report.curve.usable) view.force_given_N = report.curve.clamp_force_N;

@@ -10,6 +10,8 @@
 #include "daemon/core/base/port.h"
 #include "daemon/core/config/options/config.h"
 #include "daemon/core/loop/pipeline.h"
+#include "daemon/core/observe/carried_record.h"
+#include "daemon/core/observe/carried_window.h"
 #include "tools/monitor/bus_model.h"
 #include "tools/monitor/view.h"
 
@@ -42,6 +44,8 @@ class Shadow {
   daemon::MonoTime next_ = 0;  // sample
   daemon::BusState link_ = daemon::BusState::kActive, link_said_ = daemon::BusState::kActive;
   daemon::Outbox outbox_;
+  daemon::CarriedWatch carried_watch_;
+  daemon::CarriedRecord carried_;
   std::uint64_t decoded_ = 0;
   std::array<daemon::MonoTime, daemon::kRoleCount> newest_{};
   std::array<Rate, daemon::kRoleCount> rates_;

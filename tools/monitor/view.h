@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "daemon/core/base/port.h"
+#include "daemon/core/observe/carried_record.h"
 #include "daemon/core/reasons/reasons.h"
 #include "estimator/method/slip_curve_estimator.h"
 
@@ -92,6 +93,7 @@ struct View {
   std::optional<double> mu_star, sigma_star_percent, friction_slope;
   std::optional<double> force_asked_N, force_given_N, force_least_N;
   Friction friction;
+  daemon::CarriedBounds carried{};  // seen since this monitor began, with a configuration
   unsigned experiment_count = 0;
   std::vector<CurvePoint> curve;           // of the experiment that runs, or of the last
   std::vector<ExperimentRow> experiments;  // newest last

@@ -46,6 +46,23 @@ void add_experiments(JsonWriter& json, const View& view) {
   json.end_array();
 }
 
+void add_carried(JsonWriter& json, const View& view) {
+  json.key("carried").begin_array();
+  for (std::size_t group = 0; group < view.carried.size(); ++group) {
+    const daemon::CarriedBound& bound = view.carried[group];
+    if (!bound.known()) continue;
+    json.begin_object()
+        .field("group", daemon::group_text(group))
+        .field("mu_max_lower_bound", bound.mu_max_least)
+        .field("mu_star", bound.mu_star)
+        .field("torque_Nm", bound.torque_Nm)
+        .field("clamp_force_N", bound.clamp_force_N)
+        .field("reserve_share", or_null(daemon::reserve_share(bound)))
+        .end_object();
+  }
+  json.end_array();
+}
+
 void add_inputs(JsonWriter& json, const View& view) {
   json.key("inputs").begin_object();
   for (const InputRow& each : view.inputs) {
@@ -96,6 +113,7 @@ std::string view_json(const View& view) {
       .field("force_given_N", or_null(view.force_given_N))
       .field("min_clamp_force_N", or_null(view.force_least_N));
   add_friction(json, view.friction);
+  add_carried(json, view);
   json.field("experiment_count", view.experiment_count);
   add_experiments(json, view);
   add_inputs(json, view);

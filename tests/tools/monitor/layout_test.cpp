@@ -97,6 +97,22 @@ TEST(Layout, SaysEverythingAt80x24) {
   }
 }
 
+TEST(Layout, SaysWhatTheBeltHasCarried) {
+  View view = busy();
+  EXPECT_EQ(shown(view, 100, 30).find("carried"), std::string::npos);
+  daemon::CarriedBound& bound = view.carried.front();
+  bound.mu_star = 0.08;
+  bound.mu_max_least = 0.0709;
+  bound.held_s = 10.0;  // 2000 N, of which 1500 N were needed at mu* 0.08
+  bound.force_N_s = 20e3;
+  bound.used_N_s = 0.06 * 20e3;
+  const std::string text = shown(view, 100, 30);
+  EXPECT_NE(text.find("without slip, " + daemon::group_text(0) +
+                      ": mu_max at least 0.0709, reserve 25 %"),
+            std::string::npos)
+      << text;
+}
+
 TEST(Layout, ShowsMoreWhereThereIsRoom) {
   const std::string text = shown(busy(), 200, 60);
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 60);

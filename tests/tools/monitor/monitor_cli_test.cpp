@@ -58,6 +58,21 @@ class Monitor : public testing::Test {
 };
 Workplace* Monitor::place_ = nullptr;
 
+TEST_F(Monitor, SaysWhatWasCarriedAsReplayDoes) {
+  const std::string drive = place_->path("carried");
+  ASSERT_EQ(beltgrip({"simulate", "--duration", "20", "--out-dir", drive}).status, 0);
+  const RunResult run = beltgrip(
+      {"replay", drive + "/trace.log", "--config", drive + "/beltgrip.toml", "--json", "-"});
+  const std::size_t last = run.out.find_last_of('\n', run.out.size() - 2) + 1;
+  const json carried = json::parse(run.out.substr(last)).at("carried");
+  ASSERT_EQ(carried.size(), 1U);
+  const json view = once({drive + "/trace.log", "--config", drive + "/beltgrip.toml"});
+  ASSERT_EQ(view.at("carried").size(), 1U);
+  EXPECT_EQ(view.at("carried")[0].at("group"), "drive, overdrive");
+  EXPECT_NEAR(view.at("carried")[0].at("mu_max_lower_bound").get<double>(),
+              carried[0].at("mu_max_lower_bound").get<double>(), 1e-4);
+}
+
 TEST_F(Monitor, ALogIsReplayedAsReplayDoes) {
   const json view = once({log(), "--config", config()});
   EXPECT_TRUE(view.at("replayed_here"));
