@@ -56,6 +56,9 @@ class LogReader {
       std::make_shared<double>(std::numeric_limits<double>::quiet_NaN());
 };
 
+// The line that names the columns of a table (.csv) of frames: time, identifier, data.
+bool is_head_of_frames(std::string_view line);
+
 struct LogOpenError {
   std::string text;  // one line: path and reason
 };

@@ -476,6 +476,14 @@ class CsvParser : public LineParser {
 
 }  // namespace
 
+bool is_head_of_frames(std::string_view line) {
+  trim_end(line);
+  const Sample none;
+  CsvParser parser(none);
+  LogRecord record;
+  return !line.empty() && line[0] != '#' && parser.parse(line, record) == LineKind::kNothing;
+}
+
 std::unique_ptr<LineParser> make_csv_parser(const Sample& sample) {
   return std::make_unique<CsvParser>(sample);
 }

@@ -49,6 +49,7 @@ constexpr std::array kUnits{
     UnitRow{"kNm", {Dimension::kTorque, 1e3, 0.0}, false},
     UnitRow{"degc", {kTemperature, 1.0, 0.0}, true},
     UnitRow{"gradc", {kTemperature, 1.0, 0.0}, true},
+    UnitRow{"degreec", {kTemperature, 1.0, 0.0}, true},
     UnitRow{"°c", {kTemperature, 1.0, 0.0}, true},
     UnitRow{"℃", {kTemperature, 1.0, 0.0}, false},
     UnitRow{"celsius", {kTemperature, 1.0, 0.0}, true},

@@ -26,7 +26,7 @@ CanFrame padded(CanId id) noexcept {
 
 IsoTpReceiver::Event IsoTpReceiver::on_frame(std::int64_t t_ns, const CanFrame& frame) noexcept {
   const auto payload = frame.payload();
-  if (frame.error || frame.fd || payload.empty()) return Event::kIgnored;
+  if (frame.error || payload.empty()) return Event::kIgnored;
   switch (payload[0] >> 4U) {
     case kSingle:
       return on_single(t_ns, payload);
@@ -41,19 +41,23 @@ IsoTpReceiver::Event IsoTpReceiver::on_frame(std::int64_t t_ns, const CanFrame& 
 
 IsoTpReceiver::Event IsoTpReceiver::on_single(std::int64_t t_ns,
                                               std::span<const std::uint8_t> payload) noexcept {
-  const std::size_t length = payload[0] & 0x0FU;
-  if (length == 0 || length > kSingleMost || length >= payload.size()) return Event::kIgnored;
+  // Of more than 8 bytes: the length stands in the next byte.
+  const bool escaped = payload.size() > kFrameBytes;
+  const std::size_t length = escaped ? payload[1] : payload[0] & 0x0FU;
+  const std::size_t header = escaped ? 2 : 1;
+  if (escaped && ((payload[0] & 0x0FU) != 0 || length <= kSingleMost)) return Event::kIgnored;
+  if (length == 0 || length > payload.size() - header) return Event::kIgnored;
   receiving_ = false;
   size_ = 0;
   length_ = length;
   first_ns_ = t_ns;
-  take(payload.subspan(1));
+  take(payload.subspan(header));
   return Event::kMessage;
 }
 
 IsoTpReceiver::Event IsoTpReceiver::on_first(std::int64_t t_ns,
                                              std::span<const std::uint8_t> payload) noexcept {
-  if (payload.size() != kFrameBytes) return Event::kIgnored;
+  if (payload.size() < kFrameBytes) return Event::kIgnored;
   const std::size_t length = (payload[0] & 0x0FU) * std::size_t{256} + payload[1];
   if (length == 0) {
     // The length stands in the next four bytes: more than 4095, or an error of the sender.
@@ -62,8 +66,11 @@ IsoTpReceiver::Event IsoTpReceiver::on_first(std::int64_t t_ns,
     receiving_ = false;
     return Event::kTooLong;
   }
-  if (length <= kSingleMost) return Event::kIgnored;
+  const std::size_t single_most =
+      payload.size() > kFrameBytes ? payload.size() - kFirstHeader : kSingleMost;
+  if (length <= single_most) return Event::kIgnored;
   receiving_ = true;
+  frame_bytes_ = payload.size();
   size_ = 0;
   length_ = length;
   sequence_ = 1;
@@ -78,7 +85,7 @@ IsoTpReceiver::Event IsoTpReceiver::on_consecutive(std::int64_t t_ns,
   if (expire(t_ns)) return Event::kBroken;
   // Shorter than the others may only be the last one, which holds at least what is left.
   const std::size_t left = length_ - size_;
-  if (payload.size() != kFrameBytes && payload.size() - 1 < left) return Event::kIgnored;
+  if (payload.size() != frame_bytes_ && payload.size() - 1 < left) return Event::kIgnored;
   if ((payload[0] & 0x0FU) != sequence_) {
     receiving_ = false;
     return Event::kBroken;

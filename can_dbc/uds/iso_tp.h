@@ -1,7 +1,7 @@
-// ISO-TP (ISO 15765-2:2016) on classic CAN, normal addressing (11 or 29 bit, also normal fixed):
-// messages out of single, first and consecutive frames, and the frames that a receiver sends. Not
-// here: extended and mixed addressing, CAN FD, sending of more than a single frame. Fixed memory,
-// no clock, no I/O; any thread, also the real-time one.
+// ISO-TP (ISO 15765-2:2016), normal addressing (11 or 29 bit, also normal fixed): messages out of
+// single, first and consecutive frames on classic CAN and CAN FD, and the frames that a receiver
+// sends, on classic CAN. Not here: extended and mixed addressing, sending of more than a single
+// frame. Fixed memory, no clock, no I/O; any thread, also the real-time one.
 #pragma once
 
 #include <array>
@@ -18,8 +18,9 @@ inline constexpr std::int64_t kIsoTpFrameTimeout_ns = 1'000'000'000;  // N_Cr
 inline constexpr std::uint8_t kIsoTpPadding = 0xCC;  // what the standard fills frames up with
 
 // Puts one sender's frames together. What is no frame of the protocol is ignored, as the standard
-// has it: a first frame of less than 8 bytes' message or frame, a single frame that says
-// more than it holds, an unknown kind. A new single or first frame ends what was being received.
+// has it: a first frame whose message would fit in one, or that is not full, a single frame that
+// says more than it holds, an unknown kind. A new single or first frame ends what was being
+// received.
 class IsoTpReceiver {
  public:
   enum class Event : std::uint8_t {
@@ -53,7 +54,8 @@ class IsoTpReceiver {
   std::size_t length_ = 0;  // of the message
   std::int64_t first_ns_ = 0;
   std::int64_t last_ns_ = 0;
-  std::uint8_t sequence_ = 0;  // of the consecutive frame that is due
+  std::uint8_t sequence_ = 0;    // of the consecutive frame that is due
+  std::size_t frame_bytes_ = 0;  // of the first frame, and of all but the last
   bool receiving_ = false;
 };
 

@@ -30,7 +30,7 @@ RoleBinding role_of(Role role, std::uint8_t bus, can::CanId request, can::CanId 
   RoleBinding binding;
   binding.role = role;
   binding.bus = bus;
-  binding.uds = UdsSource{request, response, identifier, {}};
+  binding.uds = UdsSource{.request = request, .response = response, .identifier = identifier};
   binding.id = response;
   can::SignalDef signal;
   signal.start_bit = start;

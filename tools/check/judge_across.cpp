@@ -25,6 +25,12 @@ double spread_of(const std::vector<double>& values) {
   return quantile(values, 0.9) / quantile(values, 0.1) - 1.0;
 }
 
+// Of two pulleys the one that the engine is fixed to, even where slow sampling blurs it.
+bool turns_with(const std::vector<double>& engine_this, const std::vector<double>& engine_other) {
+  return engine_this.size() >= kWindowsLeast && engine_other.size() >= kWindowsLeast &&
+         kSteadier * spread_of(engine_this) < spread_of(engine_other);
+}
+
 double correlation(const std::vector<double>& x, const std::vector<double>& y) {
   const auto n = static_cast<double>(x.size());
   double mx = 0.0, my = 0.0;
@@ -189,7 +195,9 @@ bool Across::speeds() {
         Reading{"primary rad/s read as 1/min (or secondary 1/min as rad/s)", 1.0 / kPerMinute,
                 false}};
     std::string causes;
+    const bool engine_on_primary = turns_with(engine_primary, engine_secondary);
     for (const Reading& reading : kReadings) {
+      if (reading.inverted && engine_on_primary) continue;
       if (inside(reading.factor, reading.inverted) < kExplains) continue;
       causes += (causes.empty() ? "" : ", or ") + std::string(reading.text);
     }
@@ -266,6 +274,9 @@ void Across::lockup() {
     if (window[Role::kBrakePressed] > 0.5) braked_s += kWindow_s;
   }
   const std::vector<double> engine = ratio_of(Role::kEngineSpeed, Role::kPrimarySpeed, true);
+  const bool geared =
+      turns_with(engine, ratio_of(Role::kEngineSpeed, Role::kSecondarySpeed, true)) &&
+      std::abs(quantile(engine, 0.5) - 1.0) < kGearMost;
   const double together =
       share_of(engine, [](double r) { return std::abs(r - 1.0) < 4.0 * kSameSpeed; });
   const bool apart = engine.size() >= kWindowsLeast && together < 0.5 &&
@@ -275,6 +286,11 @@ void Across::lockup() {
         format("lockup_closed for %.1f s while the secondary stands: a closed lock-up would stall "
                "the engine; is it the brake, or true_when the wrong way round?",
                standing_s));
+  } else if (apart && geared) {
+    doubt(
+        format("with lockup_closed the engine turns %.3g times as fast as the primary: a gear "
+               "between them? Then engine_torque times that is the primary's (scale)",
+               quantile(engine, 0.5)));
   } else if (apart) {
     wrong(
         format("with lockup_closed the engine turns %.3g times as fast as the primary, and within "

@@ -7,6 +7,7 @@
 
 #include "can_dbc/frame/e2e.h"
 #include "can_dbc/text/unit_text.h"
+#include "daemon/core/config/toml/config_errors.h"
 #include "tools/check/text.h"
 #include "tools/check/thresholds.h"
 
@@ -47,6 +48,7 @@ class Judge {
     if (course_.in_range == 0) return found_;
     rate();
     gaps();
+    answers();
     level();
     course();
     return found_;
@@ -78,6 +80,7 @@ class Judge {
   void range();
   void rate();
   void gaps();
+  void answers();
   void level();
   void speed_level();
   void course();
@@ -114,6 +117,15 @@ void Judge::not_seen() {
     wrong("no answer of " + id_text(binding_.uds->response) +
           format(" with identifier 0x%04X", unsigned{binding_.uds->identifier}) +
           ": nobody asks, or another address");
+    return;
+  }
+  if (config_.table) {
+    std::vector<std::string> names;
+    for (const can::MessageDef& column : config_.table->columns.messages) {
+      names.push_back(column.name);
+    }
+    wrong("no column \"" + binding_.signal_name + "\" among the " + std::to_string(names.size()) +
+          daemon::nearest_hint(binding_.signal_name, names));
     return;
   }
   std::vector<std::pair<unsigned, std::string>> similar;
@@ -274,6 +286,29 @@ void Judge::gaps() {
   // Of oil and vehicle speed nothing is asked within a second (daemon/core/input/input_stage.h).
   const bool slow = binding_.role == Role::kOilTemperature || binding_.role == Role::kVehicleSpeed;
   slow&& course_.longest_gap_s < 1.0 ? note(text) : doubt(text + ": an experiment ends at each");
+}
+
+// How fast diagnostics are, and who sets the pace.
+void Judge::answers() {
+  if (!binding_.uds) return;
+  if (course_.requests == 0) {
+    note("nobody's request for it is to be seen: the answers alone");
+    return;
+  }
+  const double every_s = quantile(course_.asked_every_s.values(), 0.5);
+  std::string text =
+      format("asked for %s times", grouped(static_cast<double>(course_.requests)).c_str());
+  if (every_s > 0.0) text += format(", every %.0f ms", 1e3 * every_s);
+  const std::vector<double>& answers_s = course_.answers_s.values();
+  if (!answers_s.empty()) {
+    text += format("; answered after %.0f ms, in the slowest of 100 after %.0f ms",
+                   1e3 * quantile(answers_s, 0.5), 1e3 * quantile(answers_s, 0.99));
+  }
+  note(text);
+  if (course_.requests > course_.frames + 1) {
+    doubt(format("%s requests for it had no value as answer",
+                 grouped(static_cast<double>(course_.requests - course_.frames)).c_str()));
+  }
 }
 
 void Judge::speed_level() {

@@ -1,6 +1,7 @@
 #include "tools/check/report.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 
 #include "daemon/core/config/load/load_config.h"
@@ -117,9 +118,11 @@ std::string text(const Checked& checked) {
   const RoleWatch& watch = checked.watch;
   const bool seen = !checked.what.empty();
   if (seen) {
+    const bool table = checked.config.table != nullptr;
     out += wrapped("", checked.what + ": " + grouped(static_cast<double>(watch.frames())) +
-                           format(" frames in %.1f s, ", watch.span_s()) +
-                           std::to_string(watch.census().size()) + " identifiers");
+                           format(" %s in %.1f s, ", table ? "values" : "frames", watch.span_s()) +
+                           std::to_string(watch.census().size()) +
+                           (table ? " columns" : " identifiers"));
     out += "\n" + header();
   }
   std::vector<std::string> told;
@@ -216,6 +219,13 @@ std::string json(const Checked& checked) {
     json.field("noise", known ? in.difference(course.noise()) : kJsonNull);
     json.field("step", known ? in.difference(course.step) : kJsonNull);
     json.field("stuck_s", course.stuck_s).field("unit", binding.unit);
+    if (binding.uds) {
+      const double every_s = quantile(course.asked_every_s.values(), 0.5);
+      const double answer_s = quantile(course.answers_s.values(), 0.5);
+      json.field("requests", course.requests);
+      json.field("request_Hz", every_s > 0.0 ? 1.0 / every_s : kJsonNull);
+      json.field("answer_s", std::isfinite(answer_s) ? answer_s : kJsonNull);
+    }
     json.key("findings");
     findings(checked.verdict.roles[i]);
     json.end_object();

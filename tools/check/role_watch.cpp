@@ -6,6 +6,7 @@
 
 #include "can_dbc/dbc/message_index.h"
 #include "can_dbc/frame/e2e.h"
+#include "can_dbc/uds/uds.h"
 #include "tools/check/thresholds.h"
 
 namespace beltgrip::check {
@@ -18,6 +19,19 @@ constexpr std::size_t kIdentifiersMost = 4096;
 constexpr double kPerMedian = 1.0 / (0.6745 * 2.449489742783178);  // of second differences
 
 bool has_range(const daemon::RoleBinding& binding) { return binding.minimum < binding.maximum; }
+
+// A request in one frame that names the identifier, alone or among others.
+bool asks_for(const can::CanFrame& frame, const daemon::UdsSource& source) {
+  const auto payload = frame.payload();
+  if (payload.size() < 2 || payload[0] >= payload.size() || payload[1] != source.service) {
+    return false;
+  }
+  auto rest = payload.subspan(2, payload[0] - std::size_t{1});
+  while (const auto identifier = can::uds_take_identifier(source.service, rest)) {
+    if (*identifier == source.identifier) return true;
+  }
+  return false;
+}
 
 bool is_in_range(const daemon::RoleBinding& binding, std::uint64_t raw, double physical) {
   if (!std::isfinite(physical)) return false;
@@ -102,16 +116,7 @@ void RoleWatch::take_frame(RoleCourse& course, State& state, const daemon::RxFra
   if (!course.binding) return;
   const daemon::RoleBinding& binding = *course.binding;
   if (binding.uds) {
-    if (!diagnostics_) return;
-    const daemon::SignalHistory& history = diagnostics_->history(binding.role);
-    if (history.empty() || history.newest() == state.diagnostics) return;
-    state.diagnostics = history.newest();
-    ++course.frames;
-    ++course.values;
-    ++course.in_range;
-    take_time(course, state, frame.t);
-    take_value(course, state, history.newest_value(),
-               daemon::seconds(frame.t - first_.value_or(frame.t)));
+    take_diagnostics(course, state, frame);
     return;
   }
   if (frame.bus != binding.bus) return;
@@ -162,6 +167,31 @@ void RoleWatch::take_frame(RoleCourse& course, State& state, const daemon::RxFra
   }
   state.raw = raw;
   take_value(course, state, value, daemon::seconds(frame.t - first_.value_or(frame.t)));
+}
+
+void RoleWatch::take_diagnostics(RoleCourse& course, State& state, const daemon::RxFrame& frame) {
+  const daemon::RoleBinding& binding = *course.binding;
+  const daemon::UdsSource& source = *binding.uds;
+  if (frame.bus == binding.bus && frame.frame.id == source.request &&
+      asks_for(frame.frame, source)) {
+    if (state.asked_at) course.asked_every_s.add(daemon::seconds(frame.t - *state.asked_at));
+    state.asked_at = frame.t;
+    state.waits = true;
+    ++course.requests;
+  }
+  if (!diagnostics_) return;
+  const daemon::SignalHistory& history = diagnostics_->history(binding.role);
+  if (history.empty() || history.newest() == state.diagnostics) return;
+  state.diagnostics = history.newest();
+  if (state.waits && state.asked_at)
+    course.answers_s.add(daemon::seconds(frame.t - *state.asked_at));
+  state.waits = false;
+  ++course.frames;
+  ++course.values;
+  ++course.in_range;
+  take_time(course, state, frame.t);
+  take_value(course, state, history.newest_value(),
+             daemon::seconds(frame.t - first_.value_or(frame.t)));
 }
 
 // Counts what the daemon would refuse. False: what the frame says is not believed either.

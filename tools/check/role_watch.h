@@ -52,6 +52,10 @@ struct RoleCourse {
   std::vector<Gap> gaps;                       // the first ones
   Thinned<double> spread;                      // values
   Thinned<double> intervals_s;
+  // From diagnostics: how often somebody asked, and how long the answers took.
+  std::uint64_t requests = 0;
+  Thinned<double> asked_every_s;
+  Thinned<double> answers_s;
   Thinned<double> bends;               // second differences
   std::vector<can::CanFrame> refused;  // the first whose CRC is wrong
 
@@ -95,8 +99,11 @@ class RoleWatch {
     double other_at_same = 0.0;
     std::optional<std::uint64_t> raw;
     MonoTime diagnostics = 0;
+    std::optional<MonoTime> asked_at;  // last
+    bool waits = false;                // for its answer
   };
   void take_frame(RoleCourse& course, State& state, const daemon::RxFrame& frame);
+  void take_diagnostics(RoleCourse& course, State& state, const daemon::RxFrame& frame);
   bool protection_holds(RoleCourse& course, State& state, const can::CanFrame& frame);
   void take_time(RoleCourse& course, State& state, MonoTime t);
   void take_value(RoleCourse& course, State& state, double value, double t_s);

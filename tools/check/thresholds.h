@@ -64,6 +64,10 @@ inline constexpr double kInStopsLeast = 0.95, kExplains = 0.95;
 inline constexpr double kStaysLeast = 0.5, kPasses = 0.05;
 // Chosen: an engine with a closed lock-up turns with the primary pulley to within noise and delay.
 inline constexpr double kSameSpeed = 0.015;
+// Measured (a real chain CVT, read every five seconds: spreads 0.34 and 1.46).
+inline constexpr double kSteadier = 3.0;
+inline constexpr double kGearMost =
+    0.4;  // chosen: of a gear before the pulley, in either direction
 // Measured (city, both ways round): the spread of vehicle speed over the pulley that drives the
 // wheels is 2 %, over the other it is what the ratio moved by.
 inline constexpr double kFinalDriveSpread = 0.06, kOtherSpread = 0.20;

@@ -79,6 +79,16 @@ Verdict judge(const RoleWatch& watch, const std::vector<Window>& windows,
     if (course.frames > 0) none_seen = false;
   }
   verdict.across = judge_across(windows, config);
+  // Of a log the configuration demands them; a table has the columns that it has.
+  for (std::size_t i = 0; i < daemon::kRoleCount; ++i) {
+    const auto role = static_cast<Role>(i);
+    const bool bound =
+        std::any_of(config.roles.begin(), config.roles.end(),
+                    [role](const daemon::RoleBinding& each) { return each.role == role; });
+    if (bound || !is_required(role, config)) continue;
+    observes = commands = false;
+    verdict.missing.push_back(std::string(daemon::role_name(role)) + ": no column of it");
+  }
   if (none_seen) {
     observes = commands = false;
     verdict.missing.push_back("no message of any role is in " +

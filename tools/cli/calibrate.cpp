@@ -15,6 +15,7 @@
 #include "tools/calibrate/calibrate.h"
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"
+#include "tools/cli/log_configuration.h"
 #include "tools/cli/log_table.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/progress.h"
@@ -33,6 +34,7 @@ struct Options {
   std::string config;
   std::string json;
   std::string out;
+  double rate_Hz = 0.0;
   bool force = false;
 };
 
@@ -213,7 +215,8 @@ void run(const Options& options) {
     throw Failure{kUsage, "calibrate: only one of --json and --out can be standard output"};
   }
   end_logs_when_stopped(options.logs);
-  const daemon::Config config = load_configuration(options.config, "");
+  const daemon::Config config =
+      load_configuration_for(options.logs, options.rate_Hz, options.config, "");
   Inputs inputs(options.logs);
   inputs.add(config.files);
   std::optional<OutputFile> json, out;
@@ -252,12 +255,15 @@ void add_calibrate(command_line::Command app) {
       "calibrate",
       "End-stop ratios, zero of the pressure, inertia and delays from recorded drives");
   auto options = std::make_shared<Options>();
-  command.add_option("LOG", options->logs, "CAN logs of drives, all of the same vehicle")
+  command
+      .add_option("LOG", options->logs,
+                  "CAN logs of drives, or tables of signals (.csv), all of the same vehicle")
       .type_name("")
       .required();
   command.add_option("--config", options->config, "BeltGrip's configuration")
       .type_name("FILE")
       .required();
+  add_rate_option(command, options->rate_Hz);
   command.add_option("--json", options->json, "As JSON, '-': standard output").type_name("FILE");
   command.add_option("--out", options->out, "The keys as TOML, '-': standard output")
       .type_name("FILE");

@@ -23,7 +23,7 @@
 #include "tools/check/verdict.h"
 #include "tools/cli/bus.h"
 #include "tools/cli/command.h"
-#include "tools/cli/configuration.h"
+#include "tools/cli/log_configuration.h"
 #include "tools/cli/log_table.h"
 #include "tools/cli/log_trouble.h"
 #include "tools/cli/output_file.h"
@@ -42,6 +42,7 @@ struct Options {
   std::string config;
   std::string json;
   double live_s = 0.0;
+  double rate_Hz = 0.0;
 };
 
 std::vector<can::Database> databases_of(const daemon::Config& config) {
@@ -140,7 +141,7 @@ void look(daemon::Port& port, const daemon::Config& config, check::RoleWatch& wa
 
 void look_at_log(const std::string& path, const daemon::Config& config, check::RoleWatch& watch,
                  Seen& seen) {
-  const auto timeline = open_timeline({path}, "", config.identifiers, further_interface(config));
+  const auto timeline = open_timeline({path}, "", config);
   ports::ReplayPort port(*timeline, {});
   if (port.empty()) {
     throw Failure{kBadInput, no_frame_text(path, timeline->stats())};
@@ -182,7 +183,8 @@ void run(const Options& options) {
     throw Failure{kUsage, "check: found logs and --live, expected one of them"};
   }
   end_streams_when_stopped(options.logs);
-  const daemon::Config config = load_configuration(options.config, "");
+  const daemon::Config config =
+      load_configuration_for(options.logs, options.rate_Hz, options.config, "");
   Inputs inputs(options.logs);
   inputs.add(config.files);
   std::optional<OutputFile> json;
@@ -225,7 +227,9 @@ void add_check(command_line::Command app) {
       "check",
       "Does a configuration fit the car: every role, what belongs together, what is missing");
   auto options = std::make_shared<Options>();
-  command.add_option("LOG", options->logs, "CAN logs of drives, all of the same vehicle")
+  command
+      .add_option("LOG", options->logs,
+                  "CAN logs of drives, or tables of signals (.csv), all of the same vehicle")
       .type_name("");
   command.add_option("--config", options->config, "BeltGrip's configuration")
       .type_name("FILE")
@@ -235,6 +239,7 @@ void add_check(command_line::Command app) {
                   "Listen to the configuration's bus for so many seconds; nothing is sent")
       .type_name("SECONDS")
       .range(0.1, 86400.0);
+  add_rate_option(command, options->rate_Hz);
   command.add_option("--json", options->json, "As JSON, '-': standard output").type_name("FILE");
   command.example("beltgrip check drive/trace.log --config drive/beltgrip.toml");
   command.example("beltgrip check --live 60 --config mycar.toml");

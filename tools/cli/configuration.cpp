@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <utility>
 
 #include "daemon/core/config/load/load_config.h"
 #include "tools/cli/failure.h"
@@ -13,8 +14,10 @@
 
 namespace beltgrip::cli {
 
-daemon::Config load_configuration(const std::string& path, const std::string& method) {
-  daemon::ConfigResult result = daemon::load_config(path);
+daemon::Config load_configuration(const std::string& path, const std::string& method,
+                                  std::shared_ptr<const daemon::TableSource> table) {
+  daemon::ConfigResult result =
+      table ? daemon::load_config(path, std::move(table)) : daemon::load_config(path);
   for (const std::string& warning : result.warnings) {
     text::warn(warning);
   }

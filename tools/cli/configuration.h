@@ -1,6 +1,7 @@
 // Loads BeltGrip's configuration for a subcommand: warnings to standard error, errors as Failure.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -8,8 +9,9 @@
 
 namespace beltgrip::cli {
 
-// method: empty, or what --method says ("robust", "paper").
-daemon::Config load_configuration(const std::string& path, const std::string& method);
+// method: empty, or what --method says ("robust", "paper"). table: is read instead of frames.
+daemon::Config load_configuration(const std::string& path, const std::string& method,
+                                  std::shared_ptr<const daemon::TableSource> table = nullptr);
 // The same for texts that are in no file; the configuration names the DBC "vehicle.dbc".
 daemon::Config load_configuration_text(std::string_view toml, std::string_view dbc,
                                        const std::string& method);

@@ -16,7 +16,7 @@ constexpr std::uint64_t kFramesPerWord = 1024;
 
 diagnose::SignalTable read_log(const std::string& path, const daemon::Config& config, bool as_read,
                                const std::function<void(double, double)>& on_read) {
-  const auto timeline = open_timeline({path}, "", config.identifiers, further_interface(config));
+  const auto timeline = open_timeline({path}, "", config);
   daemon::InputMonitor inputs(config);
   if (as_read) {
     for (const daemon::Role role : {daemon::Role::kEngineTorque, daemon::Role::kPrimarySpeed,

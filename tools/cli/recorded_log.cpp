@@ -108,7 +108,7 @@ bool can_be_read_twice(const std::vector<std::string>& paths) {
 std::optional<RecordedLog> recorded_requests(const std::vector<std::string>& paths,
                                              const std::string& interface,
                                              const daemon::Config& config) {
-  if (!can_be_read_twice(paths)) return std::nullopt;
+  if (config.table || !can_be_read_twice(paths)) return std::nullopt;
   const auto timeline =
       open_timeline(paths, interface, {}, further_interface(config),
                     {{.id = {config.identifiers.clamp, false}, .bus = 0, .every = false},

@@ -15,6 +15,7 @@
 #include "tools/cli/bus.h"
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"
+#include "tools/cli/log_configuration.h"
 #include "tools/cli/log_trouble.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/progress.h"
@@ -33,6 +34,7 @@ struct Options {
   std::string config;
   std::string method;
   std::string interface;
+  double rate_Hz = 0.0;
   bool join = false;
   bool as_recorded = false;
   bool decide_anew = false;
@@ -243,7 +245,9 @@ void run(const Options& options) {
   if (options.resume && (options.json.empty() || options.join)) {
     throw Failure{kUsage, "replay: --resume goes log by log, expected --json FILE and no --join"};
   }
-  const daemon::Config config = load_configuration(options.config, options.method);
+  const daemon::Config config =
+      load_configuration_for(options.logs, options.rate_Hz, options.config, options.method);
+  require_columns(config, options.logs.front());
   check_as_recorded(options, config);
   std::optional<OutputFile> json, trace, signals_file, log_out;
   std::optional<ResumedLines> resumed;
@@ -347,7 +351,9 @@ void add_replay(command_line::Command app) {
   const command_line::Command command =
       app.add_subcommand("replay", "Run the daemon's pipeline over logs, the stamps are the clock");
   auto options = std::make_shared<Options>();
-  command.add_option("LOG", options->logs, kLogKinds).type_name("").required();
+  command.add_option("LOG", options->logs, std::string(kLogKinds) + "; or tables of signals (.csv)")
+      .type_name("")
+      .required();
   command
       .add_option("--config", options->config, "BeltGrip's configuration; required without --bus")
       .type_name("FILE");
@@ -356,6 +362,7 @@ void add_replay(command_line::Command app) {
       .one_of({"robust", "paper"});
   command.add_option("--interface", options->interface, "Frames of this interface only")
       .type_name("INTERFACE");
+  add_rate_option(command, options->rate_Hz);
   command.add_flag("--as-recorded", options->as_recorded,
                    "Follow the log's clamp requests (default where it has BeltGripClamp frames)");
   command.add_flag("--decide-anew", options->decide_anew,

@@ -21,6 +21,7 @@
 #include "tools/ports/log_timeline.h"
 #include "tools/ports/record_port.h"
 #include "tools/ports/replay_port.h"
+#include "tools/table/table_log.h"
 #include "tools/text/json_writer.h"
 #include "tools/text/seconds.h"
 #include "tools/text/snake_case.h"
@@ -203,18 +204,29 @@ std::string reason_text(estimator::StopReason reason) {
   return text::snake_case(daemon::stop_reason_name(reason));
 }
 
-std::unique_ptr<ports::LogTimeline> open_timeline(
-    const std::vector<std::string>& paths, const std::string& interface,
-    const std::optional<daemon::FrameIdentifiers>& own, const std::string& further_interface,
-    std::vector<daemon::WantedFrames> wanted) {
+namespace {
+
+using Open = std::function<std::unique_ptr<can::LogReader>(const std::string& path)>;
+
+std::unique_ptr<ports::LogTimeline> open_logs(const std::vector<std::string>& paths,
+                                              const Open& open, ports::FrameSelection selection) {
   std::vector<std::unique_ptr<can::LogReader>> readers;
   for (const std::string& path : paths) {
     try {
-      readers.push_back(can::LogReader::open(path));
+      readers.push_back(open(path));
     } catch (const can::LogOpenError& error) {
       throw Failure{kNoInput, error.text};
     }
   }
+  return std::make_unique<ports::LogTimeline>(std::move(readers), std::move(selection));
+}
+
+}  // namespace
+
+std::unique_ptr<ports::LogTimeline> open_timeline(
+    const std::vector<std::string>& paths, const std::string& interface,
+    const std::optional<daemon::FrameIdentifiers>& own, const std::string& further_interface,
+    std::vector<daemon::WantedFrames> wanted) {
   ports::FrameSelection selection;
   selection.interface = interface;
   selection.further_interface = further_interface;
@@ -223,7 +235,28 @@ std::unique_ptr<ports::LogTimeline> open_timeline(
     selection.ignored.push_back(
         {daemon::own_identifier(*own, static_cast<daemon::OwnMessage>(i)), false});
   }
-  return std::make_unique<ports::LogTimeline>(std::move(readers), std::move(selection));
+  return open_logs(
+      paths, [](const std::string& path) { return can::LogReader::open(path); },
+      std::move(selection));
+}
+
+std::unique_ptr<ports::LogTimeline> open_timeline(const std::vector<std::string>& paths,
+                                                  const std::string& interface,
+                                                  const daemon::Config& config,
+                                                  std::vector<daemon::WantedFrames> wanted) {
+  if (!config.table) {
+    return open_timeline(paths, interface, config.identifiers, further_interface(config),
+                         std::move(wanted));
+  }
+  ports::FrameSelection selection;
+  selection.interface = interface;
+  selection.wanted = std::move(wanted);
+  return open_logs(
+      paths,
+      [&config](const std::string& path) {
+        return table::open(path, config.table->columns, config.table->rate_Hz);
+      },
+      std::move(selection));
 }
 
 std::string further_interface(const daemon::Config& config) {
@@ -370,8 +403,7 @@ ReplayResult replay(const std::vector<std::string>& paths, const std::string& in
     }
     return result;
   }
-  const auto timeline =
-      open_timeline(paths, interface, config.identifiers, further, daemon::wanted_frames(config));
+  const auto timeline = open_timeline(paths, interface, config, daemon::wanted_frames(config));
   if (outputs.on_log) outputs.on_log(*timeline);
   ports::ReplayPort port(*timeline, std::move(receiver));
   const can::LogStats head = timeline->stats();

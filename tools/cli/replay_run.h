@@ -64,6 +64,12 @@ std::unique_ptr<ports::LogTimeline> open_timeline(
     const std::vector<std::string>& paths, const std::string& interface,
     const std::optional<daemon::FrameIdentifiers>& own, const std::string& further_interface = "",
     std::vector<daemon::WantedFrames> wanted = {});
+// What the configuration reads: BeltGrip's own frames are no input, the further bus is one, and a
+// table of signals is read as its columns say.
+std::unique_ptr<ports::LogTimeline> open_timeline(const std::vector<std::string>& paths,
+                                                  const std::string& interface,
+                                                  const daemon::Config& config,
+                                                  std::vector<daemon::WantedFrames> wanted = {});
 // Empty where the configuration has one bus.
 std::string further_interface(const daemon::Config& config);
 

@@ -1,6 +1,7 @@
 #include "daemon/core/guard/tx_gate.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "can_dbc/frame/e2e.h"
 
@@ -109,27 +110,56 @@ bool TxGate::own_allowed(std::size_t message, const can::CanFrame& frame) noexce
   return allowed;
 }
 
-// Layout of ISO 15765-2 and ISO 14229-1, read here on its own.
-bool TxGate::poll_allowed(const can::CanFrame& frame, std::uint8_t bus, MonoTime t) noexcept {
-  if (frame.remote || frame.error || frame.fd || frame.length != kLength) return false;
-  const auto& bytes = frame.data;
-  const bool flow = (bytes[0] == 0x30 || bytes[0] == 0x32) && bytes[1] == 0 && bytes[2] == 0;
-  const bool read = bytes[0] == 0x03 && bytes[1] == 0x22;
+// One of a request's identifiers; `seen` has a bit for each that the request has named.
+bool TxGate::poll_one_allowed(const can::CanFrame& frame, std::uint8_t bus, MonoTime t,
+                              std::uint32_t identifier, std::uint32_t& seen) noexcept {
   for (std::size_t i = 0; i < poll_.size; ++i) {
     const PollLimits::Request& request = poll_.requests[i];
-    Polled& polled = polled_[i];
-    if (request.bus != bus || request.id != frame.id) continue;
-    if (flow && polled.flow_left) {
-      polled.flow_left = false;
-      return true;
-    }
-    if (!read || (bytes[2] << 8 | bytes[3]) != request.identifier) continue;
-    if (polled.due > t + request.period / 2) return false;
-    polled.due = std::max(polled.due, t) + request.period;
-    polled.flow_left = true;
+    if (request.bus != bus || request.id != frame.id || request.service != frame.data[1]) continue;
+    if (request.identifier != identifier) continue;
+    const std::uint32_t bit = std::uint32_t{1} << i;
+    if ((seen & bit) != 0 || polled_[i].due > t + request.period / 2) return false;
+    seen |= bit;
     return true;
   }
   return false;
+}
+
+// One for the last request to this ECU.
+bool TxGate::flow_allowed(const can::CanFrame& frame, std::uint8_t bus) noexcept {
+  for (std::size_t i = 0; i < poll_.size; ++i) {
+    const PollLimits::Request& request = poll_.requests[i];
+    if (request.bus != bus || request.id != frame.id || !polled_[i].flow_left) continue;
+    polled_[i].flow_left = false;
+    return true;
+  }
+  return false;
+}
+
+// Layout of ISO 15765-2, ISO 14229-1 and ISO 14230-3, read here on its own.
+bool TxGate::poll_allowed(const can::CanFrame& frame, std::uint8_t bus, MonoTime t) noexcept {
+  static_assert(PollLimits::kMost <= 32, "a bit each");
+  if (frame.remote || frame.error || frame.fd || frame.length != kLength) return false;
+  const auto& bytes = frame.data;
+  if ((bytes[0] == 0x30 || bytes[0] == 0x32) && bytes[1] == 0 && bytes[2] == 0) {
+    return flow_allowed(frame, bus);
+  }
+  const std::size_t width = bytes[1] == 0x22 ? 2 : bytes[1] == 0x21 ? 1 : 0;
+  const std::size_t size = bytes[0];  // of a single frame: the service and the identifiers
+  if (width == 0 || size < 1 + width || size > 7 || (size - 1) % width != 0) return false;
+  std::uint32_t seen = 0;
+  for (std::size_t at = 2; at <= size; at += width) {
+    const std::uint32_t identifier =
+        width == 2 ? static_cast<std::uint32_t>(bytes[at] << 8 | bytes[at + 1]) : bytes[at];
+    if (!poll_one_allowed(frame, bus, t, identifier, seen)) return false;
+  }
+  bool flow = true;
+  for (std::size_t i = 0; i < poll_.size; ++i) {
+    if ((seen >> i & 1) == 0) continue;
+    polled_[i].due = std::max(polled_[i].due, t) + poll_.requests[i].period;
+    polled_[i].flow_left = std::exchange(flow, false);
+  }
+  return true;
 }
 
 bool TxGate::permits(const can::CanFrame& frame, std::uint8_t bus, MonoTime t) noexcept {

@@ -10,9 +10,10 @@
 // floor, never rising, never falling by more than a step from frame to frame, no longer than a
 // number of frames.
 //
-// Passes on any bus, where polling is allowed: ReadDataByIdentifier of one of the listed
-// identifiers to its ECU, as one single frame of 8 bytes, no more often than its period (early by
-// half of one at the most); and one flow control, "continue" or "overflow", for each such request.
+// Passes on any bus, where polling is allowed: ReadDataByIdentifier, or ReadDataByLocalIdentifier,
+// of listed identifiers, each once, to their ECU, as one single frame of 8 bytes, none more often
+// than its period (early by half of one at the most); and one flow control, "continue" or
+// "overflow", for each such request.
 #pragma once
 
 #include <array>
@@ -45,6 +46,7 @@ struct PollLimits {
     can::CanId id;
     std::uint16_t identifier = 0;  // of the data
     Duration period = 0;
+    std::uint8_t service = 0x22;
   };
   std::array<Request, kMost> requests{};
   std::size_t size = 0;
@@ -68,6 +70,9 @@ class TxGate {
   bool begins_at_acting(double force_N) const noexcept;
   bool request_allowed(const can::CanFrame& frame) noexcept;
   bool own_allowed(std::size_t message, const can::CanFrame& frame) noexcept;
+  bool poll_one_allowed(const can::CanFrame& frame, std::uint8_t bus, MonoTime t,
+                        std::uint32_t identifier, std::uint32_t& seen) noexcept;
+  bool flow_allowed(const can::CanFrame& frame, std::uint8_t bus) noexcept;
   bool poll_allowed(const can::CanFrame& frame, std::uint8_t bus, MonoTime t) noexcept;
 
   std::array<std::uint32_t, kMessages> identifiers_;

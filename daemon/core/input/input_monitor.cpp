@@ -175,7 +175,9 @@ FrameUse InputMonitor::on_frame(const RxFrame& frame, FaultSet& faults) noexcept
   if (message == nullptr) {
     UdsReading reading;
     if (!uds_.on_frame(frame, reading)) return FrameUse::kForeign;
-    return take_reading(reading, faults) ? FrameUse::kTaken : FrameUse::kBad;
+    bool good = take_reading(reading, faults);
+    while (uds_.next(reading)) good &= take_reading(reading, faults);
+    return good ? FrameUse::kTaken : FrameUse::kBad;
   }
   MonoTime& newest = newest_[message->bus];
   if (frame.t < newest) faults.raise(Fault::kTimeStamp, newest);

@@ -5,7 +5,9 @@
 //
 // Listening: every positive answer of a configured identifier counts, whoever asked for it, stamped
 // with the arrival of its first frame. Polling adds:
-//   - one request under way to an ECU; of its identifiers the one that has been due longest
+//   - one request under way to an ECU; of its identifiers the one that has been due longest, and
+//     together with it, where the lengths of their data are known, others that are due; an ECU that
+//     refuses several at once is asked for one at a time
 //   - the next request when the answer has come and its time is due (period_ms); "pending" (0x78)
 //     gives the ECU 5 s from then on, 30 s in all
 //   - a refusal or no answer in 150 ms costs a pause of that identifier, from its period doubling
@@ -60,6 +62,8 @@ class UdsClient {
 
   // True when the frame is part of an ECU's answer; with a reading when it completes one.
   bool on_frame(const RxFrame& frame, UdsReading& reading) noexcept;
+  // The next identifier of the same answer.
+  bool next(UdsReading& reading) noexcept;
   // What is to be sent at t; `up` says which buses carry frames. Each call later than the one
   // before.
   void step(MonoTime t, const std::array<bool, kBusMax>& up, Outbox& outbox) noexcept;
@@ -69,7 +73,9 @@ class UdsClient {
 
  private:
   struct Item {
+    std::uint8_t service = 0;
     std::uint16_t identifier = 0;
+    std::uint16_t bytes = 0;  // of data; 0: not known
     std::array<Role, kRoleCount> roles{};
     std::uint8_t role_count = 0;
     Duration period = 0;
@@ -83,7 +89,11 @@ class UdsClient {
     can::IsoTpReceiver receiver;
     std::array<Item, kRoleCount> items;
     std::uint8_t item_count = 0;
-    Item* asked = nullptr;  // of the request under way
+    std::array<Item*, can::UdsRequest::kMost> asked{};  // of the request under way
+    std::uint8_t asked_count = 0;
+    bool alone = false;  // refuses several at once
+    bool is_asked() const noexcept { return asked_count > 0; }
+    std::span<Item* const> asked_items() const noexcept { return {asked.data(), asked_count}; }
     MonoTime asked_at = 0;
     MonoTime give_up_at = 0;
     MonoTime quiet_until = std::numeric_limits<MonoTime>::min();  // another tester is there
@@ -94,6 +104,9 @@ class UdsClient {
 
   void add(const RoleBinding& role, const UdsSource& source);
   void take_message(Ecu& ecu, MonoTime t, UdsReading& reading) noexcept;
+  bool take_data(std::uint16_t identifier, std::span<const std::uint8_t> data,
+                 UdsReading& reading) noexcept;
+  static bool refuses_several(const Ecu& ecu, std::uint8_t code) noexcept;
   void want_flow(Ecu& ecu, can::FlowStatus status) noexcept;
   void step(Ecu& ecu, MonoTime t, bool up, Outbox& outbox) noexcept;
   void ask(Ecu& ecu, MonoTime t, Outbox& outbox) noexcept;
@@ -104,6 +117,10 @@ class UdsClient {
   bool started_ = false;
   std::array<Ecu, kRoleCount> ecus_;
   std::uint8_t ecu_count_ = 0;
+  // What is left of an answer with several identifiers.
+  Ecu* answering_ = nullptr;
+  std::uint8_t answering_service_ = 0;
+  std::span<const std::uint8_t> rest_;
   UdsCounters counters_;
 };
 

@@ -32,12 +32,12 @@ PollLimits poll_limits(const Config& config) {
     const auto end = limits.requests.begin() + static_cast<std::ptrdiff_t>(limits.size);
     const auto same = std::find_if(limits.requests.begin(), end, [&](const auto& each) {
       return each.bus == role.bus && each.id == role.uds->request &&
-             each.identifier == role.uds->identifier;
+             each.service == role.uds->service && each.identifier == role.uds->identifier;
     });
     if (same != end) {
       same->period = std::min(same->period, period);
     } else {
-      *same = {role.bus, role.uds->request, role.uds->identifier, period};
+      *same = {role.bus, role.uds->request, role.uds->identifier, period, role.uds->service};
       ++limits.size;
     }
   }

@@ -48,6 +48,39 @@ TEST_F(IsoTp, ASingleFrameIsAMessage) {
   EXPECT_EQ(message_of(receiver_), (Bytes{0x3E}));
 }
 
+// 0x00 and the length in the next byte: frames of CAN FD with more than 8 bytes.
+TEST_F(IsoTp, ASingleFrameOfCanFd) {
+  EXPECT_EQ(take({0x00, 0x09, 1, 2, 3, 4, 5, 6, 7, 8, 9, 0xCC}), Event::kMessage);
+  EXPECT_EQ(message_of(receiver_), (Bytes{1, 2, 3, 4, 5, 6, 7, 8, 9}));
+  Bytes whole{0x00, 62};
+  for (std::uint8_t i = 0; i < 62; ++i) whole.push_back(i);
+  EXPECT_EQ(take(whole), Event::kMessage);
+  EXPECT_EQ(receiver_.message().size(), 62U);
+  ignores({0x00, 0x0B, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10});  // more than it holds
+  ignores({0x00, 0x07, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10});  // would fit in 8 bytes
+  ignores({0x09, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11});    // the short form
+}
+
+// A first frame of 64 bytes holds 62, a consecutive one 63; the last may be shorter.
+TEST_F(IsoTp, FramesOfCanFdMakeOneMessage) {
+  Bytes first{0x10, 0x96};  // 150
+  Bytes second{0x21}, last{0x22};
+  for (std::uint8_t i = 0; i < 62; ++i) first.push_back(i);
+  for (std::uint8_t i = 62; i < 125; ++i) second.push_back(i);
+  for (std::uint8_t i = 125; i < 150; ++i) last.push_back(i);
+  last.resize(32, 0xCC);
+  EXPECT_EQ(take(first), Event::kFirst);
+  ignores({0x21, 1, 2, 3, 4, 5, 6, 7});  // shorter, and not the last
+  EXPECT_EQ(take(second), Event::kContinued);
+  EXPECT_EQ(take(last), Event::kMessage);
+  ASSERT_EQ(receiver_.message().size(), 150U);
+  for (std::size_t i = 0; i < 150; ++i) EXPECT_EQ(receiver_.message()[i], i);
+  // What would have fit in one frame needs no first one.
+  first[1] = 62;
+  first[0] = 0x10;
+  ignores(first);
+}
+
 TEST_F(IsoTp, ASingleFrameThatSaysMoreThanItHoldsIsIgnored) {
   ignores({0x00, 1, 2, 3, 4, 5, 6, 7});
   ignores({0x08, 1, 2, 3, 4, 5, 6, 7});
@@ -160,9 +193,6 @@ TEST_F(IsoTp, WhatIsNoFrameOfAMessageIsIgnored) {
     ignores({static_cast<std::uint8_t>(kind << 4U), 1, 2, 3, 4, 5, 6, 7});
   }
   CanFrame odd = frame_of({0x21, 1, 2, 3, 4, 5, 6, 7});
-  odd.fd = true;
-  EXPECT_EQ(receiver_.on_frame(t_ns_, odd), Event::kIgnored);
-  odd.fd = false;
   odd.error = true;
   EXPECT_EQ(receiver_.on_frame(t_ns_, odd), Event::kIgnored);
   odd.error = false;

@@ -39,7 +39,16 @@ TEST(Uds, EverythingElse) {
 }
 
 TEST(Uds, TheRequest) {
-  EXPECT_EQ(uds_read_request(0xF190), (std::array<std::uint8_t, 3>{0x22, 0xF1, 0x90}));
+  const auto request = [](std::uint8_t service, std::vector<std::uint16_t> identifiers) {
+    const UdsRequest made = uds_read_request(service, identifiers);
+    return std::vector<std::uint8_t>(made.payload().begin(), made.payload().end());
+  };
+  EXPECT_EQ(request(0x22, {0xF190}), (Bytes{0x22, 0xF1, 0x90}));
+  EXPECT_EQ(request(0x22, {0xF190, 0x1101, 0x0002}),
+            (Bytes{0x22, 0xF1, 0x90, 0x11, 0x01, 0x00, 0x02}));
+  EXPECT_EQ(request(0x21, {0x01, 0xA0}), (Bytes{0x21, 0x01, 0xA0}));
+  EXPECT_EQ(identifiers_most(0x22), 3U);
+  EXPECT_EQ(identifiers_most(0x21), 6U);
 }
 
 TEST(Uds, RefusalsThatWillStand) {

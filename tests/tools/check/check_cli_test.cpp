@@ -392,20 +392,6 @@ TEST_F(Check, TorqueInPercent) {
       << found["roles"]["engine_torque"];
 }
 
-TEST_F(Check, ATableOfSignalsIsNoLog) {
-  place.write("beltgrip.toml", drive("coast-overdrive").toml);
-  place.write("vehicle.dbc", drive("coast-overdrive").dbc);
-  place.write("table.csv",
-              "PrimarySpeed,SecondarySpeed,Ratio\nrpm,rpm,1\n1200,2700,2.25\n1201,2702,2.25\n");
-  for (const char* command : {"check", "replay"}) {
-    const RunResult result =
-        beltgrip({command, place.path("table.csv"), "--config", place.path("beltgrip.toml")});
-    EXPECT_EQ(result.status, 65);
-    EXPECT_EQ(lines(result.err), 1) << result.err;
-    EXPECT_TRUE(has(result.err, "table of 3 signals without a time column")) << result.err;
-  }
-}
-
 TEST_F(Check, AFrozenSpeed) {
   Drive wrong = drive("coast-overdrive");
   std::vector<std::uint8_t> last;

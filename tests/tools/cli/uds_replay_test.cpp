@@ -117,6 +117,41 @@ TEST_F(UdsReplay, AnswersInPlaceOfBroadcastsGiveTheSameResult) {
   }
 }
 
+// A local identifier among others, 29-bit addresses, and an answer on CAN FD, 5 ms after it was
+// asked for.
+TEST_F(UdsReplay, LocalIdentifiersOnCanFd) {
+  const std::string role =
+      "{ uds = { request = 0x18DA10F1, response = 0x18DAF110, service = 0x21, did = 0x10, bytes = "
+      "2,"
+      " start = 0, length = 16, byte_order = \"little\", scale = 0.001 }, unit = \"bar\", "
+      "period_ms = 10 }";
+  std::size_t count = 0;
+  const auto asked_and_answered = [&count](const Line& pressure) {
+    Line line = pressure;
+    if (count++ % 2 == 0) {
+      line.id = "18DAF110";
+      line.data = "#100096110" + pressure.data.substr(0, 4) + "2011223344CC";
+    } else {
+      line.id = "18DA10F1";
+      line.data = "03211020CCCCCCCC";
+    }
+    return line.text();
+  };
+  const std::string log = log_with(asked_and_answered);
+  const json truth = experiment(config(broadcast(10.0)),
+                                log_with([](const Line& line) { return line.text(); }, 2));
+  EXPECT_EQ(experiment(config(role), log), truth);
+
+  const RunResult result = beltgrip(
+      {"check", place_->path("case.log"), "--config", place_->path("case.toml"), "--json", "-"});
+  ASSERT_EQ(result.status, 0) << result.err;
+  const json pressure = json::parse(result.out).at("roles").at("secondary_pressure");
+  EXPECT_NEAR(pressure.at("rate_Hz").get<double>(), 100.0, 2.0);
+  EXPECT_NEAR(pressure.at("request_Hz").get<double>(), 100.0, 2.0);
+  EXPECT_NEAR(pressure.at("answer_s").get<double>(), 0.005, 0.0005);
+  EXPECT_NEAR(pressure.at("requests").get<double>(), pressure.at("frames").get<double>(), 1.0);
+}
+
 TEST_F(UdsReplay, BigEndianAnswersAndSuchOfSeveralFrames) {
   const auto kept = [](const Line& line) { return line.text(); };
   const json truth = experiment(config(broadcast(5.0)), log_with(kept));

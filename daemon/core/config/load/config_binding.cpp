@@ -176,7 +176,8 @@ std::optional<RoleBinding> RoleBinder::from_diagnostics(const UdsSource& source)
   binding.uds = source;
   binding.id = source.response;
   binding.message_name = id_text(source.response);
-  binding.signal_name = "did " + id_text({source.identifier, false}) + " " + signal_text(signal);
+  binding.signal_name = (source.service == can::kReadByIdentifier ? "did " : "local id ") +
+                        id_text({source.identifier, false}) + " " + signal_text(signal);
   binding.codec = can::SignalCodec(signal);
   if (!read_true_when(signal, binding)) return {};
   binding.unit = text_.unit;
@@ -273,6 +274,12 @@ std::optional<RoleBinding> SignalCatalogue::bind(Role role, const TomlNode& node
   const std::optional<RoleText> text = read_role(key, node, errors);
   if (!text) return {};
   const RoleBinder binder(role, node, *text, errors);
+  if (!text->uds && text->signal.empty()) {
+    errors.add(line_in_role(node, "column"), key, "a column, which no bus has",
+               "signal = \"Message.Signal\" beside it; check, calibrate and replay of a table do "
+               "without");
+    return {};
+  }
   if (text->uds) return binder.from_diagnostics(*text->uds);
   const std::uint32_t line = line_in_role(node, "signal");
   const std::size_t dot = text->signal.find('.');
@@ -305,6 +312,52 @@ std::optional<RoleBinding> SignalCatalogue::bind(Role role, const TomlNode& node
   binding.message_length = message.length;
   binding.message_fd = message.fd;
   return binder.from_message(std::move(binding), message, *signal, found->file->path);
+}
+
+std::optional<RoleBinding> SignalCatalogue::bind_column(Role role, const TomlNode* node,
+                                                        const can::Database& columns,
+                                                        ConfigErrors& errors) const {
+  const std::string key = key_of("signals", role_name(role));
+  RoleText text;
+  if (node != nullptr) {
+    const std::optional<RoleText> given = read_role(key, *node, errors);
+    if (!given) return {};
+    text = *given;
+  }
+  const std::string signal_name = text.signal.substr(text.signal.find('.') + 1);
+  const can::MessageDef* message = nullptr;
+  bool as_role = false;
+  if (!text.column.empty()) {
+    message = columns.find_message(text.column);
+  } else {
+    message = columns.find_message(std::string(role_name(role)));
+    as_role = message != nullptr;  // SI or by its own unit: what the signal's needs is not for it
+    if (message == nullptr) message = columns.find_message(text.signal);
+    if (message == nullptr) message = columns.find_message(signal_name);
+  }
+  RoleBinding binding;
+  binding.role = role;
+  binding.message_length = kClassicPayload;
+  if (message == nullptr) {
+    if (node == nullptr) return {};
+    binding.signal_name = text.column.empty() ? signal_name : text.column;
+    binding.id = {can::kExtendedIdMax, true};
+    return binding;
+  }
+  can::SignalDef signal = message->signals.front();
+  const can::SignalDef* known = as_role ? nullptr : find_signal(text.signal);
+  if (known != nullptr) {
+    if (signal.unit.empty()) signal.unit = known->unit;
+    const bool plain = known->scale == 1.0 && known->offset == 0.0;
+    if (signal.values.empty() && plain) signal.values = known->values;
+  }
+  binding.message_name = message->name;
+  binding.id = message->id;
+  static const TomlNode kNone;
+  const TomlNode& of_signal = as_role || node == nullptr ? kNone : *node;
+  if (as_role) text = {};
+  return RoleBinder(role, of_signal, text, errors)
+      .from_message(std::move(binding), *message, signal, "the table");
 }
 
 }  // namespace beltgrip::daemon

@@ -31,6 +31,7 @@ class Loader {
         further_catalogue_(kind) {}
 
   void load(ConfigScope scope);
+  void read_instead(std::shared_ptr<const TableSource> table) { config_.table = std::move(table); }
 
  private:
   void check_keys();
@@ -38,6 +39,7 @@ class Loader {
   void read_options();
   void read_sensors();
   void read_signals();
+  void read_columns();
   void read_roles(const TomlNode& signals);
   void read_protections();
   void read_catalogue(const std::vector<std::string>& paths, const std::string& key,
@@ -171,7 +173,23 @@ void Loader::read_sensors() {
   }
 }
 
+void Loader::read_columns() {
+  read_catalogue(config_.dbc, "bus.dbc", line_of(root_, "bus", "dbc"), catalogue_);
+  const TomlNode* signals = section("signals");
+  for (std::size_t i = 0; i < kRoleCount; ++i) {
+    const Role role = static_cast<Role>(i);
+    const TomlNode* node = signals == nullptr ? nullptr : signals->find(role_name(role));
+    auto binding = catalogue_.bind_column(role, node, config_.table->columns, errors_);
+    if (binding) config_.roles.push_back(std::move(*binding));
+  }
+  config_.control = Control::kObserve;
+}
+
 void Loader::read_signals() {
+  if (config_.table) {
+    read_columns();
+    return;
+  }
   const std::uint32_t line = line_of(root_, "bus", "dbc");
   if (config_.dbc.empty()) {
     const TomlNode* bus = section("bus");
@@ -289,6 +307,14 @@ std::string assumed_text(const Config& config) {
 ConfigResult load_config(const std::string& path, ConfigScope scope) {
   ConfigResult result;
   Loader(path, FileKind::kAny, result).load(scope);
+  return result;
+}
+
+ConfigResult load_config(const std::string& path, std::shared_ptr<const TableSource> table) {
+  ConfigResult result;
+  Loader loader(path, FileKind::kAny, result);
+  loader.read_instead(std::move(table));
+  loader.load(ConfigScope::kAll);
   return result;
 }
 

@@ -1,6 +1,7 @@
 // Reads the configuration and every file that it names. Start-up and tools only.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,6 +23,9 @@ struct ConfigResult {
 // for tables whose columns are named by role.
 enum class ConfigScope { kAll, kSignals, kVariator };
 ConfigResult load_config(const std::string& path, ConfigScope scope = ConfigScope::kAll);
+// The same for a table of signals: columns take the place of DBC and bus, roles may be missing, and
+// nobody is there to be commanded.
+ConfigResult load_config(const std::string& path, std::shared_ptr<const TableSource> table);
 // One line: what results rest on that nobody stated; empty: nothing.
 std::string assumed_text(const Config& config);
 

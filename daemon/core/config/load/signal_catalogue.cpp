@@ -1,5 +1,6 @@
 #include "daemon/core/config/load/signal_catalogue.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <filesystem>
@@ -95,6 +96,16 @@ void SignalCatalogue::check_identifiers(const std::string& key, std::uint32_t li
   if (clashes == 0) return;
   if (clashes > 1) first += " and " + std::to_string(clashes - 1) + " more such";
   errors.add(line, key, first, "each identifier in one file only");
+}
+
+const can::SignalDef* SignalCatalogue::find_signal(std::string_view name) const {
+  const std::size_t dot = std::min(name.find('.'), name.size());
+  for (const File& file : files_) {
+    const can::MessageDef* message = file.database.find_message(std::string(name.substr(0, dot)));
+    if (message == nullptr || dot == name.size()) continue;
+    return message->find_signal(std::string(name.substr(dot + 1)));
+  }
+  return nullptr;
 }
 
 std::vector<std::string> SignalCatalogue::message_names() const {

@@ -29,6 +29,11 @@ class SignalCatalogue {
   bool complete() const { return complete_; }
   // The binding of a role from its TOML value; nothing when errors were added (config_binding).
   std::optional<RoleBinding> bind(Role role, const TomlNode& node, ConfigErrors& errors) const;
+  // The same from a column of a table: the one that the role names, that is called like the role,
+  // or like its signal. `node` none: only one that is called like the role, else nothing. A column
+  // that is not there gives a binding that no frame has.
+  std::optional<RoleBinding> bind_column(Role role, const TomlNode* node,
+                                         const can::Database& columns, ConfigErrors& errors) const;
   // The protection of the message that the node's key names; nothing when errors were added
   // (config_protection).
   std::optional<MessageProtection> protect(const TomlNode& node, ConfigErrors& errors) const;
@@ -46,6 +51,8 @@ class SignalCatalogue {
   std::optional<Found> find_message(std::string_view name, const std::string& key,
                                     std::uint32_t line, ConfigErrors& errors) const;
   std::vector<std::string> message_names() const;
+  // "Message.Signal" in one of the files; nullptr: in none.
+  const can::SignalDef* find_signal(std::string_view name) const;
   // Empty unless messages of this file are told by parameter group.
   std::bitset<256> sources_of(const can::MessageDef& message) const;
 

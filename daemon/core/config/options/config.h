@@ -5,14 +5,17 @@
 #include <array>
 #include <bitset>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "can_dbc/dbc/model.h"
 #include "can_dbc/dbc/signal_codec.h"
 #include "can_dbc/text/unit_text.h"
+#include "can_dbc/uds/uds.h"
 #include "daemon/core/base/own_identifiers.h"
 #include "estimator/physics/assumed_constants.h"
 #include "estimator/physics/learned_term.h"
@@ -49,10 +52,14 @@ struct MuxCondition {
   std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges;  // inclusive
 };
 
-// Where a signal lives that no frame broadcasts: in the answer of one ECU to ReadDataByIdentifier.
+// Where a signal lives that no frame broadcasts: in the answer of one ECU to ReadDataByIdentifier
+// (0x22), or to ReadDataByLocalIdentifier (0x21), whose identifiers have one byte.
 struct UdsSource {
   can::CanId request, response;
+  std::uint8_t service = can::kReadByIdentifier;
   std::uint16_t identifier = 0;
+  // Of data behind the identifier; known: it may be asked for together with others. 0: not known.
+  std::uint16_t bytes = 0;
   can::SignalDef signal{};  // in the data after the identifier; start bit as in a DBC
 };
 
@@ -127,6 +134,15 @@ struct FurtherBus {
   std::vector<std::string> dbc;  // of its messages; empty: those of [bus]
 };
 
+// A table of signals that is read instead of frames, by tools alone: its columns as messages.
+struct TableSource {
+  can::Database columns;
+  double rate_Hz = 0.0;  // rows a second where no column tells the time
+};
+
+// Of a role that is read out of a table: the table has that column.
+inline bool has_column(const RoleBinding& binding) { return !binding.message_name.empty(); }
+
 struct Config {
   std::string interface = "vcan0";
   std::vector<std::string> dbc;
@@ -151,6 +167,7 @@ struct Config {
   Control control = Control::kObserve;
   ExperimentSettings experiment;
   std::vector<std::string> files;  // that were read for it: itself, DBC files, model
+  std::shared_ptr<const TableSource> table;
   std::string state_dir;  // path as in the file; empty: $STATE_DIRECTORY, or nothing is kept
 };
 

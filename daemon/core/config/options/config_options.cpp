@@ -270,6 +270,12 @@ constexpr OptionOf<RoleText> kRoleOptions[] = {
                     "has the keys\n"
                     "further below.")
         .showing("{ ... }"),
+    text<&RoleText::column>(
+        "signals.ROLE", "column",
+        "The column of a table of signals (.csv) that check, calibrate and replay read instead of\n"
+        "frames. Left out: one that is called like the role, or like the signal.")
+        .expecting("text \"name of the column\"")
+        .showing("\"Primary Rev Speed\""),
     text<&RoleText::unit>(
         "signals.ROLE", "unit",
         "Left out: that of the DBC. A flag has none.\n"
@@ -350,6 +356,17 @@ constexpr OptionOf<UdsSource> kUdsOptions[] = {
                                                         "role = scale * signal + offset, in unit."),
     flag<&UdsSource::signal, &can::SignalDef::type>(
         "signals.ROLE.uds", "signed", "The signal may be negative (two's complement)."),
+    integer<&UdsSource::service>("signals.ROLE.uds", "service", "", can::kReadByLocalIdentifier,
+                                 can::kReadByIdentifier,
+                                 "0x22: by identifier (UDS); 0x21: by local identifier of one byte "
+                                 "(KWP2000).")
+        .hexadecimal(),
+    integer<&UdsSource::bytes>("signals.ROLE.uds", "bytes", "", 0, kUdsDataMax,
+                               "Data bytes of the identifier. Given, the poll asks for it together "
+                               "with others of its\n"
+                               "ECU that have it too, up to three (0x22) or six (0x21) in one "
+                               "request; an ECU that\n"
+                               "refuses that is asked for one at a time. 0: not known."),
 };
 
 constexpr OptionOf<ProtectionText> kProtectionOptions[] = {

@@ -28,6 +28,7 @@ std::span<const OptionOf<FrameIdentifiers>> identifier_options();
 // signals.ROLE = { ... }
 struct RoleText {
   std::string signal;
+  std::string column;
   std::optional<UdsSource> uds;
   std::string unit;
   double scale = 1.0, offset = 0.0;

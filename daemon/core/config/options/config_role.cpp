@@ -35,7 +35,9 @@ std::optional<RoleText> read_role(const std::string& key, const TomlNode& node,
   }
   bool good = read_keys(role_options(), key, node, text, errors);
   const bool by_uds = node.find("uds") != nullptr;
-  if (by_uds == (node.find("signal") != nullptr)) {
+  const bool by_column = node.find("column") != nullptr;
+  const bool by_signal = node.find("signal") != nullptr;
+  if ((by_uds && by_signal) || (!by_uds && !by_signal && !by_column)) {
     errors.add(node.line, key, by_uds ? "both signal and uds" : "a table without signal",
                by_uds ? "one of them" : "signal = \"Message.Signal\"");
     good = false;

@@ -109,6 +109,16 @@ bool read_role_uds(const std::string& key, const TomlNode& node, RoleText& role,
   bool good = read_keys(uds_options(), key, node, uds, errors);
   good &= has_required(uds_options(), key, node, "a table", example(), errors);
   if (!good) return false;
+  if (can::identifier_bytes(uds.service) == 1 && uds.identifier > 0xFF) {
+    errors.add(node.line, key + ".did", "an identifier of two bytes",
+               "0 to 0xFF, as service is 0x21");
+    return false;
+  }
+  if (uds.bytes > 0 && !can::SignalCodec(uds.signal).fits(uds.bytes)) {
+    errors.add(node.line, key + ".bytes", "fewer than the signal needs",
+               "all data bytes of the identifier, or no such key");
+    return false;
+  }
   if (!can::SignalCodec(uds.signal).fits(kUdsDataMax)) {
     errors.add(node.line, key, "a signal that does not fit in an answer",
                "start and length inside " + std::to_string(kUdsDataMax) + " bytes of data");

@@ -308,6 +308,36 @@ TEST(TxGatePoll, OnlyTheListedRequestOnItsBus) {
   EXPECT_FALSE(permits(frame_of(0x6A0, 0x6A0, 0), 1));
 }
 
+TEST(TxGatePoll, SeveralListedIdentifiersOfOneService) {
+  PollLimits limits;
+  limits.requests[0] = {0, {0x7E1, false}, 0x1101, 50 * kMillisecond};
+  limits.requests[1] = {0, {0x7E1, false}, 0x1102, 50 * kMillisecond};
+  limits.requests[2] = {0, {0x7E1, false}, 0x0003, 50 * kMillisecond, 0x21};
+  limits.requests[3] = {0, {0x7E2, false}, 0x1103, 50 * kMillisecond};
+  limits.size = 4;
+  MonoTime t = 0;
+  TxGate gate({}, Control::kObserve, {}, limits);
+  const auto permits = [&](std::initializer_list<std::uint8_t> bytes, Duration later = kSecond) {
+    return gate.permits(request_of(0x7E1, bytes), 0, t += later);
+  };
+  EXPECT_TRUE(permits({0x05, 0x22, 0x11, 0x01, 0x11, 0x02}));
+  EXPECT_TRUE(permits({0x30, 0, 0}, 0));
+  EXPECT_FALSE(permits({0x30, 0, 0}, 0));  // one for the whole request
+  EXPECT_TRUE(permits({0x02, 0x21, 0x03}));
+  EXPECT_FALSE(permits({0x05, 0x22, 0x11, 0x01, 0x11, 0x01}));              // twice
+  EXPECT_FALSE(permits({0x05, 0x22, 0x11, 0x01, 0x11, 0x03}));              // another ECU's
+  EXPECT_FALSE(permits({0x07, 0x22, 0x11, 0x01, 0x11, 0x02, 0x00, 0x03}));  // another service's
+  EXPECT_FALSE(permits({0x04, 0x22, 0x11, 0x01, 0x11}));                    // half an identifier
+  EXPECT_FALSE(permits({0x08, 0x22, 0x11, 0x01, 0x11, 0x02, 0x11, 0x01}));
+  EXPECT_FALSE(permits({0x01, 0x22}));
+  EXPECT_FALSE(permits({0x01, 0x21}));
+  EXPECT_FALSE(permits({0x02, 0x21, 0x04}));
+  // Each keeps its own period.
+  EXPECT_TRUE(permits({0x03, 0x22, 0x11, 0x02}));
+  EXPECT_FALSE(permits({0x05, 0x22, 0x11, 0x01, 0x11, 0x02}, 10 * kMillisecond));
+  EXPECT_TRUE(permits({0x03, 0x22, 0x11, 0x01}, 0));
+}
+
 // Every pair of the first two bytes, and every data identifier: no other service passes.
 TEST(TxGatePoll, OnlyReadingAndOnlyTheListedIdentifier) {
   TxGate gate({}, Control::kCommand, kAnyRequest, two_identifiers());

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <functional>
 #include <vector>
 
@@ -21,7 +22,7 @@ constexpr Duration kStep = 5 * kMillisecond;
 RoleBinding role_of(Role role, std::uint16_t identifier, double period_ms) {
   RoleBinding binding;
   binding.role = role;
-  binding.uds = UdsSource{kRequest, kResponse, identifier};
+  binding.uds = UdsSource{.request = kRequest, .response = kResponse, .identifier = identifier};
   binding.id = kResponse;
   can::SignalDef signal;
   signal.start_bit = 7;
@@ -62,7 +63,8 @@ class Bench {
     for (const RoleBinding& role : config.roles) {
       limits.requests[limits.size++] = {
           role.bus, role.uds->request, role.uds->identifier,
-          static_cast<Duration>(*role.period_ms * static_cast<double>(kMillisecond))};
+          static_cast<Duration>(*role.period_ms * static_cast<double>(kMillisecond)),
+          role.uds->service};
     }
     if (config.diagnostics == Diagnostics::kPoll) gate = TxGate({}, Control::kObserve, {}, limits);
   }
@@ -86,9 +88,10 @@ class Bench {
   void arrive(const can::CanFrame& frame, bool echo = false) {
     UdsReading reading;
     client.on_frame({.t = t + kMillisecond, .frame = frame, .own_echo = echo}, reading);
-    if (reading.roles.empty()) return;
-    readings.push_back(reading);
-    data.emplace_back(reading.data.begin(), reading.data.end());
+    for (bool more = !reading.roles.empty(); more; more = client.next(reading)) {
+      readings.push_back(reading);
+      data.emplace_back(reading.data.begin(), reading.data.end());
+    }
   }
   void answer(const Bytes& bytes) { arrive(frame_of(kResponse, bytes)); }
   void answer_all(const Sent& request) {
@@ -128,6 +131,88 @@ TEST(UdsClient, ListeningSendsNothingAndTakesEveryonesAnswers) {
   EXPECT_EQ(bench.data[0], (Bytes{0x09, 0xC4}));
   EXPECT_EQ(bench.readings[0].roles[0], Role::kSecondaryPressure);
   EXPECT_EQ(bench.readings[0].t, kSecond + kMillisecond);
+}
+
+// Four values of an ECU, two bytes each, in two requests: three identifiers fit in a frame.
+Config four_values(std::uint8_t service, std::uint16_t bytes) {
+  constexpr std::array kRoles{Role::kPrimarySpeed, Role::kSecondarySpeed, Role::kSecondaryPressure,
+                              Role::kEngineTorque};
+  std::vector<RoleBinding> roles;
+  for (std::size_t i = 0; i < kRoles.size(); ++i) {
+    roles.push_back(role_of(kRoles[i], static_cast<std::uint16_t>(0x10 + i), 50.0));
+    roles.back().uds->service = service;
+    roles.back().uds->bytes = bytes;
+  }
+  return config_of(Diagnostics::kPoll, std::move(roles));
+}
+
+// Answers with its own name as the data of each identifier, on CAN FD where it must.
+void answer_several(Bench& bench, const Sent& request) {
+  const std::size_t width = request.bytes[1] == 0x22 ? 2 : 1;
+  Bytes answer{static_cast<std::uint8_t>(request.bytes[1] + 0x40)};
+  for (std::size_t at = 2; at <= request.bytes[0]; at += width) {
+    for (std::size_t i = 0; i < width; ++i) answer.push_back(request.bytes[at + i]);
+    answer.push_back(request.bytes[at + width - 1]);
+    answer.push_back(0x77);
+  }
+  Bytes single{static_cast<std::uint8_t>(answer.size())};
+  if (answer.size() > 7) single.insert(single.begin(), 0x00);
+  single.insert(single.end(), answer.begin(), answer.end());
+  can::CanFrame frame = frame_of(kResponse, single);
+  frame.fd = single.size() > 8;
+  bench.arrive(frame);
+}
+
+TEST(UdsClient, AsksForSeveralIdentifiersAtOnce) {
+  Bench bench(four_values(0x22, 2));
+  bench.run(kSecond, [&](const Sent& request) { answer_several(bench, request); });
+  ASSERT_EQ(bench.sent.size(), 40U);
+  EXPECT_EQ(bench.sent[0].bytes, (Bytes{0x07, 0x22, 0x00, 0x10, 0x00, 0x11, 0x00, 0x12}));
+  EXPECT_EQ(bench.sent[1].bytes, (Bytes{0x03, 0x22, 0x00, 0x13, 0xCC, 0xCC, 0xCC, 0xCC}));
+  ASSERT_EQ(bench.readings.size(), 80U);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(bench.readings[i].roles[0], bench.readings[i + 4].roles[0]);
+    EXPECT_EQ(bench.data[i], (Bytes{static_cast<std::uint8_t>(0x10 + i), 0x77}));
+  }
+}
+
+TEST(UdsClient, AsksForLocalIdentifiers) {
+  Bench bench(four_values(0x21, 2));
+  bench.run(kSecond, [&](const Sent& request) { answer_several(bench, request); });
+  ASSERT_EQ(bench.sent.size(), 20U);  // six would fit
+  EXPECT_EQ(bench.sent[0].bytes, (Bytes{0x05, 0x21, 0x10, 0x11, 0x12, 0x13, 0xCC, 0xCC}));
+  EXPECT_EQ(bench.readings.size(), 80U);
+  // The same number by the other service is another identifier.
+  bench.answer({0x05, 0x62, 0x00, 0x10, 1, 2, 0xCC, 0xCC});
+  EXPECT_EQ(bench.readings.size(), 80U);
+}
+
+TEST(UdsClient, AnEcuThatRefusesSeveralIsAskedForOneAtATime) {
+  Bench bench(four_values(0x22, 2));
+  bench.run(kSecond, [&](const Sent& request) {
+    if (request.bytes[0] > 3) {
+      bench.answer({0x03, 0x7F, 0x22, 0x13, 0xCC, 0xCC, 0xCC, 0xCC});
+    } else {
+      answer_several(bench, request);
+    }
+  });
+  ASSERT_GT(bench.sent.size(), 70U);
+  for (std::size_t i = 1; i < bench.sent.size(); ++i) EXPECT_EQ(bench.sent[i].bytes[0], 3);
+  EXPECT_GT(bench.readings.size(), 70U);
+  EXPECT_EQ(bench.client.counters().refusals, 1U);
+}
+
+// Foreign data of unknown length end what can be told apart.
+TEST(UdsClient, AnAnswerIsTakenAsFarAsItsLengthsAreKnown) {
+  Config config = four_values(0x22, 2);
+  config.diagnostics = Diagnostics::kListen;
+  Bench bench(config);
+  bench.answer({0x07, 0x62, 0x00, 0x10, 1, 2, 0x00, 0x11});
+  ASSERT_EQ(bench.readings.size(), 2U);  // its data are cut: the monitor refuses them
+  EXPECT_EQ(bench.data[0], (Bytes{1, 2}));
+  EXPECT_TRUE(bench.data[1].empty());
+  bench.answer({0x06, 0x62, 0x77, 0x77, 1, 0x00, 0x10, 0xCC});
+  EXPECT_EQ(bench.readings.size(), 2U);
 }
 
 TEST(UdsClient, PollsAtItsPeriod) {

@@ -126,7 +126,8 @@ TEST(OutputStage, WhatIsRefusedIsAFaultAndCounted) {
 
 RoleBinding polled(std::uint16_t identifier, double period_ms) {
   RoleBinding role;
-  role.uds = UdsSource{{0x7E0, false}, {0x7E8, false}, identifier, {}};
+  role.uds =
+      UdsSource{.request = {0x7E0, false}, .response = {0x7E8, false}, .identifier = identifier};
   role.period_ms = period_ms;
   return role;
 }
