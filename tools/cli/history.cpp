@@ -36,8 +36,6 @@ using daemon::end_stop_name;
 using daemon::HistoryRow;
 using daemon::outcome_name;
 using daemon::stop_reason_name;
-using estimator::Direction;
-using estimator::EndStop;
 using estimator::PeakKind;
 
 struct Options {

@@ -126,14 +126,12 @@ void ReportCourses::take_drive_sample(const daemon::SampleReport& report, double
 void ReportCourses::take_lanes(const daemon::SampleReport& report, double t_s) {
   const std::uint64_t bits = standing(report);
   for (std::size_t i = 0; i < kLaneCount; ++i) {
+    std::optional<double>& since_s = since_s_[i];
     const bool stands = (bits >> i & 1U) != 0;
-    if (stands == since_s_[i].has_value()) continue;
-    if (stands) {
-      since_s_[i] = t_s;
-    } else {
-      spans_s_[i].push_back({*since_s_[i], t_s});
-      since_s_[i].reset();
-    }
+    if (stands && !since_s) since_s = t_s;
+    if (stands || !since_s) continue;
+    spans_s_[i].push_back({*since_s, t_s});
+    since_s.reset();
   }
 }
 
@@ -185,7 +183,9 @@ void ReportCourses::finish(const ReplayResult& result) {
   if (result.requests_followed) take_requests(*result.requests_followed);
   const double end_s = drive_.t_s.empty() ? 0.0 : drive_.t_s.back() + period_s_;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    if (since_s_[i]) spans_s_[i].push_back({*since_s_[i], end_s});
+    if (const std::optional<double>& since_s = since_s_[i]) {
+      spans_s_[i].push_back({*since_s, end_s});
+    }
     if (spans_s_[i].empty() && i >= kFirstInhibit) continue;
     report::Lane stood = lane(i);
     stood.spans_s = std::move(spans_s_[i]);

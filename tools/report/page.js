@@ -31,16 +31,19 @@ const drawInSight = (element, draw) => {
 };
 
 const drawCurve = ([id, title, xLabel, yLabel, series]) => {
-  const datasets = series.map(([label, line, dashed, band, xy], place) => {
+  let shape = 0;  // of the next points
+  const datasets = series.map(([label, line, dashed, band, xy]) => {
     const points = [];
     for (let k = 0; k + 1 < xy.length; k += 2) points.push({x: xy[k], y: xy[k + 1]});
     const colour = band ? 'transparent' : colourOf(label);
     return {label, data: points, showLine: line, borderColor: colour,
             backgroundColor: band ? bandColour : colour, fill: band && label ? '-1' : false,
             borderWidth: line ? 1.5 : 1, borderDash: dashed ? dashes : [],
-            order: points.length === 1 ? -1 : 0, pointBorderWidth: points.length === 1 ? 2 : 1,
-            pointStyle: shapes[place % shapes.length],
-            pointRadius: line ? 0 : points.length === 1 ? 7 : 2.5};
+            // The lowest lies on top.
+            order: band ? 2 : line ? 1 : points.length === 1 ? -1 : 0,
+            pointStyle: line ? 'line' : shapes[shape++ % shapes.length],
+            pointBorderWidth: points.length === 1 ? 2 : 1,
+            pointRadius: line ? 0 : points.length === 1 ? 7 : 3};
   });
   return new Chart(document.getElementById(id), {
     type: 'scatter',
@@ -214,7 +217,7 @@ class Courses {
     const axes = {
       x: {drawAxis: last, axisLabelFormatter: (t) => String(Number(t.toPrecision(9))),
           ticker: spec.names.length ? wholeTicks : Dygraph.numericTicks, valueFormatter: String},
-      y: {axisLabelWidth: 55, pixelsPerLabel: 22, valueFormatter: (y) => String(Number(y.toPrecision(4))),
+      y: {axisLabelWidth: 55, pixelsPerLabel: 22, valueFormatter: shortly, axisLabelFormatter: shortly,
           ...(lanes.length ? {ticker: () => [], drawGrid: false} : {})}};
     const graph = new Dygraph(place, this.overview[p], {
       labels: [spec.label, ...labels], series, axes,
@@ -313,6 +316,7 @@ class Courses {
   }
 }
 
+const shortly = (y) => String(Number(y.toPrecision(4)));
 const escaped = (text) =>
   text.replace(/[&<>"]/g, (c) => ({'&': '&amp;', '<': '&lt;', '>': '&gt;', '"': '&quot;'})[c]);
 
