@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <sstream>
 #include <string>
 
+#include "daemon/core/experiment/arming.h"
 #include "tests/support/browser.h"
 #include "tests/support/program.h"
 #include "tools/report/html_page.h"
@@ -149,6 +152,25 @@ TEST_F(Hour, TheMouseZoomsToEverySampleAndBack) {
   expect_no_complaint();
 }
 
+// For how many samples each inhibit stood, by `--signals-out`: its column has a bit for each.
+std::array<double, daemon::kInhibitCount> samples_inhibited(const std::string& csv) {
+  std::istringstream in(csv);
+  std::string line, cell;
+  std::getline(in, line);
+  std::size_t column = 0;
+  std::istringstream head(line);
+  for (; std::getline(head, cell, ',') && !cell.starts_with("inhibits"); ++column) {
+  }
+  std::array<double, daemon::kInhibitCount> samples{};
+  while (std::getline(in, line)) {
+    std::istringstream row(line);
+    for (std::size_t i = 0; i <= column; ++i) std::getline(row, cell, ',');
+    const auto bits = static_cast<std::uint32_t>(std::stoul(cell));
+    for (std::size_t i = 0; i < samples.size(); ++i) samples[i] += bits >> i & 1U;
+  }
+  return samples;
+}
+
 TEST_F(Page, OfADriveHasEverySampleOfTheReplay) {
   demand({"simulate", "--scenario", "demo", "--out-dir", place_.path("drive")});
   const std::string log = place_.path("drive/trace.log"),
@@ -168,6 +190,16 @@ TEST_F(Page, OfADriveHasEverySampleOfTheReplay) {
   EXPECT_EQ(
       number("stacks[0].panels[0].lanes.filter(([name]) => name === 'experiment')[0][2].length"),
       4);
+  const auto samples = samples_inhibited(place_.read("signals.csv"));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const std::string lane = "stacks[0].panels[0].lanes.filter(([name]) => name === '" +
+                             std::string(daemon::kInhibits[i].name) + "')";
+    ASSERT_EQ(number(lane + ".length"), samples[i] > 0.0 ? 1 : 0) << daemon::kInhibits[i].name;
+    if (samples[i] == 0.0) continue;
+    EXPECT_NEAR(number(lane + "[0][2].reduce((sum, t, k) => sum + (k % 2 ? t : -t), 0)"),
+                samples[i] * kPeriod_s, kPeriod_s)  // the log ends between two samples
+        << daemon::kInhibits[i].name;
+  }
   // Of the clamping force that was asked for: what stands in the log's own frames.
   EXPECT_GT(number("stacks[0].panels[1].series[1].codes.filter((c) => c !== missing).length"),
             1000);
