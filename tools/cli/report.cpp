@@ -11,8 +11,8 @@
 #include "daemon/core/publish/names.h"
 #include "estimator/physics/least_loss.h"
 #include "tools/cli/command.h"
-#include "tools/cli/configuration.h"
 #include "tools/cli/history_page.h"
+#include "tools/cli/log_configuration.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
 #include "tools/cli/report_courses.h"
@@ -28,6 +28,7 @@ namespace {
 struct Options {
   std::vector<std::string> logs;
   std::string config, method, interface, history;
+  double rate_Hz = 0.0;
   std::string out = "report.html";
 };
 
@@ -73,7 +74,8 @@ void report_logs(const Options& options) {
   if (options.config.empty()) throw Failure{kUsage, "report: --config is required for logs"};
   end_logs_when_stopped(options.logs);
   Inputs inputs(options.logs);
-  const daemon::Config config = load_configuration(options.config, options.method);
+  const daemon::Config config =
+      load_configuration_for(options.logs, options.rate_Hz, options.config, options.method);
   inputs.add(config.files);
   inputs.demand_apart(options.out);
   std::vector<report::ExperimentCourse> experiments;
@@ -148,6 +150,7 @@ void add_report(command_line::Command app) {
       .one_of({"robust", "paper"});
   command.add_option("--interface", options->interface, "Frames of this interface only")
       .type_name("INTERFACE");
+  add_rate_option(command, options->rate_Hz);
   command.add_option("--out", options->out, "The HTML file")
       .type_name("FILE")
       .capture_default_str();

@@ -46,6 +46,21 @@ TEST_F(Report, ShowsEveryExperimentOfTheLog) {
   EXPECT_EQ(count(page, "<td>cool-down</td>"), 1);
 }
 
+// A table of the signals is a log too.
+TEST_F(Report, ShowsATable) {
+  ASSERT_EQ(beltgrip({"dbc", "decode", place_.path("drive/trace.log"), "--dbc",
+                      place_.path("drive/vehicle.dbc"), "--csv", place_.path("table.csv")})
+                .status,
+            0);
+  const RunResult run = report("table.csv");
+  ASSERT_EQ(run.status, 0) << run.err;
+  const RunResult replayed = beltgrip({"replay", place_.path("table.csv"), "--config",
+                                       place_.path("drive/beltgrip.toml"), "--json", "-"});
+  const long experiments = count(replayed.out, "\"type\":\"experiment\"");
+  EXPECT_GT(experiments, 0);
+  EXPECT_TRUE(run.out.starts_with(std::to_string(experiments) + " experiments: ")) << run.out;
+}
+
 TEST_F(Report, SaysWhyThereIsNoExperiment) {
   const std::string log = place_.read("drive/trace.log");
   place_.write("short.log", log.substr(0, log.find('\n', 20'000) + 1));
