@@ -20,9 +20,11 @@ struct InhibitRow {
 };
 constexpr std::array<InhibitRow, kInhibitCount> kInhibitWords{{
     {Inhibit::kInputs,
-     {"a signal of a role is not there, too old, or out of range",
-      "`beltgrip status can0` shows each role with its age; is the right interface, DBC and "
-      "message named?"}},
+     {"a signal of a role is not there, too old, or out of range; or the belt cannot be read: its "
+      "torque is near zero or turns round, its ratio moves",
+      "nothing where it comes and goes with the pedals; else `beltgrip status can0` shows each "
+      "role "
+      "with its age; is the right interface, DBC and message named?"}},
     {Inhibit::kFault, {"a fault that forbids requests (below)", "mend the fault"}},
     {Inhibit::kPermission,
      {"`experiment_permitted` is 0", "the controller withholds it; ask it why"}},
