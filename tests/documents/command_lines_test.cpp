@@ -43,6 +43,7 @@ constexpr std::array kEndings{
     Ending{"beltgrip can ", 69, "no CAN interface"},
     Ending{"--live", 69, "no CAN interface"},
     Ending{"--bus vcan0", 69, "no CAN interface"},
+    Ending{"scan.csv", 66, "somebody else's recording: table_cli_test has one like it"},
     Ending{"diagnose --config", 66, "no tables: it would take minutes"},
     Ending{"diagnose run", 66, "the same"},
     Ending{"simulate --model model.toml", 66, "what diagnose would have written"},

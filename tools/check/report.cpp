@@ -80,7 +80,9 @@ std::string role_line(const RoleCourse& course) {
   const double least = in.value(course.least), largest = in.value(course.largest);
   // What the arithmetic leaves of nothing is none.
   const bool flag = daemon::role_dimension(course.binding->role) == can::Dimension::kNone;
-  const double noise = course.noise() > 1e-3 * course.step ? in.difference(course.noise()) : 0.0;
+  const double nothing = std::max(
+      1e-3 * course.step, 1e-9 * std::max(std::abs(course.least), std::abs(course.largest)));
+  const double noise = course.noise() > nothing ? in.difference(course.noise()) : 0.0;
   return line + cell(format("%.1f", course.rate_Hz()), 9) +
          cell(grouped(1e3 * course.longest_gap_s), 9) + cell(number(in.value(course.value)), 10) +
          padded(" " + course.binding->unit, 6) + cell(number(std::min(least, largest)), 10) +

@@ -36,7 +36,7 @@ void missing_for_command(const daemon::Config& config, std::vector<std::string>&
   if (config.variator.primary_inertia_kg_m2 <= 0.0) {
     missing.push_back("to command: variator.primary_inertia_kg_m2");
   }
-  if (config.control != daemon::Control::kCommand) {
+  if (config.control != daemon::Control::kCommand && !config.table) {
     missing.push_back("to command: experiment.control = \"command\"");
   }
 }

@@ -23,7 +23,8 @@ std::optional<table::Head> head_of(const std::string& path) {
   };
   std::error_code none;
   if (!is_called(".csv") && !is_called(".tsv")) return {};
-  if (!std::filesystem::is_regular_file(path, none)) return {};
+  const auto file = std::filesystem::status(path, none);
+  if (!std::filesystem::is_regular_file(file) && std::filesystem::exists(file)) return {};
   try {
     return table::read_head(path);
   } catch (const can::LogOpenError& error) {

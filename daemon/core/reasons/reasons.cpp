@@ -270,6 +270,7 @@ std::string why(const ExperimentResult& result, const std::string& lost) {
 
 std::string_view remedy_of(const ExperimentResult& result) {
   if (result.outcome == Outcome::kNone || result.outcome == Outcome::kCompleted) return {};
+  if (result.peak.contradictory || result.peak.impossible) return {};  // why_no_value() asks for it
   return result.beyond ? words_of(Inhibit::kModel).remedy : words_of(result.stop_reason).remedy;
 }
 

@@ -197,6 +197,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Drive{"worn-belt", "completed", "overrun", 0.090, true},
                     Drive{"cruise-drive-torque", "completed", "drive", 0.105, true},
                     Drive{"coast-overdrive-unreachable", "inconclusive", "overrun", 0.105, false},
+                    Drive{"floor-06MPa-coast", "inconclusive", "overrun", 0.105, false},
+                    Drive{"floor-06MPa-drive", "inconclusive", "drive", 0.105, false},
                     Drive{"coast-low", "", "", 0.0, false}, Drive{"cold-oil", "", "", 0.0, false}),
     [](const auto& drive) {
       std::string name = drive.param.scenario;

@@ -55,6 +55,25 @@ TEST_F(TableCli, DecodedFramesReplayLikeTheFrames) {
               frames["stop_s"].get<double>() - frames["start_s"].get<double>(), 0.02);
 }
 
+// A share has the unit 1 there.
+TEST_F(TableCli, SignalsOutOfACarAreCheckedAgain) {
+  ASSERT_EQ(
+      beltgrip({"simulate", "--scenario", "coast-overdrive-unreachable", "--out-dir", path("car")})
+          .status,
+      0);
+  const std::string toml = path("car/beltgrip.toml");
+  ASSERT_EQ(beltgrip({"replay", path("car/trace.log"), "--config", toml, "--signals-out",
+                      path("car.csv")})
+                .status,
+            0);
+  const RunResult result = beltgrip({"check", path("car.csv"), "--config", toml, "--json", "-"});
+  ASSERT_EQ(result.status, 0) << result.err;
+  const json found = json::parse(result.out);
+  EXPECT_EQ(found["roles"]["accelerator_pedal"]["unit"], "1");
+  EXPECT_EQ(found["ready"], "observe");
+  EXPECT_TRUE(has(found["sentence"], "force floor 2,2")) << found["sentence"];
+}
+
 // Its own columns are called like the roles.
 TEST_F(TableCli, SignalsOutAreReadAgain) {
   const std::string toml = path("rig/beltgrip.toml");

@@ -137,6 +137,9 @@ std::optional<can::Unit> RoleBinder::unit_of(const can::SignalDef& signal,
   const bool has_unit = is_given("unit");
   const std::uint32_t line = line_in_role(node_, "unit");
   const std::string& unit_text = has_unit ? text_.unit : signal.unit;
+  if (dimension == can::Dimension::kShare && unit_text == can::si_unit_text(dimension)) {
+    return can::Unit{dimension};
+  }
   const std::optional<can::Unit> unit = can::parse_unit(unit_text);
   const std::string where = has_unit || dbc_path.empty() ? "" : " in " + dbc_path;
   const std::string found =
