@@ -12,7 +12,7 @@ namespace beltgrip::table {
 namespace {
 
 constexpr int kLinesLooked = 60;
-constexpr std::size_t kColumnsLeast = 2;
+constexpr std::size_t kColumnsLeast = 2, kColumnsMost = 4096;
 constexpr std::size_t kTextsMost = 64;
 constexpr int kDecimalsMost = 9;
 constexpr std::uint32_t kFirstId = 0x1FFF0000;
@@ -42,7 +42,10 @@ std::optional<std::int64_t> time_unit(std::string_view text) {
 }
 
 bool is_name(std::string_view cell, char separator) {
-  return !is_missing(cell) && !number_of(cell, separator);
+  const bool printable = std::none_of(cell.begin(), cell.end(), [](char c) {
+    return static_cast<unsigned char>(c) < ' ' || c == '\x7f';
+  });
+  return printable && !is_missing(cell) && !number_of(cell, separator);
 }
 
 // "Speed [rpm]", "Speed (rpm)", "t[s]"; parentheses that hold no unit belong to the name.
@@ -79,6 +82,17 @@ bool is_time(const Column& column, std::int64_t& unit_ns) {
   return true;
 }
 
+// Behind a preamble too, which may look like names.
+bool has_frames(const std::string& path) {
+  Lines lines(path);
+  for (int looked = 0; looked < kLinesLooked; ++looked) {
+    const auto line = lines.next();
+    if (!line) return false;
+    if (can::is_head_of_frames(*line)) return true;
+  }
+  return false;
+}
+
 class HeadReader {
  public:
   explicit HeadReader(const std::string& path) : lines_(path) {}
@@ -104,10 +118,10 @@ class HeadReader {
   bool find_names() {
     for (int looked = 0; looked < kLinesLooked; ++looked) {
       const auto line = lines_.next();
-      if (!line || can::is_head_of_frames(*line)) return false;
+      if (!line) return false;
       for (const char separator : {',', ';', '\t'}) {
         split(*line, separator, cells_);
-        if (cells_.size() < kColumnsLeast) continue;
+        if (cells_.size() < kColumnsLeast || cells_.size() > kColumnsMost) continue;
         if (!std::all_of(cells_.begin(), cells_.end(),
                          [&](std::string_view cell) { return is_name(cell, separator); })) {
           continue;
@@ -176,7 +190,9 @@ can::ValueTable values_of(std::vector<std::string> texts) {
 
 }  // namespace
 
-std::optional<Head> read_head(const std::string& path) { return HeadReader(path).read(); }
+std::optional<Head> read_head(const std::string& path) {
+  return has_frames(path) ? std::nullopt : HeadReader(path).read();
+}
 
 can::Database database_of(const Head& head) {
   can::Database database;

@@ -31,6 +31,10 @@ class TableLog final : public can::LogReader {
     for (std::size_t i = 0; i < head_.columns.size(); ++i) {
       const can::MessageDef* message = columns.find_message(head_.columns[i].name);
       if (message == nullptr || head_.time == i) continue;
+      const bool again = std::any_of(cells_.begin(), cells_.end(), [message](const Cell& each) {
+        return each.id == message->id;  // the first column of a name counts
+      });
+      if (again) continue;
       const can::SignalDef& signal = message->signals.front();
       cells_.push_back({i, message->id, can::SignalCodec(signal), &signal});
     }

@@ -105,10 +105,19 @@ TEST_F(Table, WhatIsBadIsLeftOutAndCounted) {
   EXPECT_EQ(log->stats().first_bad[0].line, 4U);
 }
 
+TEST_F(Table, OfTwoColumnsOfOneNameTheFirstCounts) {
+  EXPECT_EQ(frames(write("t,a,a\n0,1,2\n")), (Lines{"0 a=1"}));
+}
+
 TEST_F(Table, WhatIsNoTable) {
+  EXPECT_FALSE(read_head(write("a\x01,b\x02\n1,2\n")));  // no names
+  std::string many = "a";
+  for (int i = 0; i < 5000; ++i) many += ",a";
+  EXPECT_FALSE(read_head(write(many + "\n1,2\n")));
   EXPECT_FALSE(read_head(write("time,id,data\n0.1,123,0011\n")));  // frames
-  EXPECT_FALSE(read_head(write("t,a,b\n")));                       // no row
-  EXPECT_FALSE(read_head(write("1,2,3\n4,5,6\n")));                // no names
+  EXPECT_FALSE(read_head(write("Some Spy,Export\nBus,HS CAN\ntime,id,data\n0.1,123,0011\n")));
+  EXPECT_FALSE(read_head(write("t,a,b\n")));         // no row
+  EXPECT_FALSE(read_head(write("1,2,3\n4,5,6\n")));  // no names
   EXPECT_FALSE(read_head(write("")));
   EXPECT_FALSE(read_head(write("(1.0) can0 123#00\n")));
 }
