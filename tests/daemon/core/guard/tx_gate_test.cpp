@@ -157,6 +157,29 @@ TEST(TxGate, ClampIsActiveWithAForceOrNeither) {
   EXPECT_FALSE(clamp(1, 1, 0, 1));
 }
 
+// A bit that the interface keeps free, with a right CRC: no program that knows it writes it.
+TEST(TxGate, EveryReservedBitAlone) {
+  struct Case {
+    std::uint16_t id;
+    std::vector<std::uint8_t> sound;     // bytes 1 to 7
+    std::vector<std::uint8_t> reserved;  // bits of them
+  };
+  for (const Case& c :
+       {Case{0x6A0, {0x50, 1, 2, 3, 4, 5, 6}, {0x80, 0, 0, 0, 0, 0, 0}},
+        Case{0x6A1, {0x70, 1, 2, 3, 4, 5, 6}, {0x80, 0, 0, 0, 0, 0, 0}},
+        Case{0x6A2, {0, 1, 0x10, 0x27, 0, 0, 0}, {0xF0, 0xFE, 0, 0, 0xFF, 0xFF, 0xFF}},
+        Case{0x6A3, {0x20, 0x04, 1, 2, 0x0F, 0, 0}, {0, 0x80, 0, 0, 0xF0, 0xFF, 0xFF}}}) {
+    EXPECT_TRUE(permits(frame_of(c.id, c.id, 0, c.sound), Control::kCommand)) << c.id;
+    for (std::size_t bit = 0; bit < 56; ++bit) {
+      if ((c.reserved[bit / 8] >> bit % 8 & 1U) == 0) continue;
+      std::vector<std::uint8_t> bytes = c.sound;
+      bytes[bit / 8] = static_cast<std::uint8_t>(bytes[bit / 8] | 1U << bit % 8);
+      EXPECT_FALSE(permits(frame_of(c.id, c.id, 0, bytes), Control::kCommand))
+          << c.id << " " << bit;
+    }
+  }
+}
+
 // Clamp frames in a row with the right counter.
 class Requests {
  public:
@@ -406,6 +429,30 @@ TEST(TxGatePoll, OneFlowControlForARequest) {
   EXPECT_TRUE(gate.permits(flow, 0, 1));
   EXPECT_FALSE(gate.permits(flow, 0, 2));
   EXPECT_EQ(gate.refused(), 4U);
+}
+
+TEST(TxGatePoll, FlowControlGoesWhereTheRequestWent) {
+  TxGate gate({}, Control::kObserve, {}, two_identifiers());
+  ASSERT_TRUE(gate.permits(request_of(0x7E1, {0x03, 0x22, 0x11, 0x01}), 0, 0));
+  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x30, 0, 0}), 1, 1));
+  EXPECT_FALSE(gate.permits(request_of(0x7E2, {0x30, 0, 0}), 0, 1));
+  EXPECT_FALSE(gate.permits(request_of(0x18DA10F1, {0x30, 0, 0}), 1, 1));
+  EXPECT_TRUE(gate.permits(request_of(0x7E1, {0x30, 0, 0}), 0, 1));
+}
+
+// As many as the list holds, and as many of them as a frame holds.
+TEST(TxGatePoll, AFullListAndAFullRequest) {
+  PollLimits limits;
+  for (std::size_t i = 0; i < PollLimits::kMost; ++i) {
+    limits.requests[i] = {
+        0, {0x7E1, false}, static_cast<std::uint16_t>(0x1100 + i), 50 * kMillisecond};
+  }
+  limits.size = PollLimits::kMost;
+  TxGate gate({}, Control::kObserve, {}, limits);
+  EXPECT_TRUE(gate.permits(request_of(0x7E1, {0x07, 0x22, 0x11, 0, 0x11, 1, 0x11, 31}), 0, 0));
+  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x03, 0x22, 0x11, 32}), 0, 0));
+  EXPECT_FALSE(gate.permits(request_of(0x7E2, {0x30, 0, 0}), 0, 1));
+  EXPECT_TRUE(gate.permits(request_of(0x7E1, {0x30, 0, 0}), 0, 1));
 }
 
 }  // namespace

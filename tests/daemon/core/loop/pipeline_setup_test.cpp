@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "daemon/core/loop/pipeline.h"
 #include "estimator/physics/assumed_constants.h"
 
 namespace beltgrip::daemon {
@@ -49,6 +52,28 @@ TEST(PipelineSetup, ARequestIsMadeInTheTransmissionsOwnMeasure) {
   for (const estimator::Assumption& each : estimator::assumptions()) {
     EXPECT_EQ(read.variator.*each.value, config.variator.*each.value) << each.key;
   }
+}
+
+// With control "command" five frames at the start tell the controller that nothing is asked for; a
+// replay of such a drive tells it nothing.
+TEST(PipelineSetup, AReplaySendsNoClampFrame) {
+  Config config;
+  config.control = Control::kCommand;
+  Pipeline live(config), replay(config, RecordedRequests({}));
+  const auto clamp_frames = [&](Pipeline& pipeline) {
+    std::ptrdiff_t count = 0;
+    for (MonoTime t = kSecond; t < 2 * kSecond; t += 5 * kMillisecond) {
+      Outbox outbox;
+      pipeline.on_sample(t, outbox);
+      const auto end = outbox.frames.begin() + static_cast<std::ptrdiff_t>(outbox.size);
+      count += std::count_if(outbox.frames.begin(), end, [&](const can::CanFrame& frame) {
+        return frame.id.value == config.identifiers.clamp;
+      });
+    }
+    return count;
+  };
+  EXPECT_EQ(clamp_frames(live), 5);
+  EXPECT_EQ(clamp_frames(replay), 0);
 }
 
 }  // namespace
