@@ -70,6 +70,15 @@ void add_least_loss(report::HtmlPage& page, const daemon::Config& config, const 
              rows);
 }
 
+// Of a log among others: the path only where others have the same name in other folders.
+std::string short_name(const std::string& log, const std::vector<std::string>& logs) {
+  const auto name_of = [](const std::string& path) { return path.substr(path.rfind('/') + 1); };
+  const auto same = std::count_if(logs.begin(), logs.end(), [&](const std::string& each) {
+    return name_of(each) == name_of(log);
+  });
+  return same > 1 ? log : name_of(log);
+}
+
 void report_logs(const Options& options) {
   if (options.config.empty()) throw Failure{kUsage, "report: --config is required for logs"};
   end_logs_when_stopped(options.logs);
@@ -83,7 +92,8 @@ void report_logs(const Options& options) {
   std::optional<LastValue> last_value;
   report::HtmlPage page("BeltGrip: drives and experiments");
   for (const std::string& log : options.logs) {
-    ReportCourses courses(log.substr(log.rfind('/') + 1), config);
+    if (stop_asked() && !drives.empty()) break;
+    ReportCourses courses(short_name(log, options.logs), config);
     ReplayOutputs outputs;
     outputs.also = &courses;
     const ReplayResult result = replay({log}, options.interface, config, outputs);

@@ -46,6 +46,19 @@ TEST_F(Report, ShowsEveryExperimentOfTheLog) {
   EXPECT_EQ(count(page, "<td>cool-down</td>"), 1);
 }
 
+TEST_F(Report, TellsLogsOfOneNameApart) {
+  place_.write("trace.log", place_.read("drive/trace.log"));
+  const RunResult run =
+      beltgrip({"report", place_.path("trace.log"), place_.path("drive/trace.log"), "--config",
+                place_.path("drive/beltgrip.toml"), "--out", place_.path("page.html")});
+  ASSERT_EQ(run.status, 0) << run.err;
+  const std::string page = place_.read("page.html");
+  for (const char* log : {"trace.log", "drive/trace.log"}) {
+    EXPECT_EQ(count(page, "<h2>" + place_.path(log) + "</h2>"), 1) << log;
+    EXPECT_EQ(count(page, "<h2>" + place_.path(log) + ", from "), 2) << log;
+  }
+}
+
 // A table of the signals is a log too.
 TEST_F(Report, ShowsATable) {
   ASSERT_EQ(beltgrip({"dbc", "decode", place_.path("drive/trace.log"), "--dbc",
