@@ -346,7 +346,7 @@ RoleBinding asked(Role role, std::uint32_t start_bit) {
   can::SignalDef signal = signal_def(8);
   signal.start_bit = start_bit;
   RoleBinding binding = bound(role, {0, false}, signal);
-  binding.uds = UdsSource{kRequest, kResponse, 0x1101};
+  binding.uds = UdsSource{.request = kRequest, .response = kResponse, .identifier = 0x1101};
   return binding;
 }
 
