@@ -8,6 +8,7 @@ namespace beltgrip::cli {
 
 namespace {
 constexpr double kPatience_s = 2.0, kPause_s = 0.2;
+constexpr double kWholeRate = 10.0;  // no digits behind the point from there on
 }  // namespace
 
 Progress::Progress(bool shown)
@@ -18,8 +19,9 @@ void Progress::tell(double done, const std::string& what, const char* rate_unit,
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin_).count();
   if (!shown_ || wall_s < next_s_) return;
   next_s_ = wall_s + kPause_s;
-  std::fprintf(stderr, "\r\x1b[Kbeltgrip: %.0f %s, %.3g %s", done, what.c_str(), done / wall_s,
-               rate_unit);
+  const double rate = done / wall_s;
+  std::fprintf(stderr, "\r\x1b[Kbeltgrip: %.0f %s, %.*f %s", done, what.c_str(),
+               rate < kWholeRate ? 1 : 0, rate, rate_unit);
   if (share > 0.0 && share <= 1.0) {
     std::fprintf(stderr, ", %.0f s left", wall_s * (1.0 - share) / share);
   }
@@ -30,6 +32,18 @@ void Progress::tell(double done, const std::string& what, const char* rate_unit,
 void Progress::clear() {
   if (on_screen_) std::fputs("\r\x1b[K", stderr);
   on_screen_ = false;
+}
+
+void RunProgress::reads(const ports::LogTimeline& timeline) {
+  timeline_ = &timeline;
+  first_.reset();
+}
+
+void RunProgress::at(daemon::MonoTime t) {
+  if (!first_) first_ = t;
+  if (!progress_.steps()) return;
+  const double share = timeline_ != nullptr ? timeline_->share_read() : 0.0;
+  progress_.tell(static_cast<double>(t - *first_) * 1e-9, "s of the log", "times real time", share);
 }
 
 }  // namespace beltgrip::cli

@@ -4,7 +4,11 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
+
+#include "daemon/core/base/mono_time.h"
+#include "tools/ports/log_timeline.h"
 
 namespace beltgrip::cli {
 
@@ -31,6 +35,19 @@ class Progress {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   double next_s_;
   std::uint64_t steps_ = 0;
+};
+
+// Of the pipeline over one log after another.
+class RunProgress {
+ public:
+  explicit RunProgress(Progress& progress) : progress_(progress) {}
+  void reads(const ports::LogTimeline& timeline);
+  void at(daemon::MonoTime t);  // every sample
+
+ private:
+  Progress& progress_;
+  const ports::LogTimeline* timeline_ = nullptr;
+  std::optional<daemon::MonoTime> first_;
 };
 
 }  // namespace beltgrip::cli

@@ -136,24 +136,14 @@ class Teller {
   std::size_t told_ = 0;
 };
 
-// How far a single run has come.
-class RunProgress final : public daemon::SampleSink {
+// Tells of a single run how far it has come.
+class ProgressSink final : public daemon::SampleSink {
  public:
-  explicit RunProgress(Progress& progress) : progress_(progress) {}
-  void reads(const ports::LogTimeline& timeline) { timeline_ = &timeline; }
-
-  void on_report(const daemon::SampleReport& report) noexcept override {
-    if (first_ns_ == 0) first_ns_ = report.t;
-    if (!progress_.steps()) return;
-    const double share = timeline_ != nullptr ? timeline_->share_read() : 0.0;
-    progress_.tell(static_cast<double>(report.t - first_ns_) * 1e-9, "s of the log",
-                   "times real time", share);
-  }
+  explicit ProgressSink(RunProgress& progress) : progress_(progress) {}
+  void on_report(const daemon::SampleReport& report) noexcept override { progress_.at(report.t); }
 
  private:
-  Progress& progress_;
-  const ports::LogTimeline* timeline_ = nullptr;
-  std::int64_t first_ns_ = 0;
+  RunProgress& progress_;
 };
 
 void print_speed(std::uint64_t frames, std::chrono::steady_clock::time_point begin) {
@@ -282,12 +272,13 @@ void run(const Options& options) {
   Teller teller(json ? json->get() : nullptr, text_to_stdout);
   Progress progress(!options.quiet);
   RunProgress run_progress(progress);
+  ProgressSink progress_sink(run_progress);
   ReplayOutputs outputs;
   if (trace) outputs.trace = trace->get();
   outputs.signals = signals.get();
   if (log_out) outputs.log_out = log_out->get();
   if (tasks.size() == 1) {
-    outputs.also = &run_progress;
+    outputs.also = &progress_sink;
     outputs.on_log = [&](const ports::LogTimeline& timeline) { run_progress.reads(timeline); };
     outputs.on_result = [&](const ReplayResult& result) {
       progress.clear();

@@ -93,10 +93,14 @@ void report_logs(const Options& options) {
   report::HtmlPage page("BeltGrip: drives and experiments");
   for (const std::string& log : options.logs) {
     if (stop_asked() && !drives.empty()) break;
-    ReportCourses courses(short_name(log, options.logs), config);
+    Progress progress;
+    RunProgress run_progress(progress);
+    ReportCourses courses(short_name(log, options.logs), config, run_progress);
     ReplayOutputs outputs;
+    outputs.on_log = [&](const ports::LogTimeline& timeline) { run_progress.reads(timeline); };
     outputs.also = &courses;
     const ReplayResult result = replay({log}, options.interface, config, outputs);
+    progress.clear();
     courses.finish(result);
     for (const std::string& warning : result.warnings) text::warn(warning);
     if (result.experiments.empty()) page.paragraph(log + ": " + no_experiment(result));

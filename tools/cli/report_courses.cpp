@@ -47,13 +47,17 @@ const daemon::Words& words(std::size_t i) {
 
 }  // namespace
 
-ReportCourses::ReportCourses(std::string log, const daemon::Config& config)
-    : log_(std::move(log)), config_(config), period_s_(1.0 / config.estimator.sample_rate_hz) {
+ReportCourses::ReportCourses(std::string log, const daemon::Config& config, RunProgress& progress)
+    : log_(std::move(log)),
+      config_(config),
+      progress_(progress),
+      period_s_(1.0 / config.estimator.sample_rate_hz) {
   drive_.name = log_;
   drive_.period_s = now_.period_s = period_s_;
 }
 
 void ReportCourses::on_report(const daemon::SampleReport& report) noexcept {
+  progress_.at(report.t);
   const double t_s = daemon::seconds(report.t);
   take_wear(report);
   take_drive_sample(report, t_s);

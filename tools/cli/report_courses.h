@@ -9,6 +9,7 @@
 #include "daemon/core/base/faults.h"
 #include "daemon/core/config/options/config.h"
 #include "daemon/core/loop/loop.h"
+#include "tools/cli/progress.h"
 #include "tools/cli/replay_run.h"
 #include "tools/report/drive_page.h"
 #include "tools/report/experiment_page.h"
@@ -24,7 +25,7 @@ struct LastValue {
 
 class ReportCourses final : public daemon::SampleSink {
  public:
-  ReportCourses(std::string log, const daemon::Config& config);
+  ReportCourses(std::string log, const daemon::Config& config, RunProgress& progress);
 
   void on_report(const daemon::SampleReport& report) noexcept override;
   // Once the replay is over.
@@ -44,6 +45,7 @@ class ReportCourses final : public daemon::SampleSink {
 
   std::string log_;
   const daemon::Config& config_;
+  RunProgress& progress_;
   double period_s_;
   report::Drive drive_;
   report::ExperimentCourse now_;
