@@ -116,7 +116,7 @@ void RoleWatch::take_frame(RoleCourse& course, State& state, const daemon::RxFra
   if (!course.binding) return;
   const daemon::RoleBinding& binding = *course.binding;
   if (binding.uds) {
-    take_diagnostics(course, state, frame);
+    take_diagnostics(course, state, *binding.uds, frame);
     return;
   }
   if (frame.bus != binding.bus) return;
@@ -169,12 +169,14 @@ void RoleWatch::take_frame(RoleCourse& course, State& state, const daemon::RxFra
   take_value(course, state, value, daemon::seconds(frame.t - first_.value_or(frame.t)));
 }
 
-void RoleWatch::take_diagnostics(RoleCourse& course, State& state, const daemon::RxFrame& frame) {
+void RoleWatch::take_diagnostics(RoleCourse& course, State& state, const daemon::UdsSource& source,
+                                 const daemon::RxFrame& frame) {
   const daemon::RoleBinding& binding = *course.binding;
-  const daemon::UdsSource& source = *binding.uds;
   if (frame.bus == binding.bus && frame.frame.id == source.request &&
       asks_for(frame.frame, source)) {
-    if (state.asked_at) course.asked_every_s.add(daemon::seconds(frame.t - *state.asked_at));
+    if (const std::optional<MonoTime> before = state.asked_at) {
+      course.asked_every_s.add(daemon::seconds(frame.t - *before));
+    }
     state.asked_at = frame.t;
     state.waits = true;
     ++course.requests;
@@ -183,8 +185,9 @@ void RoleWatch::take_diagnostics(RoleCourse& course, State& state, const daemon:
   const daemon::SignalHistory& history = diagnostics_->history(binding.role);
   if (history.empty() || history.newest() == state.diagnostics) return;
   state.diagnostics = history.newest();
-  if (state.waits && state.asked_at)
-    course.answers_s.add(daemon::seconds(frame.t - *state.asked_at));
+  if (const std::optional<MonoTime> asked = state.asked_at; asked && state.waits) {
+    course.answers_s.add(daemon::seconds(frame.t - *asked));
+  }
   state.waits = false;
   ++course.frames;
   ++course.values;

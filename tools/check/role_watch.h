@@ -103,7 +103,8 @@ class RoleWatch {
     bool waits = false;                // for its answer
   };
   void take_frame(RoleCourse& course, State& state, const daemon::RxFrame& frame);
-  void take_diagnostics(RoleCourse& course, State& state, const daemon::RxFrame& frame);
+  void take_diagnostics(RoleCourse& course, State& state, const daemon::UdsSource& source,
+                        const daemon::RxFrame& frame);
   bool protection_holds(RoleCourse& course, State& state, const can::CanFrame& frame);
   void take_time(RoleCourse& course, State& state, MonoTime t);
   void take_value(RoleCourse& course, State& state, double value, double t_s);
