@@ -13,6 +13,10 @@ namespace beltgrip::estimator {
 // Below this magnitude neither direction nor traction coefficient mean anything.
 inline constexpr double kTorqueDeadBand_Nm = 3.0;
 
+// Of the ratio at an end stop, by which it falls as the clamp force bends the pulleys open: 0.5 to
+// 2 % at 5 kN from variator to variator. The softest of them.
+inline constexpr double kDeformationMost_1_N = 4e-6;
+
 // What stays fixed during one experiment.
 struct OperatingPoint {
   Direction direction = Direction::kDrive;

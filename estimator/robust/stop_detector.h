@@ -26,6 +26,8 @@
 #include <cstddef>
 
 #include "estimator/method/slip_curve_estimator.h"
+#include "estimator/physics/slip.h"
+#include "estimator/physics/units.h"
 #include "estimator/record/experiment_record.h"
 
 namespace beltgrip::estimator {
@@ -52,7 +54,7 @@ struct StopThresholds {
   // proportion. Deformation moves the slip by itself as the clamp force falls: by so much at most,
   // which counts for nothing.
   double smallest_gain_percent = 0.2;
-  double deformation_percent_per_N = 4e-4;
+  double deformation_percent_per_N = kPercent * kDeformationMost_1_N;
   double gain_deviations = 5.0;
   // Backups: slip above its smallest value; slip that will be reached this much later.
   double backup_slip_percent = 7.5;

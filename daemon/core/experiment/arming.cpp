@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/physics/slip.h"
+#include "estimator/signal/signal_chain.h"
+
 namespace beltgrip::daemon {
 
 namespace {
@@ -66,8 +69,17 @@ double Arming::floor_N(double omega_s_rad_s) const noexcept {
          variator_.secondary_centrifugal_N_s2 * omega_s_rad_s * omega_s_rad_s;
 }
 
-bool Arming::at_end_stop(double ratio) const noexcept {
-  const auto near = [ratio](double stop) { return std::abs(ratio / stop - 1.0) < kRatioTolerance; };
+// The force bends the pulleys open: below its end stop, not above it, the ratio may stand further
+// off. No further than where the estimator takes it for another ratio.
+bool Arming::rests_on_stop(double share_of_stop, double force_N) noexcept {
+  const double lacks_most =
+      std::min(kRatioTolerance + estimator::kDeformationMost_1_N * std::max(0.0, force_N),
+               estimator::kRatioTolerance_percent / kPercent);
+  return share_of_stop < 1.0 + kRatioTolerance && share_of_stop > 1.0 - lacks_most;
+}
+
+bool Arming::at_end_stop(double ratio, double force_N) const noexcept {
+  const auto near = [=](double stop) { return rests_on_stop(ratio / stop, force_N); };
   return (choice_ != estimator::RatioChoice::kLow && near(variator_.ratio_overdrive)) ||
          (choice_ != estimator::RatioChoice::kOverdrive && near(variator_.ratio_low));
 }
@@ -88,7 +100,7 @@ std::uint32_t Arming::preconditions(const Now& now) const noexcept {
   inhibit(coast && c.accelerator > kPedalReleased, Inhibit::kPedal);
   inhibit(c.brake_pressed, Inhibit::kBrake);
   inhibit(!c.lockup_closed, Inhibit::kLockup);
-  inhibit(!at_end_stop(now.omega_s_rad_s / now.omega_p_rad_s), Inhibit::kRatio);
+  inhibit(!at_end_stop(now.omega_s_rad_s / now.omega_p_rad_s, now.clamp_force_N), Inhibit::kRatio);
   inhibit(torque < settings_.torque_min_Nm || torque > settings_.torque_max_Nm, Inhibit::kTorque);
   inhibit(now.omega_p_rad_s < settings_.primary_speed_min_rad_s, Inhibit::kSpeed);
   inhibit(c.oil_degC < settings_.oil_temperature_min_degC, Inhibit::kOil);

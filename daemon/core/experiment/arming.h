@@ -107,7 +107,7 @@ class Arming {
   static constexpr Duration kPatience = 8 * kSecond;  // after kSettle
   static constexpr Duration kClearancePeriod = 100 * kMillisecond;
   static constexpr double kRatioDrift = 0.01;
-  static constexpr double kRatioTolerance = 0.03;  // chosen: a clamped belt slips, deforms by less
+  static constexpr double kRatioTolerance = 0.03;  // chosen: a clamped belt slips by less
   static constexpr double kPedalReleased = 0.02;   // chosen: noise of a pedal at rest
   static constexpr double kTorqueDrift = 0.25;
   static constexpr double kTorqueDrift_Nm = 4.0;
@@ -160,7 +160,9 @@ class Arming {
 
   // The force below which no request goes, at this secondary speed.
   double floor_N(double omega_s_rad_s) const noexcept;
-  bool at_end_stop(double ratio) const noexcept;
+  bool at_end_stop(double ratio, double force_N) const noexcept;
+  // The speed ratio, as a share of an end stop's, may be that stop's under this clamping force.
+  static bool rests_on_stop(double share_of_stop, double force_N) noexcept;
 
  private:
   static constexpr std::uint32_t kClearance = kForbids | inhibit_bit(Inhibit::kWait);

@@ -148,7 +148,8 @@ bool ExperimentStage::observed_over(const Now& now) const noexcept {
   const double restored_N = ClampRequest::kRestored * own_force_N_;
   return now.estimate.curve().usable && running_.clamp_force_N < restored_N &&
          now.estimate.measured_force_N() >= restored_N &&
-         arming_.at_end_stop(sample.omega_s_rad_s / sample.omega_p_rad_s);
+         arming_.at_end_stop(sample.omega_s_rad_s / sample.omega_p_rad_s,
+                             now.estimate.measured_force_N());
 }
 
 bool ExperimentStage::starved(const Now& now) const noexcept {

@@ -20,10 +20,12 @@ constexpr std::uint32_t kMisread = fault_bit(Fault::kInputMissing) | fault_bit(F
 
 bool holds(const SampleReport& report) noexcept {
   const estimator::CurveEstimate& curve = report.curve;
+  const double sign = curve.direction == estimator::Direction::kDrive ? 1.0 : -1.0;
   return report.sample.usable && curve.usable && report.torque_is_the_belts &&
          (report.faults & kMisread) == 0 && curve.clamp_force_N > 0.0 &&
          std::isfinite(curve.mu_star) &&
-         std::abs(curve.sigma_star_percent) < estimator::kPercent * Arming::kRatioTolerance;
+         Arming::rests_on_stop(1.0 - sign * curve.sigma_star_percent / estimator::kPercent,
+                               curve.clamp_force_N);
 }
 
 }  // namespace

@@ -143,13 +143,20 @@ TEST_F(Observing, TheEndStopsOfTheCurve) {
     Config chosen = config();
     chosen.estimator.ratio = c.choice;
     const Arming arming(chosen);
-    for (const double off : {-0.0299, 0.0299}) {
-      EXPECT_EQ(arming.at_end_stop(0.405 * (1.0 + off)), c.low);
-      EXPECT_EQ(arming.at_end_stop(2.25 * (1.0 + off)), c.overdrive);
-    }
-    for (const double off : {-0.0301, 0.0301}) {
-      EXPECT_FALSE(arming.at_end_stop(0.405 * (1.0 + off)));
-      EXPECT_FALSE(arming.at_end_stop(2.25 * (1.0 + off)));
+    // 3 % either way; of deformation 0.4 % per kN more, below the stop alone, up to 8 %.
+    struct Window {
+      double force_N, below, above;
+    };
+    for (const Window& window : {Window{0.0, 0.97, 1.03}, Window{10000.0, 0.93, 1.03},
+                                 Window{20000.0, 0.92, 1.03}, Window{-500.0, 0.97, 1.03}}) {
+      for (const double at : {window.below + 1e-4, window.above - 1e-4}) {
+        EXPECT_EQ(arming.at_end_stop(0.405 * at, window.force_N), c.low);
+        EXPECT_EQ(arming.at_end_stop(2.25 * at, window.force_N), c.overdrive);
+      }
+      for (const double at : {window.below - 1e-4, window.above + 1e-4}) {
+        EXPECT_FALSE(arming.at_end_stop(0.405 * at, window.force_N));
+        EXPECT_FALSE(arming.at_end_stop(2.25 * at, window.force_N));
+      }
     }
   }
 }

@@ -111,7 +111,7 @@ TEST(CarriedWatch, WhatIsNotSteadySaysNothing) {
            Case{"no curve", [](SampleReport& r) { r.curve.usable = false; }},
            Case{"lock-up", [](SampleReport& r) { r.torque_is_the_belts = false; }},
            Case{"fault", [](SampleReport& r) { r.faults = fault_bit(Fault::kInputFrozen); }},
-           Case{"end stop", [](SampleReport& r) { r.curve.sigma_star_percent = 3.5; }},
+           Case{"end stop", [](SampleReport& r) { r.curve.sigma_star_percent = 8.1; }},
            Case{"direction",
                 [](SampleReport& r) { r.curve.direction = estimator::Direction::kOverrun; }},
        }) {
