@@ -188,6 +188,23 @@ TEST(OutputStage, OnlyWhatIsConfiguredIsAskedForAndNoMoreOften) {
   EXPECT_FALSE(bench.asks_for(0x1001, 0x7E1));
 }
 
+// The same number on another bus, of another ECU or of another service is another identifier, with
+// a period of its own.
+TEST(OutputStage, AnIdentifierIsOneOfItsBusEcuAndService) {
+  RoleBinding bus = polled(0x0001, 100.0), ecu = bus, service = bus;
+  bus.bus = 1;
+  ecu.uds->request = {0x7E1, false};
+  service.uds->service = 0x21;
+  Config config = config_of();
+  config.diagnostics = Diagnostics::kPoll;
+  config.roles = {bus, ecu, service, polled(0x0001, 200.0), bus, ecu, service};
+  Poll bench(config);
+  EXPECT_TRUE(bench.asks_for(0x0001));
+  const MonoTime first = bench.t - kTen;
+  while (bench.t < first + 100 * kMillisecond) EXPECT_FALSE(bench.asks_for(0x0001)) << bench.t;
+  EXPECT_TRUE(bench.asks_for(0x0001));
+}
+
 TEST(OutputStage, NothingIsAskedForWithoutAllowance) {
   Config config = polling();
   config.diagnostics = Diagnostics::kListen;
