@@ -201,6 +201,9 @@ std::string no_result() {
   for (std::size_t i = 0; i < estimator::kStopReasonCount; ++i) {
     const auto reason = static_cast<estimator::StopReason>(i);
     stops += reason_row(daemon::stop_reason_name(reason), daemon::words_of(reason));
+    if (reason == estimator::StopReason::kNone) {
+      stops += reason_row("None, with a lower bound", daemon::words_of(reason, true));
+    }
   }
   for (const auto& each : daemon::kInhibits) {
     inhibits += reason_row(each.name, daemon::words_of(each.value));

@@ -593,7 +593,7 @@ std::string experiment_text(const ReplayResult& result, std::size_t from) {
     out += e.stopped ? format("stopped at %.3f s", end_s) : format("ended at %.3f s", end_s);
     out += format(" (%s) after %.1f s", reason_text(e.stop_reason).c_str(), length_s);
     if (e.stopped) out += format(", at %.2f %% slip", e.sigma_stop_percent);
-    const std::string cause = daemon::cause_text(e.stop_reason, e.cause);
+    const std::string cause = has_bound(e) ? why(e) : daemon::cause_text(e.stop_reason, e.cause);
     if (!cause.empty()) out += ": " + cause;
     out += "\n";
     if (e.outcome == daemon::Outcome::kCompleted) {

@@ -140,7 +140,7 @@ struct StopRow {
   std::string_view remedy;
 };
 constexpr std::array<StopRow, estimator::kStopReasonCount> kStopRemedies{{
-    {StopReason::kNone, "hold the conditions for longer"},
+    {StopReason::kNone, "hold the conditions for longer"},  // without a bound
     {StopReason::kSlope,
      "no value all the same: its points lie on no one curve, or what they say is no belt's; see "
      "`reason`"},
@@ -167,6 +167,11 @@ constexpr std::array<StopRow, estimator::kStopReasonCount> kStopRemedies{{
     {StopReason::kRoom, "a late peak: lower speed"},
     {StopReason::kLag, "measure `actuator_lag_s` at the coldest permitted oil"},
 }};
+
+// With a bound the data are good: what lacks is the way to the top.
+constexpr Words kEndedBeforeTheTop{
+    "it ended before friction came to its top: the clamping force was not lowered far enough",
+    "lower the clamping force further before the experiment ends"};
 
 // Each row at its value's place.
 constexpr bool in_order(const auto& rows) {
@@ -208,9 +213,11 @@ const Words& words_of(Inhibit inhibit) {
   return kInhibitWords.at(static_cast<std::size_t>(inhibit)).words;
 }
 const Words& words_of(Fault fault) { return kFaultWords.at(static_cast<std::size_t>(fault)).words; }
-Words words_of(StopReason reason) {
+Words words_of(StopReason reason, bool bound) {
   const std::string_view remedy = kStopRemedies.at(static_cast<std::size_t>(reason)).remedy;
-  if (reason == StopReason::kNone) return {"the trigger ended the experiment", remedy};
+  if (reason == StopReason::kNone) {
+    return bound ? kEndedBeforeTheTop : Words{"the trigger ended the experiment", remedy};
+  }
   return {stop_reason_words(reason), remedy};
 }
 
@@ -262,8 +269,10 @@ std::string why_no_value(const ExperimentResult& result, const std::string& lost
 
 std::string why(const ExperimentResult& result, const std::string& lost) {
   std::string cause = cause_text(result.stop_reason, result.cause);
+  const bool bound = has_bound(result);
+  if (cause.empty() && bound) return std::string(words_of(result.stop_reason, bound).means);
   if (cause.empty()) return why_no_value(result, lost);
-  const bool known = result.outcome == Outcome::kCompleted || has_bound(result);
+  const bool known = result.outcome == Outcome::kCompleted || bound;
   if (known || result.outcome == Outcome::kAborted) return cause;
   return why_no_value(result, lost) + " (" + cause + ")";
 }
@@ -271,7 +280,8 @@ std::string why(const ExperimentResult& result, const std::string& lost) {
 std::string_view remedy_of(const ExperimentResult& result) {
   if (result.outcome == Outcome::kNone || result.outcome == Outcome::kCompleted) return {};
   if (result.peak.contradictory || result.peak.impossible) return {};  // why_no_value() asks for it
-  return result.beyond ? words_of(Inhibit::kModel).remedy : words_of(result.stop_reason).remedy;
+  return result.beyond ? words_of(Inhibit::kModel).remedy
+                       : words_of(result.stop_reason, has_bound(result)).remedy;
 }
 
 }  // namespace beltgrip::daemon

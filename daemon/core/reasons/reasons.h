@@ -17,7 +17,8 @@ struct Words {
 };
 const Words& words_of(Inhibit inhibit);
 const Words& words_of(Fault fault);
-Words words_of(estimator::StopReason reason);
+// bound: of an experiment that gave a lower bound.
+Words words_of(estimator::StopReason reason, bool bound = false);
 
 // As it is told: with the figure beside its limit where there is one.
 struct Reason {

@@ -155,6 +155,12 @@ TEST(Event, AResultWithoutAValueSaysWhyAndWhatToDo) {
       "experiment Inconclusive, stop reason ForceFloor (the force floor lies above the peak's "
       "force 2203 N, limit 1168 N), mu_max above 0.0500; to do: more torque, a lower floor, a "
       "lower speed");
+  event.result.stop_reason = StopReason::kNone;
+  event.result.cause = {};
+  EXPECT_EQ(text_of(event),
+            "experiment Inconclusive, stop reason None (it ended before friction came to its top: "
+            "the clamping force was not lowered far enough), mu_max above 0.0500; to do: lower the "
+            "clamping force further before the experiment ends");
 }
 
 // Each with its figure and limit, from the sample; by hand.
