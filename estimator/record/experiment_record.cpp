@@ -36,6 +36,7 @@ void ExperimentRecord::reset() noexcept {
   held_count_ = 0;
   last_held_s_ = 0.0;
   first_force_N_ = 0.0;
+  lowered_ = false;
   torque_stepped_s_ = std::numeric_limits<double>::infinity();
   smooth_force_N_ = lowest_force_N_ = lowest_force_s_ = 0.0;
   last_t_s_ = 0.0;
@@ -69,14 +70,15 @@ bool ExperimentRecord::step(const Cell& sample) noexcept {
     held_[held_count_++ % held_.size()] = {
         torque_line_.at(last_held_s_), torque_line_.variance_at(last_held_s_), torque_line_.valid};
   }
-  // Before the force falls, the load is being taken up.
-  if (force_line_.valid) {
+  // Before the force falls, the load is being taken up. From then on no sample is left out, also
+  // where noise lifts the force again: across a gap a torque that swings seems to step.
+  if (!lowered_ && force_line_.valid) {
     const double force_N = force_line_.at(sample.t_s);
     if (first_force_N_ <= 0.0) first_force_N_ = force_N;
-    if (force_N < kLowered * first_force_N_ &&
-        torque_watch_.step(sample.torque_Nm, slip, slip_noise(), torque_)) {
-      torque_stepped_s_ = std::min(torque_stepped_s_, sample.t_s);
-    }
+    lowered_ = force_N < kLowered * first_force_N_;
+  }
+  if (lowered_ && torque_watch_.step(sample.torque_Nm, slip, slip_noise(), torque_)) {
+    torque_stepped_s_ = std::min(torque_stepped_s_, sample.t_s);
   }
   omega_p_.step(sample.t_s, sample.omega_p_rad_s, 0.0);
   slip_speed_.step(sample.t_s, slip * sample.omega_p_rad_s, 0.0);

@@ -72,6 +72,7 @@ class ExperimentRecord {
   double last_held_s_ = 0.0;
   StepWatch torque_watch_;
   double first_force_N_ = 0.0;
+  bool lowered_ = false;  // since then the torque is watched
   double torque_stepped_s_ = std::numeric_limits<double>::infinity();
   double smooth_force_N_ = 0.0;
   double lowest_force_N_ = 0.0, lowest_force_s_ = 0.0;

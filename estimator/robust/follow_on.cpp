@@ -1,5 +1,6 @@
 #include "estimator/robust/follow_on.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "estimator/statistics/square.h"
@@ -16,10 +17,11 @@ constexpr double kDeviations = 3.0;
 
 }  // namespace
 
-void FollowOn::Mean::add(double after_s, double slip) noexcept {
+void FollowOn::Mean::add(double after_s, const Cell& cell) noexcept {
   n += 1.0;
   t_s += after_s;
-  slip_percent += slip;
+  slip_percent += cell.slip_percent;
+  clamp_force_N += cell.clamp_force_N;
 }
 
 void FollowOn::begin(const ExperimentRecord& record) noexcept {
@@ -28,18 +30,19 @@ void FollowOn::begin(const ExperimentRecord& record) noexcept {
   begun_ = true;
   stop_t_s_ = record.duration_s();
   slip_noise_ = record.slip_noise();
+  force_variance_N2_ = record.force().density(kMean_s) / kMean_s;
   before_cells_s_ = history.cell_s(0) * static_cast<double>(kBeforeCells);
   for (std::size_t i = kBeforeCell; i < kBeforeCell + kBeforeCells; ++i) {
     const Cell& cell = history.cell(0, i);
-    before_.add(cell.t_s - stop_t_s_, cell.slip_percent);
+    before_.add(cell.t_s - stop_t_s_, cell);
   }
 }
 
 void FollowOn::step(const Cell& sample) noexcept {
   after_s_ = sample.t_s - stop_t_s_;
   if (!begun_ || after_s_ > kTo_s) return;
-  if (std::abs(after_s_ - kMiddle_s) < 0.5 * kMean_s) middle_.add(after_s_, sample.slip_percent);
-  if (after_s_ > kTo_s - kMean_s) late_.add(after_s_, sample.slip_percent);
+  if (std::abs(after_s_ - kMiddle_s) < 0.5 * kMean_s) middle_.add(after_s_, sample);
+  if (after_s_ > kTo_s - kMean_s) late_.add(after_s_, sample);
   if (after_s_ < kMiddle_s) return;
   const double t = after_s_ - kMiddle_s;
   n_ += 1.0;
@@ -51,6 +54,13 @@ void FollowOn::step(const Cell& sample) noexcept {
   force_ += sample.clamp_force_N;
 }
 
+// Whoever lowers the clamp force lets it stand or lowers it on: beyond noise it only rises when it
+// is given back.
+bool FollowOn::clamped_again() const noexcept {
+  const double lowest_N = std::min(before_.force_N(), middle_.force_N());
+  return late_.force_N() - lowest_N > kDeviations * std::sqrt(2.0 * force_variance_N2_);
+}
+
 double FollowOn::carried(double traction_per_Nm_N, double inertia_kg_m2) const noexcept {
   const double acceleration = (omega_t_ - omega_ * t_ / n_) / (tt_ - square(t_) / n_);
   return traction_per_Nm_N * (torque_ - n_ * inertia_kg_m2 * acceleration) / force_;
@@ -59,6 +69,7 @@ double FollowOn::carried(double traction_per_Nm_N, double inertia_kg_m2) const n
 bool FollowOn::stood_still(double mu, double traction_per_Nm_N,
                            double inertia_kg_m2) const noexcept {
   if (middle_.n < kFewest || late_.n < kFewest || !(force_ > 0.0)) return false;
+  if (clamped_again()) return false;
   if (carried(traction_per_Nm_N, inertia_kg_m2) < kStillCarried * mu) return false;
   // Slip gained around the stop, less what the later pace, so many times over, would have gained.
   const double times =

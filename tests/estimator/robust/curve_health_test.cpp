@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -107,6 +109,29 @@ TEST(StepWatch, SeesAStepAndNoDriftAndNoneWhereSlipMoves) {
   EXPECT_TRUE(steps(up, creeps));
 }
 
+// The clamp force stays about where it counts as lowered, and the torque swings: read only while
+// the force lies below, it seems to step. By hand: 1.6 Nm of 30 Nm from one such time to the next.
+TEST(ExperimentRecord, ATorqueThatSwingsIsNoStepWhereTheForceHovers) {
+  const auto stepped = [](double (*torque_Nm)(double)) {
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal;
+    ExperimentRecord record(200.0);
+    for (int i = 0; i < 4000; ++i) {
+      const double t = i / 200.0;
+      const double force_N = 5000.0 * (1.0 - 0.010 * std::min(t, 2.0) +
+                                       0.015 * std::sin(std::numbers::pi * std::max(0.0, t - 2.0)));
+      record.step({.t_s = t,
+                   .slip_percent = 0.3 + 0.01 * normal(random),
+                   .torque_Nm = torque_Nm(t) + 0.1 * normal(random),
+                   .clamp_force_N = force_N + 5.0 * normal(random),
+                   .omega_p_rad_s = 105.0});
+    }
+    return std::isfinite(record.torque_stepped_s());
+  };
+  EXPECT_FALSE(stepped([](double t) { return 30.0 + 0.8 * std::sin(2.2 * t); }));
+  EXPECT_TRUE(stepped([](double t) { return t < 15.0 ? 30.0 : 33.0; }));
+}
+
 // mu* is T / F, the curve a straight line of slip over mu*: a belt follows the true force.
 TEST(ForceStep, SeesAReadingThatStepsWhereSlipStaysAndNoForceThatSlipFollows) {
   using Force = double (*)(double);
@@ -171,10 +196,15 @@ TEST(Trend, LearnsTheNoiseBesideAStepAndACorner) {
   EXPECT_LT(density([](double t) { return t < 10.0 ? 50.0 : 53.0; }), 2.0 * kTruth);
 }
 
+double clamped_again_N(double t) {
+  return 3300.0 - 30.0 * t + 2000.0 * std::clamp(t - 10.15, 0.0, 0.3);
+}
+
 // Slip runs from 10 s on and is stopped 0.1 s later; mu* is c T / F with c = 6.
 TEST(FollowOn, TellsSlipThatComesToAStandFromSlipThatGoesOn) {
   constexpr double kStop_s = 10.1;
-  const auto stood = [](double (*slip)(double), double (*force_N)(double)) {
+  const auto stood = [](double (*slip)(double), double (*force_N)(double),
+                        double (*torque_Nm)(double)) {
     std::mt19937_64 random(1);
     std::normal_distribution<double> normal;
     ExperimentRecord record(200.0);
@@ -183,7 +213,7 @@ TEST(FollowOn, TellsSlipThatComesToAStandFromSlipThatGoesOn) {
       const double t = i / 200.0;
       const Cell sample{.t_s = t,
                         .slip_percent = slip(t) + 0.02 * normal(random),
-                        .torque_Nm = 50.0 + 0.3 * normal(random),
+                        .torque_Nm = torque_Nm(t) + 0.3 * normal(random),
                         .clamp_force_N = force_N(t) + 30.0 * normal(random),
                         .omega_p_rad_s = 105.0 + 0.02 * normal(random)};
       if (t < kStop_s) {
@@ -199,12 +229,13 @@ TEST(FollowOn, TellsSlipThatComesToAStandFromSlipThatGoesOn) {
   const auto lowered = [](double t) { return 3300.0 - 30.0 * t; };  // 2997 N at the stop
   const auto drift = [](double t) { return 1.0 + 2.5 * std::clamp(t - 10.0, 0.0, 0.3); };
   const auto slipping = [](double t) { return 1.0 + 2.5 * std::max(t - 10.0, 0.0); };
-  EXPECT_TRUE(stood(drift, lowered));
-  EXPECT_FALSE(stood(slipping, lowered));
-  // Clamped again it comes to a stand as well.
-  EXPECT_FALSE(stood(drift, [](double t) {
-    return 3300.0 - 30.0 * t + 2000.0 * std::clamp(t - 10.15, 0.0, 0.3);
-  }));
+  const auto held = [](double) { return 50.0; };
+  EXPECT_TRUE(stood(drift, lowered, held));
+  EXPECT_FALSE(stood(slipping, lowered, held));
+  // Clamped again it comes to a stand as well; mu* stays where it was as long as it slips.
+  EXPECT_FALSE(stood(drift, clamped_again_N, held));
+  EXPECT_FALSE(
+      stood(drift, clamped_again_N, [](double t) { return 0.1 / 6.0 * clamped_again_N(t); }));
 }
 
 }  // namespace
