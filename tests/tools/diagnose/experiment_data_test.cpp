@@ -115,6 +115,38 @@ TEST(Rounding, StaysWhereNoNoiseCarriesTheSamplesFromStepToStep) {
   EXPECT_LT(shafts(1e-4, 0.02).rounding_slip, 0.001 * held);
 }
 
+// A pressure that is held, then falls, and is held again; steps of 40 kPa, as one of 8 bits has.
+SignalTable held_pressure(double from_Pa, double to_Pa) {
+  SignalTable table;
+  Noise noise;
+  for (int i = 0; i < 2000; ++i) {
+    const double t_s = 0.01 * i;
+    const double share = std::clamp((t_s - 6.0) / 8.0, 0.0, 1.0);
+    const auto add = [&](Role role, double value) {
+      table[role].t_s.push_back(t_s);
+      table[role].value.push_back(value);
+    };
+    add(Role::kPrimarySpeed, 100.0 + 0.01 * noise());
+    add(Role::kSecondarySpeed, 222.0 + 0.01 * noise());
+    add(Role::kSecondaryPressure,
+        std::round((from_Pa + share * (to_Pa - from_Pa) + 6e3 * noise()) / 4e4) * 4e4);
+    add(Role::kPrimaryTorque, 50.0);
+  }
+  return table;
+}
+
+TEST(Saturation, IsALevelThatNoExperimentGoesBeyond) {
+  const SignalTable table = held_pressure(5.2e5, 4.0e5);
+  const ExperimentData alone = prepare(table, {});
+  EXPECT_TRUE(alone.saturated_pressure);
+  Reaches reached;
+  widen(reached, held_pressure(6.4e5, 2.8e5));
+  const ExperimentData among_others = prepare(table, {}, reached);
+  EXPECT_FALSE(among_others.saturated_pressure);
+  EXPECT_GT(among_others.valid_count, 180);  // of 200, less the ends
+  EXPECT_LT(alone.valid_count, 100);
+}
+
 // A pressure that comes down in steps, each a tenth of a second long.
 TEST(Staircase, KeepsThePlateausAndNotTheSteps) {
   constexpr double kPlateau_s = 1.3, kHeight_Pa = 5e4;

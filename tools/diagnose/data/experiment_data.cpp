@@ -79,17 +79,18 @@ GridSignal to_grid(const Channel& channel, double start_s, int n, double dt_s) {
   return out;
 }
 
-// Where a third and more of the channel's samples sit on its largest or smallest value for half a
-// second while the channel moves elsewhere: noise takes a clipped signal off its bound now and
-// then.
-std::vector<bool> saturated_samples(const Channel& channel, double start_s, int n, double dt_s) {
+// Where a third and more of the channel's samples sit on the largest or smallest value that it
+// reaches for half a second while the channel moves elsewhere: noise takes a clipped signal off its
+// bound now and then.
+std::vector<bool> saturated_samples(const Channel& channel, const Reach& reach, double start_s,
+                                    int n, double dt_s) {
   constexpr double kWindow_s = 0.5, kAround_s = 0.5, kShare = 0.33;
   constexpr std::size_t kCountMin = 5;
   std::vector<bool> out(static_cast<std::size_t>(n), false);
   if (channel.value.size() < 10) return out;
   const auto [low, high] = std::minmax_element(channel.value.begin(), channel.value.end());
   if (*low == *high) return out;
-  for (const double bound : {*low, *high}) {
+  for (const double bound : {reach.lowest, reach.highest}) {
     std::size_t begin = 0, hits = 0;
     for (std::size_t end = 0; end < channel.value.size(); ++end) {
       if (channel.value[end] == bound) ++hits;
@@ -367,7 +368,9 @@ ArrayXd shifted_slope(const GridSignal& signal, double dt_s, double shift_s) {
   return out;
 }
 
-ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator) {
+ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator,
+                       Reaches reached) {
+  widen(reached, table);
   ExperimentData data;
   data.name = table.name;
   data.notes = table.notes;
@@ -401,13 +404,20 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
   data.line_p = order_line(speed);
   data.line_s = order_line(table[Role::kSecondarySpeed]);
 
-  std::vector<bool> saturated =
-      saturated_samples(table[Role::kSecondaryPressure], start_s, n, data.dt_s);
-  data.saturated_pressure = std::find(saturated.begin(), saturated.end(), true) != saturated.end();
+  const auto saturated_on = [&](Role role) {
+    return saturated_samples(table[role], reached[static_cast<std::size_t>(role)], start_s, n,
+                             data.dt_s);
+  };
+  const auto any = [](const std::vector<bool>& samples) {
+    return std::find(samples.begin(), samples.end(), true) != samples.end();
+  };
+  std::vector<bool> saturated = saturated_on(Role::kSecondaryPressure);
+  data.saturated_pressure = any(saturated);
   for (const Role role : {Role::kPrimaryTorque, Role::kEngineTorque, Role::kSecondaryTorque}) {
     if (!clipped(table[role])) continue;
+    const std::vector<bool> too = saturated_on(role);
+    if (!any(too)) continue;
     data.notes.push_back(table.name + ": a torque rests on its bound; left out there");
-    const std::vector<bool> too = saturated_samples(table[role], start_s, n, data.dt_s);
     std::transform(saturated.begin(), saturated.end(), too.begin(), saturated.begin(),
                    std::logical_or<>());
   }

@@ -50,8 +50,10 @@ struct ExperimentData {
   int size() const { return static_cast<int>(t_s.size()); }
 };
 
-// Never throws: what cannot be used is masked, and said in notes.
-ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator);
+// Never throws: what cannot be used is masked, and said in notes. reached: by each channel in all
+// experiments with the same sensors; what one of them goes beyond is no bound in another.
+ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator,
+                       Reaches reached = {});
 
 // Both slow copies, from value.
 void add_slow(GridSignal& signal, double dt_s);

@@ -224,6 +224,15 @@ double median_period_s(const Channel& channel) {
   return steps.empty() ? std::numeric_limits<double>::quiet_NaN() : estimator::median(steps);
 }
 
+void widen(Reaches& reaches, const SignalTable& table) {
+  for (std::size_t role = 0; role < reaches.size(); ++role) {
+    for (const double value : table.channels[role].value) {
+      reaches[role].lowest = std::min(reaches[role].lowest, value);
+      reaches[role].highest = std::max(reaches[role].highest, value);
+    }
+  }
+}
+
 void close_gaps(SignalTable& table) {
   // At most so much, however seldom rows come: what looks at the course of the signals takes time
   // by its length.

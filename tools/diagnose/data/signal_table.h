@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,6 +30,14 @@ struct SignalTable {
   const Channel& operator[](Role role) const { return channels[static_cast<std::size_t>(role)]; }
   Channel& operator[](Role role) { return channels[static_cast<std::size_t>(role)]; }
 };
+
+// The lowest and the highest value that each channel reaches in some tables.
+struct Reach {
+  double lowest = std::numeric_limits<double>::infinity();
+  double highest = -std::numeric_limits<double>::infinity();
+};
+using Reaches = std::array<Reach, daemon::kRoleCount>;
+void widen(Reaches& reaches, const SignalTable& table);
 
 struct TableError {
   bool missing_file = false;  // else: the content cannot be used at all

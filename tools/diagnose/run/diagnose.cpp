@@ -53,9 +53,11 @@ class Run {
     std::vector<ExperimentData> runs;
     drop_copies(request_.experiments, doubts_);
     is_coarse_ = std::any_of(request_.experiments.begin(), request_.experiments.end(), is_coarse);
+    for (const SignalTable& table : request_.experiments) widen(reached_, table);
+    for (const SignalTable& table : request_.held_out) widen(reached_, table);
     runs.resize(request_.experiments.size());
     in_parallel(request_.jobs, runs.size(), [&](std::size_t i) {
-      runs[i] = prepare(request_.experiments[i], request_.model.variator);
+      runs[i] = prepare(request_.experiments[i], request_.model.variator, reached_);
       // From here on the grid is all that counts; half of the memory that an hour takes.
       if (!request_.with_plots) request_.experiments[i] = {};
     });
@@ -217,7 +219,7 @@ class Run {
       std::vector<ExperimentData> runs;
       runs.reserve(request_.held_out.size());
       for (const SignalTable& table : request_.held_out) {
-        runs.push_back(prepare(table, request_.model.variator));
+        runs.push_back(prepare(table, request_.model.variator, reached_));
       }
       held_out.runs = std::move(runs);
       held_out.slip_noise_share = estimate_slip_noise_shares(held_out, naming.nominal.state);
@@ -584,6 +586,7 @@ class Run {
   Answer answer_;
   Doubts doubts_;
   bool is_coarse_ = false;
+  Reaches reached_{};  // by what is fitted and what is held out
 };
 
 }  // namespace
