@@ -201,8 +201,10 @@ std::string no_result() {
   for (std::size_t i = 0; i < estimator::kStopReasonCount; ++i) {
     const auto reason = static_cast<estimator::StopReason>(i);
     stops += reason_row(daemon::stop_reason_name(reason), daemon::words_of(reason));
-    if (reason == estimator::StopReason::kNone) {
-      stops += reason_row("None, with a lower bound", daemon::words_of(reason, true));
+    const daemon::Words with_bound = daemon::words_of(reason, true);
+    if (with_bound.remedy != daemon::words_of(reason).remedy) {
+      stops += reason_row(std::string(daemon::stop_reason_name(reason)) + ", with a lower bound",
+                          with_bound);
     }
   }
   for (const auto& each : daemon::kInhibits) {

@@ -172,6 +172,9 @@ constexpr std::array<StopRow, estimator::kStopReasonCount> kStopRemedies{{
 constexpr Words kEndedBeforeTheTop{
     "it ended before friction came to its top: the clamping force was not lowered far enough",
     "lower the clamping force further before the experiment ends"};
+constexpr std::string_view kBoundAtTheTop =
+    "a value needs more data, or less noise, around the peak: lower the clamping force more slowly "
+    "there";
 
 // Each row at its value's place.
 constexpr bool in_order(const auto& rows) {
@@ -218,7 +221,8 @@ Words words_of(StopReason reason, bool bound) {
   if (reason == StopReason::kNone) {
     return bound ? kEndedBeforeTheTop : Words{"the trigger ended the experiment", remedy};
   }
-  return {stop_reason_words(reason), remedy};
+  const bool at_the_top = bound && reason == StopReason::kSlope;
+  return {stop_reason_words(reason), at_the_top ? kBoundAtTheTop : remedy};
 }
 
 Reason reason_of(Inhibit inhibit, std::string figure) {
