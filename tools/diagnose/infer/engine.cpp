@@ -18,7 +18,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kSaturatedPrecision = 50.0;
-constexpr std::array<double, 3> kCoarseness{30.0, 8.0, 2.0};
+// Of the noise. The first covers what any machine leaves: 0.04 Nm of noise, 12 Nm.
+constexpr std::array kCoarseness{300.0, 100.0, 30.0, 8.0, 2.0};
 constexpr double kCovered = 2.0;       // chosen: rms in units of noise that the eye tells from none
 constexpr int kAttempts = 10;          // to find a step that gains, each shorter than the last
 constexpr double kLongStep = 0.05;     // in tolerances and usual sizes
@@ -299,20 +300,27 @@ void Engine::fit_machine() {
     double objective = 0.0;
   };
   constexpr std::array kPeaks{0.012, 0.02, 0.035};
-  std::array<Attempt, kPeaks.size()> attempts;
+  // From the coarsest look, where only what is usual holds the machine, and from one that the data
+  // hold already.
+  constexpr std::array<std::size_t, 2> kFirstLooks{0, 2};
+  std::array<Attempt, kPeaks.size() * kFirstLooks.size()> attempts;
   for (std::size_t i = 0; i < attempts.size(); ++i) {
     Attempt& attempt = attempts[i];
+    const double peak = kPeaks[i % kPeaks.size()];
     ModelState state = start;
     state.nuisance[kLnMuMax] = ln_mu_seen;
-    state.nuisance[kLnPeakSlipOverdrive] = std::log(kPeaks[i]);
-    state.nuisance[kLnPeakSlipLow] = std::log(1.4 * kPeaks[i]);
+    state.nuisance[kLnPeakSlipOverdrive] = std::log(peak);
+    state.nuisance[kLnPeakSlipLow] = std::log(1.4 * peak);
     attempt.first = state;
-    // From a coarse look to the sharp one: far from the optimum every misfit is beyond all noise.
+    // To the sharp one: far from the optimum every misfit is beyond all noise.
     Whitening& whitening = attempt.whitening;
     whitening = identity_whitening(campaign_);
-    for (const Campaign& coarse : coarse_) {
-      state = minimise(coarse, nuisances_, state, whitening, default_scatter(), 8, 0).state;
-      reweigh(coarse, state, whitening);
+    for (std::size_t look = 0; look < coarse_.size(); ++look) {
+      if (look >= kFirstLooks[i / kPeaks.size()]) {
+        state =
+            minimise(coarse_[look], nuisances_, state, whitening, default_scatter(), 8, 0).state;
+        reweigh(coarse_[look], state, whitening);
+      }
       attempt.way.push_back(state);
     }
     for (const int iterations : {8, 6}) {

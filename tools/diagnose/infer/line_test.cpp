@@ -20,6 +20,7 @@ constexpr double kSmooth_s = 2.0;   // slower courses are no line
 constexpr int kSamplesMin = 100;
 constexpr double kLeast = 0.05;  // of the noise: less is rounding
 constexpr double kClip = 4.0;    // sigmas
+constexpr double kDriven = 6.0;  // of the level about it: noise comes so far in 1 of 400
 
 // The residual's valid stretches without their slow course, outliers clipped; zero elsewhere.
 ArrayXd fast_part(const ExperimentData& run, const ArrayXd& residual, int every) {
@@ -75,6 +76,46 @@ std::vector<double> levelled(const std::vector<double>& power) {
   return out;
 }
 
+// Of a signal, over the valid samples: its fast part, with a variance of one.
+ArrayXd swing(const ExperimentData& run, const ArrayXd& signal) {
+  double sum = 0.0, squares = 0.0, count = 0.0;
+  for (int k = 0; k < run.size(); ++k) {
+    if (!run.valid[static_cast<std::size_t>(k)] || !std::isfinite(signal[k])) continue;
+    sum += signal[k];
+    squares += signal[k] * signal[k];
+    count += 1.0;
+  }
+  const double mean = sum / std::max(count, 1.0);
+  const double deviation = std::sqrt(squares / std::max(count, 1.0) - mean * mean);
+  if (!(deviation > 0.0)) return ArrayXd::Zero(signal.size());
+  return signal.isFinite().select((signal - mean) / deviation, 0.0);
+}
+
+// Where sums and differences of the frequencies that drive the machine lie. A bent curve, of which
+// the model knows the bend only so far, answers there too.
+std::vector<bool> driven(const ExperimentData& run, std::size_t bins, double highest_Hz) {
+  const std::array<ArrayXd, 3> drives{swing(run, run.torque.value), swing(run, run.omega_p.value),
+                                      swing(run, run.pressure.value)};
+  std::vector<bool> out(bins, false);
+  const auto look = [&](const ArrayXd& product) {
+    const ArrayXd fast = fast_part(run, product, 1);
+    if (fast.size() == 0) return;
+    const std::vector<double> own = levelled(spectrum(fast, run.dt_s, highest_Hz));
+    for (std::size_t i = 0; i < std::min(bins, own.size()); ++i) {
+      out[i] = out[i] || own[i] > kDriven;
+    }
+  };
+  for (std::size_t a = 0; a < drives.size(); ++a) {
+    for (std::size_t b = 0; b < drives.size(); ++b) {
+      const ArrayXd second = swing(run, drives[a] * drives[b]);
+      if (b >= a) look(second);
+      // Not of three times the same: that has the drive's own frequency.
+      if (b != a) look(swing(run, swing(run, drives[a].square()) * drives[b]));
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 SpectralLine strongest_line(const Campaign& campaign, const ModelState& state) {
@@ -95,7 +136,11 @@ SpectralLine strongest_line(const Campaign& campaign, const ModelState& state) {
       const ArrayXd fast = fast_part(run, at.value[q], every);
       if (fast.size() == 0) continue;
       const double highest_Hz = std::min(kHighest_Hz, 0.45 / (run.dt_s * every));
-      const std::vector<double> own = levelled(spectrum(fast, run.dt_s, highest_Hz));
+      std::vector<double> own = levelled(spectrum(fast, run.dt_s, highest_Hz));
+      const std::vector<bool> is_driven = driven(run, own.size(), highest_Hz);
+      for (std::size_t i = 0; i < own.size(); ++i) {
+        if (is_driven[i]) own[i] = std::min(own[i], 1.0);  // as noise has it
+      }
       Pool& pool = pools[q];
       pool.sum.resize(std::max(pool.sum.size(), own.size()), 0.0);
       for (std::size_t i = 0; i < own.size(); ++i) pool.sum[i] += own[i];
