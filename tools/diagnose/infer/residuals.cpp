@@ -375,7 +375,7 @@ NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& st
       const int reach = 2 * probe.lag;
       for (int k = reach; k + reach < data.size(); k += 2) {
         const auto before = static_cast<std::size_t>(k - reach);
-        const auto after = static_cast<std::size_t>(k + reach);
+        const auto after = static_cast<std::size_t>(k) + static_cast<std::size_t>(reach);
         if (!data.valid[before] || !data.valid[after]) continue;
         if (stop != kNoStop && data.stop[before] != stop) continue;
         into.push_back(probe.at(y, k));
@@ -410,7 +410,7 @@ std::vector<double> estimate_slip_noise_shares(const Campaign& campaign, const M
     constexpr int kReach = 2 * kFastProbe.lag;
     for (int k = kReach; k + kReach < data.size(); ++k) {
       if (!data.valid[static_cast<std::size_t>(k - kReach)] ||
-          !data.valid[static_cast<std::size_t>(k + kReach)]) {
+          !data.valid[static_cast<std::size_t>(k) + kReach]) {
         continue;
       }
       slip.push_back(kFastProbe.at(q.slip, k));
