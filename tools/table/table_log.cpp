@@ -21,7 +21,7 @@ struct Cell {
   std::size_t column = 0;
   can::CanId id;
   can::SignalCodec codec;
-  const can::SignalDef* signal = nullptr;
+  can::SignalDef signal;
 };
 
 class TableLog final : public can::LogReader {
@@ -36,7 +36,7 @@ class TableLog final : public can::LogReader {
       });
       if (again) continue;
       const can::SignalDef& signal = message->signals.front();
-      cells_.push_back({i, message->id, can::SignalCodec(signal), &signal});
+      cells_.push_back({i, message->id, can::SignalCodec(signal), signal});
     }
   }
 
@@ -98,7 +98,7 @@ class TableLog final : public can::LogReader {
     const std::string_view text = row_[cell.column];
     // Of a DBC's value table the numbers stand in the cells.
     if (const auto number = number_of(text, head_.separator)) return number;
-    for (const auto& [value, label] : cell.signal->values) {
+    for (const auto& [value, label] : cell.signal.values) {
       if (label == text) return static_cast<double>(value);
     }
     return {};
