@@ -18,7 +18,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kSaturatedPrecision = 50.0;
-// Of the noise. The first covers what any machine leaves: 0.04 Nm of noise, 12 Nm.
+// Chosen, of the noise. The first covers what any machine leaves: 0.04 Nm of noise, 12 Nm.
 constexpr std::array kCoarseness{300.0, 100.0, 30.0, 8.0, 2.0};
 constexpr double kCovered = 2.0;       // chosen: rms in units of noise that the eye tells from none
 constexpr int kAttempts = 10;          // to find a step that gains, each shorter than the last
