@@ -9,8 +9,10 @@ namespace {
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 // Frames of one bus may leave a kernel a little out of order; more than this is another matter.
 constexpr std::int64_t kDisorder_ns = kSecond_ns;
-// The longest silence that is played through.
-constexpr std::int64_t kSilence_ns = 600 * kSecond_ns;
+// A pause between two drives of one recording lasts days at most; a clock that is set after a start
+// comes from years before (chosen). Time then goes on after what stands for a pause.
+constexpr std::int64_t kClockSet_ns = 7 * 86'400 * kSecond_ns;
+constexpr std::int64_t kPause_ns = 600 * kSecond_ns;
 }  // namespace
 
 // One log, one frame ahead of what is taken. The two frames change places; none is copied before it
@@ -63,8 +65,8 @@ class LogTimeline::Source {
     const std::int64_t log_ns = first_->record.t_ns;
     if (has_before_) {
       const std::int64_t gap_ns = log_ns - before_ns_;
-      if (gap_ns < -kDisorder_ns || gap_ns > kSilence_ns) {
-        shift_ns_ -= gap_ns < 0 ? gap_ns : gap_ns - kSilence_ns;
+      if (gap_ns < -kDisorder_ns || gap_ns > kClockSet_ns) {
+        shift_ns_ -= gap_ns < 0 ? gap_ns : gap_ns - kPause_ns;
         ++counters_.clock_steps;
       }
     }

@@ -1,7 +1,8 @@
 // One or several logs as one timeline: merged by stamp, frames of one interface or of all, of one
 // bus or two, stamps made monotonic. A single stamp that leaps ahead of its successor marks a
 // garbled line: the frame is dropped and counted. Where the stamps of a log step back, or ahead by
-// more than ten minutes, its clock was set: time goes on without the step. Memory flat. Tools only.
+// more than a week, its clock was set: time goes on without the step. A shorter gap is a pause of
+// the recording, and time passes in it. Memory flat. Tools only.
 #pragma once
 
 #include <cstdint>

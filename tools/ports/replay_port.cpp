@@ -5,6 +5,12 @@
 
 namespace beltgrip::ports {
 
+namespace {
+// A longer silence is a pause of the recording: what the daemon would say in it tells nobody
+// anything, and a night of it would be two million frames (chosen).
+constexpr daemon::Duration kPause = 600 * daemon::kSecond;
+}  // namespace
+
 ReplayPort::ReplayPort(LogTimeline& log, Receiver receiver)
     : log_(log), receiver_(std::move(receiver)), has_next_(log_.next(next_)) {
   if (has_next_) now_ = next_.t_ns;
@@ -28,7 +34,8 @@ daemon::Wake ReplayPort::wait_until(daemon::MonoTime deadline) noexcept {
 }
 
 daemon::MonoTime ReplayPort::silent_until() noexcept {
-  const bool heard = receiver_ != nullptr || echo_count_ > 0 || !has_next_;
+  const bool is_pause = next_.t_ns - now_ > kPause;
+  const bool heard = (receiver_ != nullptr && !is_pause) || echo_count_ > 0 || !has_next_;
   return heard ? Port::silent_until() : next_.t_ns;
 }
 

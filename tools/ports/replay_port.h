@@ -27,7 +27,8 @@ class ReplayPort final : public daemon::Port {
   std::size_t receive(std::span<daemon::RxFrame> out) noexcept override;
   daemon::SendResult send(const can::CanFrame& frame) noexcept override;
   daemon::SendResult send_on(std::uint8_t bus, const can::CanFrame& frame) noexcept override;
-  // With a receiver every frame that the daemon would have sent is wanted.
+  // With a receiver every frame that the daemon would have sent is wanted, but for pauses of the
+  // recording beyond ten minutes.
   daemon::MonoTime silent_until() noexcept override;
   daemon::BusState bus_state() noexcept override { return daemon::BusState::kActive; }
   daemon::BusState bus_state_of(std::uint8_t) noexcept override { return bus_state(); }

@@ -152,8 +152,32 @@ TEST(LogTimeline, AClockSetBackOrFarAheadIsTakenOut) {
   LogTimeline ahead = timeline({{{0}, {1 * kS}, {800000000 * kS}, {800000001 * kS}}});
   EXPECT_EQ(stamps(ahead), (Stamps{0, 1 * kS, 601 * kS, 602 * kS}));
   EXPECT_EQ(ahead.counters().clock_steps, 1u);
-  LogTimeline pause = timeline({{{0}, {599 * kS}}});
-  EXPECT_EQ(stamps(pause), (Stamps{0, 599 * kS}));
+}
+
+// A recorder that goes on after a stop, or over night: later results stand at the log's own stamps.
+TEST(LogTimeline, APauseOfTheRecordingPasses) {
+  constexpr std::int64_t kDay = 86'400 * kS;
+  LogTimeline pause = timeline({{{0}, {1 * kS}, {1201 * kS}, {3 * kDay}, {3 * kDay + 1 * kS}}});
+  EXPECT_EQ(stamps(pause), (Stamps{0, 1 * kS, 1201 * kS, 3 * kDay, 3 * kDay + 1 * kS}));
+  EXPECT_EQ(pause.counters().clock_steps, 0u);
+}
+
+// Without a receiver nobody hears what is sent in a silence; with one, pauses alone are left out.
+TEST(ReplayPort, WhatASilenceMayBeLeftOutOf) {
+  const auto until = [](std::int64_t gap_ns, ReplayPort::Receiver receiver) {
+    LogTimeline log = timeline({{{0}, {gap_ns}}});
+    ReplayPort port(log, std::move(receiver));
+    daemon::RxFrame frame;
+    EXPECT_EQ(port.wait_until(1 * kS), daemon::Wake::kFrames);
+    EXPECT_EQ(port.receive({&frame, 1}), 1u);
+    EXPECT_EQ(port.wait_until(1 * kS), daemon::Wake::kDeadline);
+    return port.silent_until();
+  };
+  const ReplayPort::Receiver heard = [](daemon::MonoTime, const can::CanFrame&, std::uint8_t) {};
+  EXPECT_EQ(until(30 * kS, nullptr), 30 * kS);
+  EXPECT_EQ(until(1201 * kS, nullptr), 1201 * kS);
+  EXPECT_LE(until(30 * kS, heard), 1 * kS);
+  EXPECT_EQ(until(1201 * kS, heard), 1201 * kS);
 }
 
 TEST(ReplayPort, StampsAreTheClock) {
