@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -17,9 +18,8 @@ namespace beltgrip::can::dbc {
 inline constexpr std::size_t kNameLengthMax = 1024;
 
 struct SignalSource {
-  std::size_t offset = 0;  // of the name
-  bool multiplexed = false;
-  std::uint64_t selector_value = 0;  // of "m3", with multiplexed
+  std::size_t offset = 0;                       // of the name
+  std::optional<std::uint32_t> selector_value;  // of "m3": its place in Draft::selector_values
 };
 
 struct MessageSource {
@@ -38,17 +38,17 @@ struct Reference {
 };
 
 struct CommentRef : Reference {
-  std::string text;
+  Text text;
 };
 struct AttributeRef : Reference {
-  std::string attribute;
-  std::string value;
+  Text attribute;
+  Text value;
 };
 struct RelationRef : Reference {
-  std::string attribute;
+  Text attribute;
   std::string_view kind;
   std::string_view node;
-  std::string value;
+  Text value;
 };
 struct ValuesRef : Reference {
   ValueTable values;
@@ -59,10 +59,10 @@ struct ValueTypeRef : Reference {
 };
 struct MultiplexRef : Reference {
   std::string_view selector;
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges;
+  List<ValueRange> ranges;
 };
 struct SendersRef : Reference {
-  std::vector<std::string> senders;
+  std::vector<Text> senders;
 };
 struct GroupRef : Reference {
   SignalGroup group;
@@ -72,27 +72,29 @@ struct DataBytesRef : Reference {
 };
 
 struct Draft {
-  explicit Draft(std::string_view dbc_text) : text(dbc_text) {}
+  explicit Draft(std::string dbc_text) : text(database.arena->keep_whole(std::move(dbc_text))) {}
 
-  std::string_view text;
-  bool text_is_utf8 = true;
   Database database;
+  std::string_view text;  // of the file; what is read of it stays there
+  bool text_is_utf8 = true;
+  std::vector<std::uint64_t> selector_values;
   std::vector<MessageSource> messages;    // beside database.messages
   std::vector<std::size_t> node_offsets;  // beside database.nodes
-  std::vector<CommentRef> comments;
-  std::vector<AttributeRef> attributes;
-  std::vector<RelationRef> relations;
-  std::vector<ValuesRef> values;
-  std::vector<ValueTypeRef> value_types;
-  std::vector<MultiplexRef> multiplexes;
-  std::vector<SendersRef> senders;
-  std::vector<GroupRef> groups;
-  std::vector<DataBytesRef> data_bytes;
-  std::vector<Reference> kept;  // spans that go to other_statements as text
+  std::deque<CommentRef> comments;
+  std::deque<AttributeRef> attributes;
+  std::deque<RelationRef> relations;
+  std::deque<ValuesRef> values;
+  std::deque<ValueTypeRef> value_types;
+  std::deque<MultiplexRef> multiplexes;
+  std::deque<SendersRef> senders;
+  std::deque<GroupRef> groups;
+  std::deque<DataBytesRef> data_bytes;
+  std::deque<Reference> kept;  // spans that go to other_statements as text
   ProblemList problems;
 
-  // A piece of the file as UTF-8.
-  std::string utf8(std::string_view piece);
+  Arena& arena() const { return *database.arena; }
+  // A piece of the file, or of what the arena keeps, as UTF-8.
+  Text utf8(std::string_view piece);
   // Keeps the statement as text.
   void keep(std::size_t begin, std::size_t end) {
     Reference span;

@@ -4,6 +4,7 @@
 #include <bitset>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <set>
 
 #include "can_dbc/dbc/draft.h"
@@ -25,6 +26,16 @@ std::uint64_t first_bit(const SignalDef& signal) {
   return std::uint64_t{byte} * 8 + (signal.byte_order == ByteOrder::kLittle ? bit : 7 - bit);
 }
 
+// The bits of each byte the other way round.
+constexpr std::uint64_t reversed_in_bytes(std::uint64_t bits) {
+  constexpr std::uint64_t kFours = 0x0F0F'0F0F'0F0F'0F0FU;
+  constexpr std::uint64_t kTwos = 0x3333'3333'3333'3333U;
+  constexpr std::uint64_t kOnes = 0x5555'5555'5555'5555U;
+  bits = (bits & kFours) << 4 | (bits >> 4 & kFours);
+  bits = (bits & kTwos) << 2 | (bits >> 2 & kTwos);
+  return (bits & kOnes) << 1 | (bits >> 1 & kOnes);
+}
+
 // Signals of one message that share bits though a frame can carry both. Two signals exclude each
 // other when some selector, their own or one further up, would need two values at once.
 class OverlapCheck {
@@ -38,7 +49,7 @@ class OverlapCheck {
   static constexpr std::size_t kGroupsMax = 512;
   static constexpr std::size_t kRangesMax = 1024;
   static constexpr std::size_t kDepthMax = 4;  // selectors above each other
-  using Ranges = std::vector<std::pair<std::uint64_t, std::uint64_t>>;
+  using Ranges = List<ValueRange>;
   using GroupSet = std::bitset<kGroupsMax>;
   struct Condition {
     std::size_t selector;  // index of the signal
@@ -83,16 +94,16 @@ bool OverlapCheck::collect_groups() {
   std::size_t ranges = 0;
   for (std::size_t i = 0; i < signals.size(); ++i) {
     by_name.emplace(signals[i].name, i);
-    const std::optional<MuxRule>& rule = signals[i].multiplexed_by;
+    const MuxRule* const rule = signals[i].multiplexed_by;
     if (rule) ranges += rule->ranges.size();
   }
   if (ranges > kRangesMax) return false;
-  std::map<std::pair<std::size_t, Ranges>, std::size_t> known;
+  std::map<std::pair<std::size_t, std::vector<ValueRange>>, std::size_t> known;
   for (const SignalDef& signal : signals) {
     Group group;
     const SignalDef* at = &signal;
     while (group.size() < kDepthMax) {
-      const std::optional<MuxRule>& rule = at->multiplexed_by;
+      const MuxRule* const rule = at->multiplexed_by;
       if (!rule) break;
       const auto selector = by_name.find(rule->selector);
       if (selector == by_name.end()) break;
@@ -103,8 +114,8 @@ bool OverlapCheck::collect_groups() {
       group_of_.push_back(0);
       continue;
     }
-    const auto [place, is_new] =
-        known.try_emplace({group[0].selector, *group[0].ranges}, groups_.size());
+    const auto [place, is_new] = known.try_emplace(
+        {group[0].selector, {group[0].ranges->begin(), group[0].ranges->end()}}, groups_.size());
     group_of_.push_back(place->second);
     if (!is_new) continue;
     if (groups_.size() == kGroupsMax) return false;
@@ -214,7 +225,7 @@ void check_circles(const MessageDef& message, const MessageSource& source, Probl
     std::size_t at = i;
     while (visited[at] == 0) {
       visited[at] = i + 1;
-      const std::optional<MuxRule>& rule = message.signals[at].multiplexed_by;
+      const MuxRule* const rule = message.signals[at].multiplexed_by;
       if (!rule) break;
       const auto above = by_name.find(rule->selector);
       if (above == by_name.end()) break;
@@ -228,9 +239,26 @@ void check_circles(const MessageDef& message, const MessageSource& source, Probl
   }
 }
 
+// The same of a payload of at most eight bytes, by one word: bit b of byte B is 8 B + b. Nothing
+// where a signal ends beyond them.
+std::optional<bool> bits_of_eight_bytes_taken_twice(const MessageDef& message) {
+  std::uint64_t taken = 0;
+  for (const SignalDef& signal : message.signals) {
+    const std::uint64_t first = first_bit(signal);
+    if (signal.length == 0) continue;
+    if (signal.length > 64 || first + signal.length > 64) return std::nullopt;
+    std::uint64_t bits = (~std::uint64_t{0} >> (64 - signal.length)) << first;
+    if (signal.byte_order == ByteOrder::kBig) bits = reversed_in_bytes(bits);
+    if ((taken & bits) != 0) return true;
+    taken |= bits;
+  }
+  return false;
+}
+
 // Quick look before the thorough one: without multiplexing, every bit of a frame-sized payload has
 // one owner.
 bool bits_taken_twice(const MessageDef& message) {
+  if (const std::optional<bool> known = bits_of_eight_bytes_taken_twice(message)) return *known;
   std::bitset<kFdBits> taken;
   for (const SignalDef& signal : message.signals) {
     const std::uint64_t first = first_bit(signal);
@@ -260,7 +288,7 @@ void check_message(const MessageDef& message, const MessageSource& source, Probl
   names.reserve(message.signals.size());
   for (std::size_t i = 0; i < message.signals.size(); ++i) {
     check_signal(message, message.signals[i], source.signals[i].offset, problems);
-    names.emplace_back(std::hash<std::string>()(message.signals[i].name), i);
+    names.emplace_back(std::hash<std::string_view>()(message.signals[i].name), i);
   }
   std::sort(names.begin(), names.end());
   for (std::size_t i = 1; i < names.size(); ++i) {
@@ -275,9 +303,49 @@ void check_message(const MessageDef& message, const MessageSource& source, Probl
   }
   const bool multiplexed =
       std::any_of(message.signals.begin(), message.signals.end(),
-                  [](const SignalDef& s) { return s.multiplexed_by.has_value(); });
+                  [](const SignalDef& s) { return s.multiplexed_by != nullptr; });
   if (multiplexed) check_circles(message, source, problems);
   if (multiplexed || bits_taken_twice(message)) OverlapCheck(message, source, problems).run();
+}
+
+// The messages in the order of what `of` gives of them, those of the same in the file's.
+template <typename Of>
+std::vector<std::uint32_t> sorted_by(const std::vector<MessageDef>& messages, Of of) {
+  std::vector<std::uint32_t> order(messages.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return of(messages[a]) < of(messages[b]);
+  });
+  return order;
+}
+
+void check_names(Draft& draft) {
+  const std::vector<MessageDef>& messages = draft.database.messages;
+  const std::vector<std::uint32_t> order =
+      sorted_by(messages, [](const MessageDef& message) { return message.name; });
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    const Text name = messages[order[i]].name;
+    if (name != messages[order[i - 1]].name) continue;
+    draft.problems.warn(draft.messages[order[i]].offset, "duplicate-name",
+                        "a second message \"" + clip(name) + "\"");
+  }
+}
+
+void check_identifiers(Draft& draft) {
+  const std::vector<MessageDef>& messages = draft.database.messages;
+  const std::vector<std::uint32_t> order =
+      sorted_by(messages, [](const MessageDef& message) { return message.id; });
+  std::uint32_t first = 0;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const MessageDef& message = messages[order[i]];
+    if (i == 0 || message.id != messages[first].id) {
+      first = order[i];
+      continue;
+    }
+    draft.problems.warn(draft.messages[order[i]].offset, "duplicate-id",
+                        "message \"" + clip(message.name) + "\" has the identifier of \"" +
+                            clip(messages[first].name) + "\"; frames are decoded by the first");
+  }
 }
 
 // Each node used but not declared: once, where it is used first.
@@ -291,7 +359,7 @@ void check_nodes(Draft& draft) {
     }
   }
   std::string_view last;
-  const auto used = [&](const std::string& node, std::size_t offset) {
+  const auto used = [&](Text node, std::size_t offset) {
     if (node == last) return;
     last = node;
     if (!known.insert(node).second) return;
@@ -301,9 +369,9 @@ void check_nodes(Draft& draft) {
   for (std::size_t i = 0; i < db.messages.size(); ++i) {
     const MessageDef& message = db.messages[i];
     used(message.transmitter, draft.messages[i].offset);
-    for (const std::string& node : message.senders) used(node, draft.messages[i].offset);
+    for (const Text node : message.senders) used(node, draft.messages[i].offset);
     for (std::size_t k = 0; k < message.signals.size(); ++k) {
-      for (const std::string& node : message.signals[k].receivers) {
+      for (const Text node : message.signals[k].receivers) {
         used(node, draft.messages[i].signals[k].offset);
       }
     }
@@ -314,23 +382,10 @@ void check_nodes(Draft& draft) {
 
 void lint(Draft& draft) {
   const Database& db = draft.database;
-  std::set<std::string_view> names;
-  std::map<CanId, std::size_t> ids;
+  check_names(draft);
+  check_identifiers(draft);
   for (std::size_t i = 0; i < db.messages.size(); ++i) {
-    const MessageDef& message = db.messages[i];
-    const MessageSource& source = draft.messages[i];
-    if (!names.insert(message.name).second) {
-      draft.problems.warn(source.offset, "duplicate-name",
-                          "a second message \"" + clip(message.name) + "\"");
-    }
-    const auto [place, is_new] = ids.emplace(message.id, i);
-    if (!is_new) {
-      draft.problems.warn(source.offset, "duplicate-id",
-                          "message \"" + clip(message.name) + "\" has the identifier of \"" +
-                              clip(db.messages[place->second].name) +
-                              "\"; frames are decoded by the first");
-    }
-    check_message(message, source, draft.problems);
+    check_message(db.messages[i], draft.messages[i], draft.problems);
   }
   check_nodes(draft);
   if (db.messages.empty()) {

@@ -123,7 +123,7 @@ class MessageCodec::Builder {
     std::vector<Range> ranges;
     std::vector<std::uint64_t> begins{0};
     for (const std::uint32_t each : selected) {
-      const std::optional<MuxRule>& rule = definition_.signals[each].multiplexed_by;
+      const MuxRule* const rule = definition_.signals[each].multiplexed_by;
       if (!rule) continue;
       for (const auto& [low, high] : rule->ranges) {
         if (low > high || low > selector.mask) continue;

@@ -2,14 +2,14 @@
 
 namespace beltgrip::can {
 
-const SignalDef* MessageDef::find_signal(const std::string& signal_name) const {
+const SignalDef* MessageDef::find_signal(std::string_view signal_name) const {
   for (const auto& signal : signals) {
     if (signal.name == signal_name) return &signal;
   }
   return nullptr;
 }
 
-const MessageDef* Database::find_message(const std::string& message_name) const {
+const MessageDef* Database::find_message(std::string_view message_name) const {
   for (const auto& message : messages) {
     if (message.name == message_name) return &message;
   }

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "can_dbc/dbc/draft.h"
+#include "can_dbc/dbc/usual_signal.h"
 #include "can_dbc/text/encoding.h"
 
 namespace beltgrip::can {
@@ -46,6 +47,7 @@ class StatementReader {
   bool value_table();
   bool message();
   bool signal();
+  bool usual_signal();
   bool environment_variable();
   bool environment_data();
   bool comment();
@@ -63,8 +65,12 @@ class StatementReader {
   void check_order(std::string_view word);
   void unknown_statement();
   void signal_tail(SignalDef& signal);
+  List<Text> receiver_list();
+  void end_message();
   bool value_list(ValueTable& table);
-  bool attribute_value(std::string& value);
+  bool read_labels();
+  ValueTable table_of_labels();
+  bool attribute_value(Text& value);
   bool object_of(Reference& reference);
 
   // Tokens that must be here; each says what it found and expected instead.
@@ -73,26 +79,39 @@ class StatementReader {
   bool expect_unsigned(std::uint64_t& value, std::uint64_t highest, const char* what);
   bool expect_id(std::uint32_t& raw_id);
   bool expect_name(std::string_view& name, const char* what);
-  bool expect_string(std::string& text, StringContext context, const char* what);
+  bool expect_string(Text& text, StringContext context, const char* what);
   void expect_semicolon();
   bool fail(const char* expected);
   bool fail_at(std::size_t offset, const char* expected);
-  void names_until_semicolon(std::vector<std::string>& names);
-  std::string take_text(const StringToken& token);
+  void names_until_semicolon(std::vector<Text>& names);
+  Text take_text(const StringToken& token);
   void check_name(std::string_view name, std::size_t offset);
 
   Draft& draft_;
   Scanner scan_;
   std::size_t start_ = 0;  // of the statement
   enum class Within : std::uint8_t { kNothing, kMessage, kRefusedMessage };
-  Within within_ = Within::kNothing;  // what SG_ lines belong to
-  bool closed_ = true;                // the last quoted text had an end
+  Within within_ = Within::kNothing;   // what SG_ lines belong to
+  std::vector<SignalSource> sources_;  // of the message that is read
+  std::vector<SignalDef> signals_;
+  std::vector<Text> receivers_;  // of the signal that is read
+  List<Text> last_receivers_;
+  List<Text> usual_receivers_;  // of the last usual signal, and as it has them
+  std::string_view last_receivers_text_;
+  struct LabelRead {
+    std::int64_t key = 0;
+    std::size_t offset = 0;
+    Text text;
+  };
+  std::vector<LabelRead> labels_;  // of the value list that is read
+  std::vector<std::pair<std::int64_t, Text>> entries_;
+  bool closed_ = true;  // the last quoted text had an end
   bool seen_bit_timing_ = false;
   bool seen_nodes_ = false;
   std::size_t last_rank_ = 0;  // see check_order
   std::string_view last_section_;
   std::array<bool, 7> late_reported_{};
-  std::set<std::pair<std::string, std::string>> defined_;  // attributes: name, object
+  std::set<std::pair<Text, Text>> defined_;  // attributes: name, object
 };
 
 const std::array<StatementReader::Row, 32> StatementReader::kRows{{
@@ -219,7 +238,7 @@ bool StatementReader::expect_name(std::string_view& name, const char* what) {
   return true;
 }
 
-std::string StatementReader::take_text(const StringToken& token) {
+Text StatementReader::take_text(const StringToken& token) {
   closed_ = token.closed;
   if (!token.closed) {
     draft_.problems.error(token.offset, "unclosed-string",
@@ -235,10 +254,10 @@ std::string StatementReader::take_text(const StringToken& token) {
     const bool escape = token.raw[i] == '\\' && i + 1 < token.raw.size() && token.raw[i + 1] == '"';
     if (!escape) text += token.raw[i];
   }
-  return draft_.utf8(text);
+  return draft_.utf8(draft_.arena().keep(text));
 }
 
-bool StatementReader::expect_string(std::string& text, StringContext context, const char* what) {
+bool StatementReader::expect_string(Text& text, StringContext context, const char* what) {
   scan_.skip_blank();
   const auto token = scan_.string(context);
   if (!token) return fail(what);
@@ -305,6 +324,7 @@ void StatementReader::run() {
       draft_.keep(start_, scan_.position());
     }
   }
+  end_message();
   if (!seen_bit_timing_ || !seen_nodes_) {
     draft_.problems.warn(0, "header-missing",
                          std::string("no ") + (seen_bit_timing_ ? "" : "BS_:") +
@@ -359,9 +379,9 @@ bool StatementReader::verbatim() {
 
 bool StatementReader::version() {
   scan_.accept(':');
-  std::string text;
+  Text text;
   if (!expect_string(text, StringContext::kName, "the version in quotes")) return false;
-  draft_.database.version = std::move(text);
+  draft_.database.version = text;
   scan_.skip_spaces();
   if (scan_.peek() == ';') scan_.seek(scan_.position() + 1);
   return true;
@@ -534,6 +554,7 @@ bool StatementReader::message() {
     }
   }
   within_ = Within::kMessage;
+  end_message();
   draft_.messages.push_back(std::move(source));
   draft_.database.messages.push_back(std::move(message));
   return true;
@@ -545,6 +566,7 @@ bool StatementReader::signal() {
     return false;
   }
   if (within_ == Within::kRefusedMessage) return false;
+  if (usual_signal()) return true;
 
   SignalDef signal;
   SignalSource source;
@@ -569,6 +591,7 @@ bool StatementReader::signal() {
       scan_.skip_blank();
     }
     std::string_view digits = indicator;
+    std::uint64_t selector_value = 0;
     bool is_indicator = digits.size() == 1 && digits[0] == 'M';
     if (is_indicator) signal.is_multiplexer = true;
     if (!is_indicator && digits[0] == 'm') {
@@ -576,7 +599,7 @@ bool StatementReader::signal() {
       const bool both = !digits.empty() && digits.back() == 'M';
       if (both) digits.remove_suffix(1);
       const auto [end, status] =
-          std::from_chars(digits.data(), digits.data() + digits.size(), source.selector_value);
+          std::from_chars(digits.data(), digits.data() + digits.size(), selector_value);
       const bool whole = end == digits.data() + digits.size();
       if (digits.empty()) {
         draft_.problems.warn(indicator_offset, "mux-number",
@@ -586,7 +609,8 @@ bool StatementReader::signal() {
         signal.is_multiplexer = both;
       } else if (whole && status == std::errc{}) {
         is_indicator = true;
-        source.multiplexed = true;
+        source.selector_value = static_cast<std::uint32_t>(draft_.selector_values.size());
+        draft_.selector_values.push_back(selector_value);
         signal.is_multiplexer = both;
       }
     }
@@ -626,9 +650,62 @@ bool StatementReader::signal() {
   }
   signal.scale = scale.value;
   signal.offset = offset.value;
+  receivers_.clear();
   signal_tail(signal);
-  draft_.messages.back().signals.push_back(source);
-  draft_.database.messages.back().signals.push_back(std::move(signal));
+  signal.receivers = receiver_list();
+  sources_.push_back(source);
+  signals_.push_back(signal);
+  return true;
+}
+
+// Signals that follow each other have the same receivers, most of them.
+List<Text> StatementReader::receiver_list() {
+  if (!(last_receivers_ == receivers_)) last_receivers_ = draft_.arena().list(receivers_);
+  return last_receivers_;
+}
+
+// The signals of the last message are complete: they get just the room that they need.
+void StatementReader::end_message() {
+  if (signals_.empty()) return;
+  draft_.messages.back().signals.assign(sources_.begin(), sources_.end());
+  draft_.database.messages.back().signals.assign(signals_.begin(), signals_.end());
+  sources_.clear();
+  signals_.clear();
+}
+
+bool StatementReader::usual_signal() {
+  UsualSignal usual;
+  const char* const end = read_usual_signal(scan_.rest(), usual);
+  if (end == nullptr) return false;
+  SignalSource& source = sources_.emplace_back();
+  source.offset = static_cast<std::size_t>(usual.name.data() - draft_.text.data());
+  if (usual.selector_value) {
+    source.selector_value = static_cast<std::uint32_t>(draft_.selector_values.size());
+    draft_.selector_values.push_back(*usual.selector_value);
+  }
+  SignalDef& signal = signals_.emplace_back();
+  signal.name = Text(usual.name);
+  signal.start_bit = usual.start_bit;
+  signal.length = usual.length;
+  signal.byte_order = usual.is_big_endian ? ByteOrder::kBig : ByteOrder::kLittle;
+  signal.type = usual.is_signed ? ValueType::kSigned : ValueType::kUnsigned;
+  signal.is_multiplexer = usual.is_multiplexer;
+  signal.scale = usual.scale;
+  signal.offset = usual.offset;
+  signal.minimum = usual.minimum;
+  signal.maximum = usual.maximum;
+  signal.unit = draft_.utf8(usual.unit);
+  if (last_receivers_text_.empty() || usual.receivers != last_receivers_text_) {
+    receivers_.clear();
+    last_receivers_text_ = usual.receivers;
+    std::string_view left = usual.receivers;
+    for (Text name(take_receiver(left)); !name.empty(); name = Text(take_receiver(left))) {
+      receivers_.push_back(name);
+    }
+    usual_receivers_ = receiver_list();
+  }
+  signal.receivers = usual_receivers_;
+  scan_.seek(static_cast<std::size_t>(end - draft_.text.data()));
   return true;
 }
 
@@ -684,9 +761,9 @@ void StatementReader::signal_tail(SignalDef& signal) {
     }
     const std::string_view receiver = scan_.name();
     if (receiver.empty() || receiver.size() > kNameLengthMax) return incomplete("receivers");
-    signal.receivers.push_back(draft_.utf8(receiver));
+    receivers_.push_back(draft_.utf8(receiver));
   }
-  if (signal.receivers.empty()) {
+  if (receivers_.empty()) {
     draft_.problems.warn(scan_.position(), "receiver", "expected a receiver after the unit");
   }
 }
@@ -771,14 +848,14 @@ bool StatementReader::attribute_definition() {
   const std::string_view object = scan_.peek_word();
   if (!object.empty()) {
     scan_.word();
-    definition.object = object;
+    definition.object = Text(object);
   }
   if (!expect_string(definition.name, StringContext::kName, "the attribute's name in quotes")) {
     return false;
   }
   if (definition.name.size() > kNameLengthMax) return fail("a name of at most 1024 characters");
   scan_.skip_blank();
-  definition.type = scan_.word();
+  definition.type = Text(scan_.word());
   static constexpr std::array<std::string_view, 5> kTypes{"INT", "HEX", "FLOAT", "STRING", "ENUM"};
   if (std::find(kTypes.begin(), kTypes.end(), definition.type) == kTypes.end()) {
     draft_.problems.warn(scan_.position(), "attribute-type",
@@ -812,7 +889,7 @@ bool StatementReader::attribute_definition() {
 }
 
 // A number as written, or quoted text.
-bool StatementReader::attribute_value(std::string& value) {
+bool StatementReader::attribute_value(Text& value) {
   scan_.skip_blank();
   const std::size_t begin = scan_.position();
   if (const auto token = scan_.string(StringContext::kAttribute)) {
@@ -889,12 +966,19 @@ bool StatementReader::relation() {
 
 // Pairs of a number and a text, up to the semicolon.
 bool StatementReader::value_list(ValueTable& table) {
+  labels_.clear();
+  const bool read = read_labels();
+  table = table_of_labels();
+  return read;
+}
+
+bool StatementReader::read_labels() {
   for (;;) {
     scan_.skip_blank();
     if (scan_.peek() == ';' || scan_.at_end() || scan_.keyword_at(scan_.position())) return true;
     const auto number = scan_.number();
     if (!number) return fail("a number or \";\"");
-    std::string text;
+    Text text;
     if (!expect_string(text, StringContext::kValues, "the value's text in quotes")) return false;
     if (!number->magnitude) {
       draft_.problems.warn(number->offset, "value-number",
@@ -904,16 +988,29 @@ bool StatementReader::value_list(ValueTable& table) {
       continue;
     }
     const std::uint64_t bits = number->negative ? ~*number->magnitude + 1 : *number->magnitude;
-    const auto key = static_cast<std::int64_t>(bits);
-    const auto before = table.size();
-    const auto place = table.insert_or_assign(table.end(), key, std::move(text));
-    if (table.size() == before) {
-      draft_.problems.warn(number->offset, "duplicate-value",
-                           "value " + std::to_string(key) + " again; this text, \"" +
-                               clip(place->second) + "\", is used");
-    }
+    labels_.push_back({static_cast<std::int64_t>(bits), number->offset, text});
     if (!closed_) return true;
   }
+}
+
+// By their numbers. Of several texts for one the last stands.
+ValueTable StatementReader::table_of_labels() {
+  const auto before = [](const LabelRead& a, const LabelRead& b) { return a.key < b.key; };
+  if (!std::is_sorted(labels_.begin(), labels_.end(), before)) {
+    std::stable_sort(labels_.begin(), labels_.end(), before);
+  }
+  entries_.clear();
+  for (const LabelRead& label : labels_) {
+    if (entries_.empty() || entries_.back().first != label.key) {
+      entries_.emplace_back(label.key, label.text);
+      continue;
+    }
+    entries_.back().second = label.text;
+    draft_.problems.warn(label.offset, "duplicate-value",
+                         "value " + std::to_string(label.key) + " again; this text, \"" +
+                             clip(label.text) + "\", is used");
+  }
+  return draft_.arena().table(entries_);
 }
 
 bool StatementReader::value_table() {
@@ -954,7 +1051,7 @@ bool StatementReader::values() {
   return true;
 }
 
-void StatementReader::names_until_semicolon(std::vector<std::string>& names) {
+void StatementReader::names_until_semicolon(std::vector<Text>& names) {
   for (;;) {
     scan_.skip_blank();
     if (scan_.accept(',')) continue;
@@ -1006,6 +1103,7 @@ bool StatementReader::value_type() {
 
 bool StatementReader::multiplex_values() {
   MultiplexRef reference;
+  std::vector<ValueRange> ranges;
   reference.object = "SG_";
   if (!expect_id(reference.raw_id) || !expect_name(reference.name, "the signal's name") ||
       !expect_name(reference.selector, "the multiplexer's name")) {
@@ -1027,9 +1125,10 @@ bool StatementReader::multiplex_values() {
                                " ends before it starts; read the other way round");
       std::swap(low, high);
     }
-    reference.ranges.emplace_back(low, high);
+    ranges.emplace_back(low, high);
   }
-  if (reference.ranges.empty()) return fail("a range like 3-5");
+  if (ranges.empty()) return fail("a range like 3-5");
+  reference.ranges = draft_.arena().list(ranges);
   expect_semicolon();
   reference.offset = start_;
   reference.end = scan_.position();
@@ -1054,17 +1153,18 @@ bool StatementReader::senders() {
 
 // In a file that is not UTF-8 as a whole, a piece that is, with more than ASCII in it, was hardly
 // meant as Windows-1252.
-std::string Draft::utf8(std::string_view piece) {
-  if (text_is_utf8 || is_utf8(piece)) return std::string(piece);
-  return utf8_from_windows_1252(piece);
+Text Draft::utf8(std::string_view piece) {
+  if (text_is_utf8 || is_utf8(piece)) return Text(piece);
+  return arena().keep(utf8_from_windows_1252(piece));
 }
 
 }  // namespace dbc
 
-DbcParseResult parse_dbc(std::string_view text) {
-  const std::optional<std::string> from_utf16 = utf8_from_utf16(text);
-  dbc::Draft draft(from_utf16 ? std::string_view(*from_utf16) : text);
-  if (from_utf16) {
+DbcParseResult parse_dbc(std::string text) {
+  std::optional<std::string> from_utf16 = utf8_from_utf16(text);
+  const bool is_utf16 = from_utf16.has_value();
+  dbc::Draft draft(is_utf16 ? std::move(*from_utf16) : std::move(text));
+  if (is_utf16) {
     draft.problems.warn(0, "utf-16", "the file is UTF-16, expected UTF-8 or Windows-1252");
   }
   draft.text_is_utf8 = is_ascii(draft.text) || is_utf8(draft.text);

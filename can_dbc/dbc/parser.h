@@ -25,6 +25,6 @@ struct DbcParseResult {
   std::vector<Problem> problems;  // in file order
 };
 
-DbcParseResult parse_dbc(std::string_view text);
+DbcParseResult parse_dbc(std::string text);  // which the database keeps
 
 }  // namespace beltgrip::can

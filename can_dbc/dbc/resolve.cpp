@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "can_dbc/dbc/draft.h"
+#include "can_dbc/dbc/gathered.h"
 #include "can_dbc/text/encoding.h"
 
 namespace beltgrip::can::dbc {
@@ -46,10 +47,17 @@ class Resolver {
   void unresolved(const Reference& reference, const char* code, const std::string& what);
 
   void comments();
+  Text joined(const std::vector<const CommentRef*>& references, bool network);
   void value_tables();
   void data_bytes();
   void attribute_defaults();
   void attributes();
+  struct AttributeValue {
+    Text name;
+    Text text;
+    std::size_t offset = 0;
+  };
+  Attributes attribute_table(std::vector<AttributeValue>& values);
   void relations();
   void values();
   void value_types();
@@ -64,8 +72,8 @@ class Resolver {
   void kept_text();
 
   const AttributeDef* definition_of(std::string_view name) const;
-  std::string attribute_text(const AttributeRef& reference);
-  std::string message_attribute(const MessageDef& message, const char* name) const;
+  Text attribute_text(const AttributeRef& reference);
+  Text message_attribute(const MessageDef& message, const char* name) const;
 
   Draft& draft_;
   Database& db_;
@@ -75,6 +83,7 @@ class Resolver {
   std::set<std::string_view> nodes_;
   std::map<std::string_view, std::size_t> definitions_;
   Indices last_messages_;
+  std::vector<std::pair<Text, Text>> entries_;
 };
 
 void Resolver::index_messages() {
@@ -179,38 +188,49 @@ EnvironmentVariable* Resolver::find_variable(std::string_view name) {
 }
 
 void Resolver::comments() {
-  for (CommentRef& reference : draft_.comments) {
-    // A second comment of one object joins the first; of the network, without a break between.
-    const auto take = [&](std::string& comment, bool network) {
-      if (!comment.empty() && !network) {
-        draft_.problems.warn(reference.offset, "duplicate-comment",
-                             "a second comment of the same object; joined to the first");
-        comment += '\n';
-      }
-      comment += reference.text;
-    };
+  Gathered<Text, const CommentRef*> said;
+  for (const CommentRef& reference : draft_.comments) {
+    const auto take = [&](Text& comment) { said.add(&comment, &reference); };
     if (reference.object.empty()) {
-      take(db_.comment, true);
+      take(db_.comment);
     } else if (reference.object == "BO_") {
-      for_messages(reference, [&](MessageDef& message) { take(message.comment, false); });
+      for_messages(reference, [&](MessageDef& message) { take(message.comment); });
     } else if (reference.object == "SG_") {
-      for_signals(reference, [&](SignalDef& signal) { take(signal.comment, false); });
+      for_signals(reference, [&](SignalDef& signal) { take(signal.comment); });
     } else if (reference.name.empty()) {
       draft_.keep(reference.offset, reference.end);
     } else if (reference.object == "BU_") {
-      const std::string name = draft_.utf8(reference.name);
+      const Text name = draft_.utf8(reference.name);
       if (!nodes_.contains(name)) {
         unresolved(reference, "unknown-node", "no node is named \"" + clip(name) + "\"");
       } else {
-        take(db_.node_details[name].comment, false);
+        take(db_.node_details[name].comment);
       }
     } else if (EnvironmentVariable* variable = find_variable(draft_.utf8(reference.name))) {
-      take(variable->comment, false);
+      take(variable->comment);
     } else {
       unresolved(reference, "unknown-variable",
                  "no environment variable is named \"" + clip(reference.name) + "\"");
     }
   }
+  said.give([&](Text& comment, const std::vector<const CommentRef*>& references) {
+    comment = joined(references, &comment == &db_.comment);
+  });
+}
+
+// A second comment of one object joins the first; of the network, without a break between.
+Text Resolver::joined(const std::vector<const CommentRef*>& references, bool network) {
+  if (references.size() == 1) return references[0]->text;
+  std::string text;
+  for (const CommentRef* reference : references) {
+    if (!text.empty() && !network) {
+      draft_.problems.warn(reference->offset, "duplicate-comment",
+                           "a second comment of the same object; joined to the first");
+      text += '\n';
+    }
+    text += reference->text;
+  }
+  return draft_.arena().keep(text);
 }
 
 void Resolver::data_bytes() {
@@ -231,7 +251,7 @@ const AttributeDef* Resolver::definition_of(std::string_view name) const {
 
 // The value as it is shown: of an enumeration the text chosen, whether the file gives its number or
 // the text itself.
-std::string Resolver::attribute_text(const AttributeRef& reference) {
+Text Resolver::attribute_text(const AttributeRef& reference) {
   const AttributeDef* definition = definition_of(reference.attribute);
   if (definition == nullptr) {
     draft_.problems.warn(reference.offset, "undefined-attribute",
@@ -276,7 +296,7 @@ std::string Resolver::attribute_text(const AttributeRef& reference) {
     }
     return reference.value;
   }
-  const std::string& choice = definition->choices[index];
+  const Text choice = definition->choices[index];
   return choice.size() <= kChoiceLengthMax ? choice : reference.value;
 }
 
@@ -294,17 +314,11 @@ void Resolver::attribute_defaults() {
 }
 
 void Resolver::attributes() {
+  Gathered<Attributes, AttributeValue> said;
   for (const AttributeRef& reference : draft_.attributes) {
     if (reference.object == "default") continue;
-    const std::string value = attribute_text(reference);
-    const auto take = [&](Attributes& attributes) {
-      const auto [place, is_new] = attributes.insert_or_assign(reference.attribute, value);
-      if (!is_new) {
-        draft_.problems.warn(reference.offset, "duplicate-attribute",
-                             "attribute \"" + clip(place->first) +
-                                 "\" of the same object again; this value is used");
-      }
-    };
+    const AttributeValue value{reference.attribute, attribute_text(reference), reference.offset};
+    const auto take = [&](Attributes& attributes) { said.add(&attributes, value); };
     if (reference.object.empty()) {
       take(db_.attributes);
     } else if (reference.object == "BO_") {
@@ -314,7 +328,7 @@ void Resolver::attributes() {
     } else if (reference.name.empty()) {
       draft_.keep(reference.offset, reference.end);  // said before
     } else if (reference.object == "BU_") {
-      const std::string name = draft_.utf8(reference.name);
+      const Text name = draft_.utf8(reference.name);
       if (!nodes_.contains(name)) {
         unresolved(reference, "unknown-node", "no node is named \"" + clip(name) + "\"");
       } else {
@@ -327,15 +341,37 @@ void Resolver::attributes() {
                  "no environment variable is named \"" + clip(reference.name) + "\"");
     }
   }
+  said.give([&](Attributes& attributes, std::vector<AttributeValue>& values) {
+    attributes = attribute_table(values);
+  });
+}
+
+// By their names. Of several values of one the last stands.
+Attributes Resolver::attribute_table(std::vector<AttributeValue>& values) {
+  std::stable_sort(
+      values.begin(), values.end(),
+      [](const AttributeValue& a, const AttributeValue& b) { return a.name < b.name; });
+  entries_.clear();
+  for (const AttributeValue& value : values) {
+    if (entries_.empty() || entries_.back().first != value.name) {
+      entries_.emplace_back(value.name, value.text);
+      continue;
+    }
+    entries_.back().second = value.text;
+    draft_.problems.warn(
+        value.offset, "duplicate-attribute",
+        "attribute \"" + clip(value.name) + "\" of the same object again; this value is used");
+  }
+  return draft_.arena().table(entries_);
 }
 
 void Resolver::relations() {
   for (RelationRef& reference : draft_.relations) {
     RelationAttribute relation;
-    relation.name = std::move(reference.attribute);
-    relation.kind = reference.kind;
+    relation.name = reference.attribute;
+    relation.kind = Text(reference.kind);
     relation.node = draft_.utf8(reference.node);
-    relation.value = std::move(reference.value);
+    relation.value = reference.value;
     if (reference.kind == "BU_EV_REL_") {
       relation.object = draft_.utf8(reference.name);
     } else {
@@ -346,7 +382,9 @@ void Resolver::relations() {
         continue;
       }
       relation.object = db_.messages[messages[0]].name;
-      if (reference.kind == "BU_SG_REL_") relation.object += "." + draft_.utf8(reference.name);
+      if (reference.kind == "BU_SG_REL_") {
+        relation.object = draft_.arena().keep(relation.object + "." + draft_.utf8(reference.name));
+      }
     }
     db_.relations.push_back(std::move(relation));
   }
@@ -431,7 +469,7 @@ void Resolver::senders() {
 void Resolver::groups() {
   for (GroupRef& reference : draft_.groups) {
     for_messages(reference, [&](MessageDef& message) {
-      for (const std::string& name : reference.group.signals) {
+      for (const Text name : reference.group.signals) {
         const auto index = static_cast<std::uint32_t>(&message - db_.messages.data());
         if (!find_signals(index, name).empty()) continue;
         draft_.problems.warn(reference.offset, "unknown-signal",
@@ -451,6 +489,11 @@ void Resolver::multiplex_message(std::uint32_t message,
   MessageSource& source = draft_.messages[message];
   std::vector<SignalDef>& signals = definition.signals;
 
+  struct RuleRead {
+    Text selector;
+    std::vector<ValueRange> ranges;
+  };
+  std::map<std::uint32_t, RuleRead> rules_of;  // by signal
   for (const MultiplexRef* rule : rules) {
     const Indices targets = find_signals(message, draft_.utf8(rule->name));
     const Indices selectors = find_signals(message, draft_.utf8(rule->selector));
@@ -467,19 +510,20 @@ void Resolver::multiplex_message(std::uint32_t message,
                                "\" selects others but is not marked as a multiplexer with M");
     }
     for (const std::uint32_t target : targets) {
-      std::optional<MuxRule>& known = signals[target].multiplexed_by;
-      if (known) {
-        if (known->selector != selector.name) {
-          unresolved(*rule, "mux-two-selectors",
-                     "signal \"" + clip(signals[target].name) +
-                         "\" has a second multiplexer; the first one is used");
-          continue;
-        }
-        known->ranges.insert(known->ranges.end(), rule->ranges.begin(), rule->ranges.end());
+      const auto [known, is_new] = rules_of.try_emplace(target, RuleRead{selector.name, {}});
+      RuleRead& read = known->second;
+      if (!is_new && read.selector != selector.name) {
+        unresolved(*rule, "mux-two-selectors",
+                   "signal \"" + clip(signals[target].name) +
+                       "\" has a second multiplexer; the first one is used");
         continue;
       }
-      known = MuxRule{selector.name, rule->ranges};
+      read.ranges.insert(read.ranges.end(), rule->ranges.begin(), rule->ranges.end());
     }
+  }
+  for (const auto& [signal, read] : rules_of) {
+    signals[signal].multiplexed_by =
+        draft_.arena().one(MuxRule{read.selector, draft_.arena().list(read.ranges)});
   }
 
   std::size_t multiplexers = 0;
@@ -490,10 +534,13 @@ void Resolver::multiplex_message(std::uint32_t message,
     only = i;
   }
   for (std::size_t i = 0; i < signals.size(); ++i) {
-    if (!source.signals[i].multiplexed || signals[i].multiplexed_by) continue;
+    const std::optional<std::uint32_t> selected_at = source.signals[i].selector_value;
+    if (!selected_at || signals[i].multiplexed_by != nullptr) continue;
     if (multiplexers == 1 && only != i) {
-      const std::uint64_t value = source.signals[i].selector_value;
-      signals[i].multiplexed_by = MuxRule{signals[only].name, {{value, value}}};
+      const std::uint64_t value = draft_.selector_values[*selected_at];
+      const std::vector<ValueRange> range{{value, value}};
+      signals[i].multiplexed_by =
+          draft_.arena().one(MuxRule{signals[only].name, draft_.arena().list(range)});
       continue;
     }
     if (multiplexers == 1) continue;  // "m0M" alone: the multiplexer of the others
@@ -529,7 +576,7 @@ void Resolver::multiplexing() {
 }
 
 // The attribute's value for this message, or its default.
-std::string Resolver::message_attribute(const MessageDef& message, const char* name) const {
+Text Resolver::message_attribute(const MessageDef& message, const char* name) const {
   const auto own = message.attributes.find(name);
   if (own != message.attributes.end()) return own->second;
   const AttributeDef* definition = definition_of(name);
@@ -545,9 +592,9 @@ void Resolver::frame_formats() {
     const auto own = db_.attributes.find(name);
     if (own != db_.attributes.end() && !own->second.empty()) return own->second;
     const AttributeDef* definition = definition_of(name);
-    return definition != nullptr ? definition->default_value.value_or("") : std::string();
+    return definition != nullptr ? definition->default_value.value_or("") : Text();
   };
-  const std::string protocol = network("ProtocolType");
+  const Text protocol = network("ProtocolType");
   const auto mentions = [&](std::string_view word) {
     return std::search(protocol.begin(), protocol.end(), word.begin(), word.end(),
                        [](char a, char b) { return std::toupper(a) == b; }) != protocol.end();
@@ -562,7 +609,7 @@ void Resolver::frame_formats() {
                message.name == kIndependentMessage;
       });
   for (MessageDef& message : db_.messages) {
-    const std::string format = message_attribute(message, "VFrameFormat");
+    const Text format = message_attribute(message, "VFrameFormat");
     const bool own = message.attributes.contains("VFrameFormat");
     message.fd = format.ends_with("FD") || format == "14" || format == "15";
     if (!message.id.extended) continue;
@@ -574,7 +621,7 @@ void Resolver::frame_formats() {
 
 void Resolver::cycle_times() {
   for (MessageDef& message : db_.messages) {
-    const std::string text = message_attribute(message, "GenMsgCycleTime");
+    const Text text = message_attribute(message, "GenMsgCycleTime");
     double period_ms = 0.0;
     const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), period_ms);
     if (status == std::errc{} && std::isfinite(period_ms) && period_ms > 0.0) {
@@ -585,69 +632,75 @@ void Resolver::cycle_times() {
 
 // Long names by attribute. Last, for everything else refers by the short ones.
 void Resolver::long_names() {
-  const auto long_name = [](const Attributes& attributes, const char* name) -> const std::string* {
-    const auto found = attributes.find(name);
+  const auto long_name = [](const Attributes& attributes, const char* name) -> const Text* {
+    const auto* found = attributes.find(name);
     const bool usable = found != attributes.end() && !found->second.empty() &&
                         found->second.size() <= kLongNameLengthMax;
     return usable ? &found->second : nullptr;
   };
 
-  std::map<std::string, std::string> nodes;  // short -> long
+  std::map<Text, Text> nodes;  // short -> long
   for (const auto& [name, node] : db_.node_details) {
-    if (const std::string* replacement = long_name(node.attributes, "SystemNodeLongSymbol")) {
+    if (const Text* replacement = long_name(node.attributes, "SystemNodeLongSymbol")) {
       if (*replacement != name) nodes.emplace(name, *replacement);
     }
   }
-  const auto rename_node = [&](std::string& name) {
+  const auto rename_node = [&](Text& name) {
     const auto found = nodes.find(name);
     if (found != nodes.end()) name = found->second;
   };
   if (!nodes.empty()) {
-    std::map<std::string, NodeDef> details;
+    std::map<Text, NodeDef> details;
     for (auto& [name, node] : db_.node_details) {
       const auto found = nodes.find(name);
       if (found != nodes.end()) node.short_name = name;
       details.insert_or_assign(found != nodes.end() ? found->second : name, std::move(node));
     }
     db_.node_details = std::move(details);
-    for (std::string& name : db_.nodes) rename_node(name);
+    for (Text& name : db_.nodes) rename_node(name);
     for (RelationAttribute& relation : db_.relations) rename_node(relation.node);
   }
   for (EnvironmentVariable& variable : db_.environment_variables) {
-    if (const std::string* name = long_name(variable.attributes, "SystemEnvVarLongSymbol")) {
+    if (const Text* name = long_name(variable.attributes, "SystemEnvVarLongSymbol")) {
       variable.name = *name;
     }
-    for (std::string& node : variable.access_nodes) rename_node(node);
+    for (Text& node : variable.access_nodes) rename_node(node);
   }
 
+  std::vector<Text> receivers;
   for (MessageDef& message : db_.messages) {
-    if (const std::string* name = long_name(message.attributes, "SystemMessageLongSymbol")) {
+    if (const Text* name = long_name(message.attributes, "SystemMessageLongSymbol")) {
       if (*name != message.name) message.short_name = std::exchange(message.name, *name);
     }
     if (!nodes.empty()) {
       rename_node(message.transmitter);
-      for (std::string& node : message.senders) rename_node(node);
+      for (Text& node : message.senders) rename_node(node);
     }
-    std::map<std::string, std::string> signals;  // short -> long
+    std::map<Text, Text> signals;  // short -> long
     for (SignalDef& signal : message.signals) {
       if (!nodes.empty()) {
-        for (std::string& node : signal.receivers) rename_node(node);
+        receivers.assign(signal.receivers.begin(), signal.receivers.end());
+        for (Text& node : receivers) rename_node(node);
+        if (!(signal.receivers == receivers)) signal.receivers = draft_.arena().list(receivers);
       }
-      const std::string* name = long_name(signal.attributes, "SystemSignalLongSymbol");
+      const Text* name = long_name(signal.attributes, "SystemSignalLongSymbol");
       if (name == nullptr || *name == signal.name) continue;
       signal.short_name = std::exchange(signal.name, *name);
       signals.emplace(signal.short_name, signal.name);
     }
     if (signals.empty()) continue;
-    const auto rename_signal = [&](std::string& name) {
+    const auto rename_signal = [&](Text& name) {
       const auto found = signals.find(name);
       if (found != signals.end()) name = found->second;
     };
     for (SignalDef& signal : message.signals) {
-      if (signal.multiplexed_by) rename_signal(signal.multiplexed_by->selector);
+      if (signal.multiplexed_by == nullptr) continue;
+      MuxRule rule = *signal.multiplexed_by;
+      rename_signal(rule.selector);
+      signal.multiplexed_by = draft_.arena().one(rule);
     }
     for (SignalGroup& group : message.groups) {
-      for (std::string& name : group.signals) rename_signal(name);
+      for (Text& name : group.signals) rename_signal(name);
     }
   }
 }
@@ -686,18 +739,26 @@ void Resolver::kept_text() {
   }
 }
 
+// What has been brought together is given back at once: a large file is in memory as few times as
+// can be.
 void Resolver::run() {
   index_messages();
   comments();
+  draft_.comments = {};
   data_bytes();
   attribute_defaults();
   attributes();
+  draft_.attributes = {};
   relations();
+  draft_.relations = {};
   values();
+  draft_.values = {};
   value_types();
   senders();
   groups();
   multiplexing();
+  draft_.multiplexes = {};
+  by_name_ = {};
   frame_formats();
   cycle_times();
   long_names();

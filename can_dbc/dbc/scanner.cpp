@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 
+#include "can_dbc/dbc/short_decimal.h"
 #include "can_dbc/text/encoding.h"
 
 namespace beltgrip::can::dbc {
@@ -175,7 +176,14 @@ std::optional<NumberToken> Scanner::number() {
   if (at != end && (*at == '+' || *at == '-')) token.negative = *at++ == '-';
   if (at == end || !(is_digit(*at) || *at == '.')) return std::nullopt;
 
-  if (end - at > 2 && at[0] == '0' && (at[1] == 'x' || at[1] == 'X')) {
+  constexpr double kExactWhole = 9007199254740992.0;  // 2^53
+  if (const ShortDecimal read = read_short_decimal(at, end); read.end != nullptr) {
+    token.value = read.value;
+    if (read.whole || read.value == std::floor(read.value)) {
+      token.magnitude = static_cast<std::uint64_t>(read.value);
+    }
+    at = read.end;
+  } else if (end - at > 2 && at[0] == '0' && (at[1] == 'x' || at[1] == 'X')) {
     std::uint64_t bits = 0;
     const auto [rest, status] = std::from_chars(at + 2, end, bits, 16);
     if (status != std::errc{}) return std::nullopt;
@@ -202,7 +210,6 @@ std::optional<NumberToken> Scanner::number() {
         token.value = small ? 0.0 : std::numeric_limits<double>::infinity();
       }
       at = result.ptr;
-      constexpr double kExactWhole = 9007199254740992.0;  // 2^53
       if (token.value <= kExactWhole && token.value == std::floor(token.value)) {
         token.magnitude = static_cast<std::uint64_t>(token.value);
       }
@@ -327,7 +334,9 @@ std::optional<StringToken> Scanner::string(StringContext context) {
   for (;;) {
     const std::size_t quote = text_.find('"', scan);
     const std::size_t until = quote == kNone ? text_.size() : quote;
-    for (std::size_t at = scan; statement == kNone && at < until;) {
+    const std::string_view piece = text_.substr(scan, until - scan);
+    const bool one_line_only = piece.find('\n') == kNone && piece.find('\r') == kNone;
+    for (std::size_t at = one_line_only ? until : scan; statement == kNone && at < until;) {
       while (at < until && !is_line_break(text_[at])) ++at;
       while (at < until && is_blank(text_[at])) ++at;
       if (at < until && keyword_at(at)) statement = at;

@@ -101,6 +101,7 @@ class Scanner {
   void seek(std::size_t position) noexcept { at_ = position; }
   bool at_end() const noexcept { return at_ >= text_.size(); }
   char peek() const noexcept { return at_ < text_.size() ? text_[at_] : '\0'; }
+  std::string_view rest() const noexcept { return text_.substr(std::min(at_, text_.size())); }
   std::string_view slice(std::size_t begin, std::size_t end) const noexcept {
     return text_.substr(begin, end - begin);
   }

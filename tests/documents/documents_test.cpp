@@ -55,7 +55,7 @@ std::string values_of(const can::SignalDef& signal) {
 }
 
 std::string frames() {
-  const can::DbcParseResult parsed = can::parse_dbc(daemon::beltgrip_dbc_text());
+  const can::DbcParseResult parsed = can::parse_dbc(std::string(daemon::beltgrip_dbc_text()));
   std::ostringstream out;
   out << "# The frames of BeltGrip\n"
       << parsed.database.comment << " The file is `can_dbc/beltgrip.dbc`; what a receiver of clamp "

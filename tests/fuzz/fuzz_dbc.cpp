@@ -27,7 +27,7 @@ void require(bool condition, int line = __builtin_LINE()) {
 // Looks at every text of the model; remembers whether all of it can be written down as it is.
 class Texts {
  public:
-  void name(const std::string& text) {
+  void name(std::string_view text) {
     require(is_utf8(text));
     const bool plain = !text.empty() && text.find_first_not_of(
                                             "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
@@ -35,7 +35,7 @@ class Texts {
     // A word of the format is no name once it stands at the start of a line.
     if (!plain || text.back() == '_' || text == "FILTER" || text == "VERSION") writable_ = false;
   }
-  void quoted(const std::string& text) {
+  void quoted(std::string_view text) {
     require(is_utf8(text));
     if (text.find_first_of("\"\\\r\n") != std::string::npos) writable_ = false;
   }
@@ -64,7 +64,7 @@ std::string values_text(const ValueTable& values) {
 std::string written(const Database& db, Texts& texts) {
   std::string text = "VERSION \"" + db.version + "\"\nBU_:";
   texts.quoted(db.version);
-  for (const std::string& node : db.nodes) {
+  for (const Text node : db.nodes) {
     texts.name(node);
     text += ' ' + node;
   }
@@ -136,7 +136,7 @@ void check_other_texts(const Database& db) {
   }
   for (const AttributeDef& definition : db.attribute_definitions) {
     require(is_utf8(definition.name) && is_utf8(definition.default_value.value_or("")));
-    for (const std::string& choice : definition.choices) require(is_utf8(choice));
+    for (const Text choice : definition.choices) require(is_utf8(choice));
   }
   for (const RelationAttribute& relation : db.relations) {
     require(is_utf8(relation.name) && is_utf8(relation.node) && is_utf8(relation.object));
@@ -175,7 +175,7 @@ void check_decoding(const Database& db) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
-  const DbcParseResult result = parse_dbc(text);
+  const DbcParseResult result = parse_dbc(std::string(text));
   std::uint32_t line = 1;
   for (const Problem& problem : result.problems) {
     require(problem.line >= line && problem.column > 0 && !problem.code.empty());

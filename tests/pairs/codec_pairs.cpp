@@ -29,6 +29,7 @@ std::vector<Payload> payloads(bool with_selector) {
 }
 
 struct Coded {
+  can::Database dbc;
   can::MessageDef definition;
   can::MessageCodec codec;
   can::DecodedMessage values;
@@ -38,7 +39,8 @@ struct Coded {
 
 std::shared_ptr<Coded> coded(unsigned id) {
   auto made = std::make_shared<Coded>();
-  made->definition = *can::parse_dbc(plain_dbc()).database.find_message(can::CanId{id, false});
+  made->dbc = can::parse_dbc(plain_dbc()).database;
+  made->definition = *made->dbc.find_message(can::CanId{id, false});
   made->codec = can::MessageCodec(made->definition);
   made->values = can::DecodedMessage(made->codec.signal_count());
   made->frames = payloads(id == kCasesId);

@@ -118,7 +118,7 @@ class Encoder {
       codec_.decode(frame_.payload(), decoded_);
       for (std::size_t i = 0; i < message_.signals.size(); ++i) {
         const can::SignalDef& signal = message_.signals[i];
-        if (signal.multiplexed_by.has_value() != multiplexed || !decoded_.has(i)) continue;
+        if ((signal.multiplexed_by != nullptr) != multiplexed || !decoded_.has(i)) continue;
         if (!is_given(i)) put(i, start_value(signal, codec_.signal(i)));
       }
     }

@@ -1,5 +1,8 @@
 #include "tools/cli/dbc_file.h"
 
+#include <sys/stat.h>
+
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdio>
@@ -21,6 +24,10 @@ std::string read_file(const std::string& path) {
   if (!file) fail();
   constexpr std::size_t kLargest = std::size_t{256} * 1024 * 1024;
   std::string text;
+  struct stat about {};
+  if (::fstat(::fileno(file.get()), &about) == 0 && S_ISREG(about.st_mode)) {
+    text.reserve(std::min(kLargest, static_cast<std::size_t>(about.st_size)));
+  }
   std::array<char, 65536> block;
   std::size_t size = 0;
   while ((size = std::fread(block.data(), 1, block.size(), file.get())) > 0) {

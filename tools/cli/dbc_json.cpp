@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <map>
+#include <span>
 #include <string_view>
 
 #include "tools/text/json_writer.h"
@@ -45,7 +46,7 @@ class DatabaseWriter {
  private:
   void nodes() {
     json_.key("nodes").begin_array();
-    for (const std::string& name : database_.nodes) {
+    for (const can::Text name : database_.nodes) {
       static const can::NodeDef kNone;
       const auto found = database_.node_details.find(name);
       const can::NodeDef& node = found == database_.node_details.end() ? kNone : found->second;
@@ -129,19 +130,19 @@ class DatabaseWriter {
     json_.end_object();
   }
 
-  void short_name(const std::string& name) {
+  void short_name(can::Text name) {
     if (!name.empty()) json_.field("short_name", name);
   }
 
-  void write(const std::vector<std::string>& texts) {
+  void write(std::span<const can::Text> texts) {
     json_.begin_array();
-    for (const std::string& text : texts) json_.value(text);
+    for (const can::Text text : texts) json_.value(text);
     json_.end_array();
   }
 
   // False, and nothing written, where not all of the text is such a number.
   template <typename Number>
-  bool write_as(const std::string& text) {
+  bool write_as(can::Text text) {
     Number number{};
     const char* const end = text.data() + text.size();
     const auto [rest, status] = std::from_chars(text.data(), end, number);

@@ -211,7 +211,7 @@ class TextFrames : public FrameWriter {
       line += ' ';
       append_readable(line, frame.values[i].physical);
       if (!signal.unit.empty()) line += ' ' + signal.unit;
-      if (const std::string* label = label_of(frame, i)) line += " (" + *label + ')';
+      if (const can::Text* label = label_of(frame, i)) line += " (" + *label + ')';
       if (with_raw_) {
         line += " [";
         line += frame.message.codec.signal(i).raw_text(frame.values[i].raw);
@@ -301,7 +301,7 @@ class CsvFrames : public FrameWriter {
 
 }  // namespace
 
-const std::string* label_of(const DecodedFrame& frame, std::size_t signal) {
+const can::Text* label_of(const DecodedFrame& frame, std::size_t signal) {
   const can::ValueTable& table = frame.message.definition->signals[signal].values;
   if (!frame.values.has(signal) || table.empty()) return nullptr;
   const std::optional<std::int64_t> key = table_key(frame, signal);

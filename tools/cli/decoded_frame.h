@@ -31,7 +31,7 @@ struct DecodedFrame {
 };
 
 // Text of the value table; nullptr: none.
-const std::string* label_of(const DecodedFrame& frame, std::size_t signal);
+const can::Text* label_of(const DecodedFrame& frame, std::size_t signal);
 
 class FrameWriter {
  public:

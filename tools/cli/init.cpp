@@ -88,8 +88,8 @@ std::string labels_text(const can::SignalDef& signal) {
   std::size_t shown = 0;
   for (const auto& [value, label] : signal.values) {
     if (shown++ == kLabelsShown) return text + ", ...";
-    text +=
-        (text.empty() ? "" : ", ") + std::to_string(value) + " " + can::printable(quoted(label));
+    text += (text.empty() ? "" : ", ") + std::to_string(value) + " " +
+            can::printable(quoted(std::string(label)));
   }
   return text;
 }

@@ -17,7 +17,7 @@ constexpr std::int64_t kTogether_ns = 3'000'000;
 constexpr std::uint64_t kRowsPerHeader = 50;
 constexpr std::uint8_t kMaxDelta = 3;  // frames that may be lost in a row, plus one
 
-std::size_t index_of(const can::MessageDef& message, const char* signal) {
+std::size_t index_of(const can::MessageDef& message, std::string_view signal) {
   return static_cast<std::size_t>(message.find_signal(signal) - message.signals.data());
 }
 
@@ -54,11 +54,11 @@ std::string lower(const std::string& label) {
 
 }  // namespace
 
-double OwnFrameView::value(const char* signal) const {
+double OwnFrameView::value(std::string_view signal) const {
   return signals[index_of(*message, signal)].physical;
 }
 
-std::string OwnFrameView::label(const char* signal) const {
+std::string OwnFrameView::label(std::string_view signal) const {
   const std::size_t index = index_of(*message, signal);
   const auto& values = message->signals[index].values;
   const auto found = values.find(static_cast<std::int64_t>(signals[index].raw));
@@ -106,7 +106,7 @@ std::string json_line(std::int64_t t_ns, const OwnFrameView& view) {
   }
   json.end_object().key("labels").begin_object();
   for (const can::SignalDef& signal : view.message->signals) {
-    const std::string label = view.label(signal.name.c_str());
+    const std::string label = view.label(signal.name);
     if (!label.empty()) json.field(signal.name, label);
   }
   json.end_object().end_object();
@@ -116,7 +116,7 @@ std::string json_line(std::int64_t t_ns, const OwnFrameView& view) {
 void BusTable::on_frame(std::int64_t t_ns, const OwnFrameView& view) {
   if (!view.good()) {
     std::fprintf(out_, "%9.3f s   %s: %s\n", static_cast<double>(t_ns) * 1e-9,
-                 view.message->name.c_str(), check_text(view.check));
+                 std::string(view.message->name).c_str(), check_text(view.check));
     return;
   }
   if (change_ns_ && t_ns - *change_ns_ > kTogether_ns) row(*change_ns_);

@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "can_dbc/dbc/message_codec.h"
@@ -25,9 +26,9 @@ struct OwnFrameView {
   bool good() const {
     return check == can::e2e::CheckStatus::kOk || check == can::e2e::CheckStatus::kOkSomeLost;
   }
-  double value(const char* signal) const;
+  double value(std::string_view signal) const;
   // Text of the value table; empty where the raw value has none.
-  std::string label(const char* signal) const;
+  std::string label(std::string_view signal) const;
 };
 
 class OwnFrameDecoder {

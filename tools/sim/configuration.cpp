@@ -10,7 +10,8 @@
 namespace beltgrip::sim {
 
 const can::Database& rig_database() {
-  static const can::Database database = can::parse_dbc(shipped("paper-rig.dbc")).database;
+  static const can::Database database =
+      can::parse_dbc(std::string(shipped("paper-rig.dbc"))).database;
   return database;
 }
 
@@ -66,7 +67,8 @@ std::string rig_configuration(const RigScenario& scenario, const std::string& in
 }
 
 const can::Database& vehicle_database() {
-  static const can::Database database = can::parse_dbc(shipped("vehicle.dbc")).database;
+  static const can::Database database =
+      can::parse_dbc(std::string(shipped("vehicle.dbc"))).database;
   return database;
 }
 

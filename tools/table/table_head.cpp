@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 
 #include "can_dbc/log/can_log.h"
 #include "can_dbc/text/unit_text.h"
@@ -170,7 +171,7 @@ class HeadReader {
   Cells cells_;
 };
 
-can::ValueTable values_of(std::vector<std::string> texts) {
+can::ValueTable values_of(std::vector<std::string> texts, can::Arena& arena) {
   constexpr std::array<std::string_view, 9> kFalse{
       "off", "no", "false", "open", "opened", "released", "inactive", "not pressed", "aus"};
   constexpr std::array<std::string_view, 9> kTrue{
@@ -178,14 +179,16 @@ can::ValueTable values_of(std::vector<std::string> texts) {
   const auto is_in = [](const auto& words, const std::string& text) {
     return std::find(words.begin(), words.end(), lower(text)) != words.end();
   };
-  can::ValueTable values;
+  std::map<std::int64_t, std::string> values;
   std::int64_t next = 2;
   std::sort(texts.begin(), texts.end());
   for (const std::string& text : texts) {
     const std::int64_t usual = is_in(kFalse, text) ? 0 : is_in(kTrue, text) ? 1 : -1;
     values[usual >= 0 && !values.contains(usual) ? usual : next++] = text;
   }
-  return values;
+  std::vector<std::pair<std::int64_t, can::Text>> entries;
+  for (const auto& [value, text] : values) entries.emplace_back(value, arena.keep(text));
+  return arena.table(entries);
 }
 
 }  // namespace
@@ -200,18 +203,17 @@ can::Database database_of(const Head& head) {
     if (head.time == i) continue;
     const Column& column = head.columns[i];
     can::MessageDef& message = database.messages.emplace_back();
-    message.name = column.name;
+    message.name = database.arena->keep(column.name);
     message.id = {kFirstId + static_cast<std::uint32_t>(i), true};
     message.length = 8;
     can::SignalDef& signal = message.signals.emplace_back();
-    signal.name = column.name;
-    signal.unit = column.unit;
+    signal.name = message.name;
+    signal.unit = database.arena->keep(column.unit);
     signal.length = 64;
     if (column.numbers == 0 && !column.texts.empty()) {
-      signal.values = values_of(column.texts);
+      signal.values = values_of(column.texts, *database.arena);
       signal.length = 16;
-      signal.maximum =
-          static_cast<double>(std::max<std::int64_t>(1, signal.values.rbegin()->first));
+      signal.maximum = static_cast<double>(std::max<std::int64_t>(1, signal.values.back().first));
     } else if (column.decimals) {
       signal.type = can::ValueType::kSigned;
       for (int digit = 0; digit < *column.decimals; ++digit) signal.scale /= 10.0;

@@ -43,7 +43,7 @@ std::string_view beltgrip_dbc_text() { return kBeltgripDbcText; }
 
 const can::Database& own_database() {
   static const can::Database database = [] {
-    can::DbcParseResult parsed = can::parse_dbc(beltgrip_dbc_text());
+    can::DbcParseResult parsed = can::parse_dbc(std::string(beltgrip_dbc_text()));
     assert(parsed.problems.empty());
     return std::move(parsed.database);
   }();

@@ -70,7 +70,8 @@ struct Counts {
 
 std::string multiplexing(const SignalDef& signal) {
   if (!signal.multiplexed_by) return signal.is_multiplexer ? "M" : "-";
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges = signal.multiplexed_by->ranges;
+  std::vector<ValueRange> ranges(signal.multiplexed_by->ranges.begin(),
+                                 signal.multiplexed_by->ranges.end());
   std::sort(ranges.begin(), ranges.end());
   std::vector<std::pair<std::uint64_t, std::uint64_t>> joined;
   for (const auto& range : ranges) {
@@ -183,10 +184,12 @@ class FileCheck {
     // The reference names a selector by its short name.
     const std::string rule = multiplexing(*signal_);
     SignalDef by_short_name = *signal_;
-    if (signal_->multiplexed_by) {
+    MuxRule short_rule;
+    if (signal_->multiplexed_by != nullptr) {
       const SignalDef* selector = message_->find_signal(signal_->multiplexed_by->selector);
       if (selector != nullptr && !selector->short_name.empty()) {
-        by_short_name.multiplexed_by->selector = selector->short_name;
+        short_rule = {selector->short_name, signal_->multiplexed_by->ranges};
+        by_short_name.multiplexed_by = &short_rule;
       }
     }
     EXPECT_TRUE(rule == f[11] || multiplexing(by_short_name) == f[11])

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <ctime>
+#include <random>
 
 #include "can_dbc/dbc/message_index.h"
 
@@ -51,6 +53,63 @@ const SignalDef& signal(const DbcParseResult& result, const std::string& name) {
   const SignalDef* found = result.database.messages.at(0).find_signal(name);
   if (found == nullptr) throw std::runtime_error("no signal " + name);
   return *found;
+}
+
+// --- the quick way through a usual line
+// ------------------------------------------------------------
+
+// All that one signal is.
+std::string told(const DbcParseResult& result) {
+  std::string all = places(result) + " | ";
+  for (const Problem& problem : result.problems) all += problem.text + '\n';
+  for (const Statement& kept : result.database.other_statements) all += kept.text + '\n';
+  for (const MessageDef& message : result.database.messages) {
+    for (const SignalDef& s : message.signals) {
+      all += s.name + ' ' + std::to_string(s.start_bit) + ' ' + std::to_string(s.length) + ' ' +
+             std::to_string(static_cast<int>(s.byte_order)) +
+             std::to_string(static_cast<int>(s.type));
+      for (const double value : {s.scale, s.offset, s.minimum, s.maximum}) {
+        all += ' ' + std::to_string(std::bit_cast<std::uint64_t>(value));
+      }
+      all += " [" + std::string(s.unit) + "] " + (s.is_multiplexer ? "M" : "-");
+      for (const Text receiver : s.receivers) all += ' ' + std::string(receiver);
+      if (s.multiplexed_by != nullptr) {
+        all += " by " + s.multiplexed_by->selector;
+        for (const auto& [low, high] : s.multiplexed_by->ranges) {
+          all += ' ' + std::to_string(low) + '-' + std::to_string(high);
+        }
+      }
+      all += '\n';
+    }
+  }
+  return all;
+}
+
+// The quick reader knows a line by its line feed: one that a carriage return alone ends is read by
+// the other. Both must say the same of it, whatever it is.
+TEST(DbcParser, ReadsAUsualSignalAsAnyOther) {
+  const std::string before =
+      "BS_:\nBU_: A B\nBO_ 291 M: 8 A\n SG_ mux M : 0|8@1+ (1,0) [0|0] \"\" A\n";
+  const std::vector<std::string> lines{
+      " SG_ Speed : 7|16@0+ (0.25,-40) [-40|23.75] \"degC\" A,B",
+      " SG_ s m12 : 8|8@1- (1,0) [0|255] \"\"  A",
+      "SG_ _x m3M : 16|4@1+ (0.000001,1000000) [-1.50|+3] \"\xC2\xB0 C\" Vector__XXX",
+      "\tSG_ a1: 63|64@0- (123456789012345,1E-05) [0|0.1] \"m/s\" A , B"};
+  const std::string pool = " :|@+-(),[]\"/\\;_mM019.eExX\t\rAz\xB0\xC2";
+  std::mt19937 random(4);
+  const auto below = [&](std::size_t end) { return static_cast<std::size_t>(random()) % end; };
+  for (int round = 0; round < 40'000; ++round) {
+    std::string line = lines[below(lines.size())];
+    for (std::size_t changes = below(3); changes > 0; --changes) {
+      const std::size_t at = below(line.size());
+      const char c = pool[below(pool.size())];
+      const std::size_t kind = below(3);
+      if (kind == 0) line[at] = c;
+      if (kind == 1) line.insert(at, 1, c);
+      if (kind == 2) line.erase(at, 1);
+    }
+    ASSERT_EQ(told(parse(before + line + '\n')), told(parse(before + line + '\r'))) << line;
+  }
 }
 
 // --- what every file has -------------------------------------------------------------------------
@@ -110,7 +169,7 @@ SG_MUL_VAL_ 291 Torque Mode 3-3, 5-10;
   EXPECT_EQ(places(result), "");
   const Database& db = result.database;
   EXPECT_EQ(db.version, "1.5");
-  EXPECT_EQ(db.nodes, (std::vector<std::string>{"Engine", "Gateway"}));
+  EXPECT_EQ(db.nodes, (std::vector<Text>{"Engine", "Gateway"}));
   EXPECT_EQ(db.new_symbols.size(), 4U);
   EXPECT_EQ(db.bit_timing, "500000 : 1,2");
   EXPECT_EQ(db.comment, "of the network");
@@ -123,12 +182,12 @@ SG_MUL_VAL_ 291 Torque Mode 3-3, 5-10;
   EXPECT_EQ(message.id, (CanId{291, false}));
   EXPECT_EQ(message.length, 8U);
   EXPECT_EQ(message.transmitter, "Engine");
-  EXPECT_EQ(message.senders, (std::vector<std::string>{"Engine", "Gateway"}));
+  EXPECT_EQ(message.senders, (std::vector<Text>{"Engine", "Gateway"}));
   EXPECT_EQ(message.comment, "of a\nmessage");
   EXPECT_EQ(message.cycle_ms, 20.0);
   EXPECT_EQ(message.attributes.at("GenMsgSendType"), "cyclic");
   ASSERT_EQ(message.groups.size(), 1U);
-  EXPECT_EQ(message.groups[0].signals, (std::vector<std::string>{"Speed", "Mode"}));
+  EXPECT_EQ(message.groups[0].signals, (std::vector<Text>{"Speed", "Mode"}));
   const SignalDef& speed = message.signals[0];
   EXPECT_EQ(speed.start_bit, 7U);
   EXPECT_EQ(speed.length, 16U);
@@ -137,7 +196,7 @@ SG_MUL_VAL_ 291 Torque Mode 3-3, 5-10;
   EXPECT_EQ(speed.offset, -10.0);
   EXPECT_EQ(speed.maximum, 16373.75);
   EXPECT_EQ(speed.unit, "rpm");
-  EXPECT_EQ(speed.receivers, (std::vector<std::string>{"Gateway", "Engine"}));
+  EXPECT_EQ(speed.receivers, (std::vector<Text>{"Gateway", "Engine"}));
   EXPECT_EQ(speed.comment, "of a signal; with \"quotes\"");
   EXPECT_EQ(speed.attributes.at("Start"), "0.5");
   const SignalDef& mode = message.signals[1];
@@ -160,7 +219,7 @@ SG_MUL_VAL_ 291 Torque Mode 3-3, 5-10;
   EXPECT_EQ(db.environment_variables[0].values.at(0), "off");
   EXPECT_EQ(db.environment_variables[0].access_nodes.size(), 2U);
   ASSERT_EQ(db.attribute_definitions.size(), 5U);
-  EXPECT_EQ(db.attribute_definitions[2].choices, (std::vector<std::string>{"cyclic", "on change"}));
+  EXPECT_EQ(db.attribute_definitions[2].choices, (std::vector<Text>{"cyclic", "on change"}));
   EXPECT_EQ(db.attribute_definitions[2].default_value, "on change");
   ASSERT_EQ(db.relations.size(), 1U);
   EXPECT_EQ(db.relations[0].object, "EngineData.Speed");
@@ -976,17 +1035,17 @@ TEST(DbcParser, ARunOfSemicolonsIsOneOddity) {
 TEST(DbcParser, AStrayQuoteBehindNodesAndReceiversCostsNothing) {
   const DbcParseResult nodes = parse("BU_: A B XX\";\nBO_ 1 M: 8 B\n");
   EXPECT_EQ(places(nodes), "1:12 node-list");
-  EXPECT_EQ(nodes.database.nodes, (std::vector<std::string>{"A", "B", "XX"}));
+  EXPECT_EQ(nodes.database.nodes, (std::vector<Text>{"A", "B", "XX"}));
   ASSERT_EQ(nodes.database.other_statements.size(), 1U);
   EXPECT_EQ(nodes.database.other_statements[0].text, "\"");
   EXPECT_EQ(parse("BU_: A (B) [C\nBO_ 1 M: 8 B\n").database.nodes,
-            (std::vector<std::string>{"A", "B", "C"}));
+            (std::vector<Text>{"A", "B", "C"}));
 
   const DbcParseResult receivers =
       parse(kNodes + "BO_ 1 M: 8 A\n SG_ s : 0|8@1+ (1,0) [0|1] \"\" B\";\n");
   EXPECT_EQ(places(receivers), "3:33 signal-incomplete");
   EXPECT_EQ(signal(receivers, "s").unit, "");
-  EXPECT_EQ(signal(receivers, "s").receivers, std::vector<std::string>{"B"});
+  EXPECT_EQ(signal(receivers, "s").receivers, std::vector<Text>{"B"});
   // With receivers behind the last quote, the others are the unit's.
   const DbcParseResult inch =
       parse(kNodes + "BO_ 1 M: 8 A\n SG_ s : 0|8@1+ (1,0) [0|1] \"12\" pipe\" B\n");

@@ -20,9 +20,10 @@ SignalDef byte_signal(const char* name, std::uint32_t byte) {
 }
 
 SignalDef selected(const char* name, std::uint32_t byte, const char* selector,
-                   std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges) {
+                   const std::vector<ValueRange>& ranges) {
+  static Arena arena;
   SignalDef signal = byte_signal(name, byte);
-  signal.multiplexed_by = MuxRule{selector, std::move(ranges)};
+  signal.multiplexed_by = arena.one(MuxRule{selector, arena.list(ranges)});
   return signal;
 }
 
@@ -104,7 +105,7 @@ class Drawn {
 
   SignalDef signal(std::size_t number, std::uint32_t bytes) {
     SignalDef signal;
-    signal.name = "s" + std::to_string(number);
+    signal.name = arena_.keep("s" + std::to_string(number));
     signal.start_bit = static_cast<std::uint32_t>(below(bytes * 8));
     const std::uint64_t lengths[] = {1, 8, 16, 32, 64, below(12), below(20), below(67)};
     signal.length = static_cast<std::uint32_t>(lengths[below(8)]);
@@ -122,13 +123,14 @@ class Drawn {
   void select(MessageDef& message, std::uint64_t range_most) {
     for (SignalDef& signal : message.signals) {
       if (below(3) == 0) continue;
-      MuxRule rule{"s" + std::to_string(below(message.signals.size() + below(2))), {}};
+      const std::string selector = "s" + std::to_string(below(message.signals.size() + below(2)));
+      std::vector<ValueRange> ranges;
       for (std::uint64_t k = below(4); k > 0; --k) {
         const std::uint64_t low = below(range_most);
-        rule.ranges.emplace_back(low, low + below(range_most));
+        ranges.emplace_back(low, low + below(range_most));
       }
-      if (below(20) == 0) rule.ranges.emplace_back(7, 3);
-      signal.multiplexed_by = std::move(rule);
+      if (below(20) == 0) ranges.emplace_back(7, 3);
+      signal.multiplexed_by = arena_.one(MuxRule{arena_.keep(selector), arena_.list(ranges)});
     }
   }
 
@@ -140,6 +142,7 @@ class Drawn {
 
  private:
   std::mt19937_64 random_;
+  Arena arena_;
 };
 
 void expect_as_naive(const MessageDef& message, const MessageCodec& codec,

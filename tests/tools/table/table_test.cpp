@@ -39,7 +39,7 @@ class Table : public testing::Test {
       const can::SignalCodec codec(message->signals.front());
       char line[100];
       std::snprintf(line, sizeof line, "%lld %s=%.10g", static_cast<long long>(record.t_ns),
-                    message->name.c_str(), codec.decode(record.frame.payload()));
+                    std::string(message->name).c_str(), codec.decode(record.frame.payload()));
       out.emplace_back(line);
     }
     return out;

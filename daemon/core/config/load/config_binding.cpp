@@ -233,7 +233,7 @@ bool RoleBinder::read_multiplexers(const can::MessageDef& message, const can::Si
                   "a multiplexer signal inside " + message.name);
       return false;
     }
-    binding.mux.push_back({can::SignalCodec(*selector), rule.ranges});
+    binding.mux.push_back({can::SignalCodec(*selector), {rule.ranges.begin(), rule.ranges.end()}});
     multiplexed = selector;
   }
   return true;
