@@ -18,6 +18,7 @@ using log_text::in_base;
 using log_text::is_digit;
 using log_text::kFdLengths;
 using log_text::skip_blanks;
+using log_text::take_hex_bytes;
 using log_text::take_word;
 using log_text::time_ns;
 using log_text::trim_end;
@@ -119,6 +120,7 @@ class AscParser : public LineParser {
   }
 
   bool read_data(std::string_view& line, CanFrame& frame) const {
+    if (base_ == 16 && take_hex_bytes(line, frame.length, frame.data.data())) return true;
     for (std::size_t i = 0; i < frame.length; ++i) {
       const auto byte = in_base(take_word(line), base_);
       if (!byte || *byte > 0xFF) return false;

@@ -110,43 +110,74 @@ class LineBuffer {
   bool skipping_ = false;
 };
 
-// The format in which most of the sample's lines are frames; among equals, fewest are bad. More
-// than half of them are enough: hardly a line is a frame in two formats.
-std::unique_ptr<LineParser> find_format(const Sample& sample) {
-  const auto make = [&](std::size_t format) -> std::unique_ptr<LineParser> {
-    switch (format) {
-      case 1:
-        return make_asc_parser();
-      case 2:
-        return make_trc_parser();
-      case 3:
-        return make_csv_parser(sample);
-      default:
-        return make_candump_parser(sample);
-    }
-  };
-  constexpr std::size_t kFormats = 4;
-  std::size_t best = 0;
-  std::int64_t best_score = INT64_MIN;
-  for (std::size_t format = 0; format < kFormats; ++format) {
-    const auto parser = make(format);
-    LogRecord record;
-    std::size_t frames = 0;
-    std::size_t bad = 0;
-    for (const std::string_view line : sample) {
-      const LineKind kind = parser->parse(line, record);
-      if (kind == LineKind::kFrame && 2 * ++frames > sample.size()) return make(format);
-      if (kind == LineKind::kBad) ++bad;
-    }
-    constexpr std::int64_t kFrameWeight = 1000;
-    const std::int64_t score =
-        kFrameWeight * static_cast<std::int64_t>(frames) - static_cast<std::int64_t>(bad);
-    if (score > best_score) {
-      best = format;
-      best_score = score;
-    }
+constexpr std::size_t kFormats = 4;
+constexpr std::size_t kCsv = 3;
+
+std::unique_ptr<LineParser> parser_of(std::size_t format, const Sample& sample) {
+  switch (format) {
+    case 1:
+      return make_asc_parser();
+    case 2:
+      return make_trc_parser();
+    case kCsv:
+      return make_csv_parser(sample);
+    default:
+      return make_candump_parser(sample);
   }
-  return make(best);
+}
+
+struct Tally {
+  std::size_t frames = 0;
+  std::size_t bad = 0;
+};
+
+// `enough` frames end it.
+Tally tally(std::size_t format, const Sample& sample, std::size_t enough) {
+  const auto parser = parser_of(format, sample);
+  LogRecord record;
+  Tally found;
+  for (const std::string_view line : sample) {
+    const LineKind kind = parser->parse(line, record);
+    if (kind == LineKind::kFrame) ++found.frames;
+    if (kind == LineKind::kBad) ++found.bad;
+    if (found.frames == enough) break;
+  }
+  return found;
+}
+
+// The format in which most of the sample's lines are frames; among equals, fewest are bad. More
+// than half of them are enough: hardly a line is a frame in two formats. So the one that the first
+// lines speak for is tried before the others.
+std::unique_ptr<LineParser> find_format(const Sample& sample) {
+  constexpr std::size_t kFirstLines = 50;  // chosen: behind the header of any format
+  const Sample head(sample.begin(),
+                    sample.begin() + static_cast<std::ptrdiff_t>(
+                                         std::min<std::size_t>(kFirstLines, sample.size())));
+  std::array<std::size_t, kFormats> first{};
+  std::array<std::size_t, kFormats> order{};
+  bool none = true;
+  for (std::size_t format = 0; format < kFormats; ++format) {
+    // The heads of tables are the dearest to look for, so only where nothing else is found.
+    if (format != kCsv || none) first[format] = tally(format, head, kFirstLines).frames;
+    none = none && first[format] == 0;
+    order[format] = format;
+  }
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return first[a] > first[b]; });
+  const std::size_t most = sample.size() / 2 + 1;
+  std::array<Tally, kFormats> found{};
+  for (const std::size_t format : order) {
+    found[format] = tally(format, sample, most);
+    if (found[format].frames == most) return parser_of(format, sample);
+  }
+  constexpr std::int64_t kFrameWeight = 1000;
+  const auto score = [&](const Tally& of) {
+    return kFrameWeight * static_cast<std::int64_t>(of.frames) - static_cast<std::int64_t>(of.bad);
+  };
+  const auto best =
+      std::max_element(found.begin(), found.end(),
+                       [&](const Tally& a, const Tally& b) { return score(a) < score(b); });
+  return parser_of(static_cast<std::size_t>(best - found.begin()), sample);
 }
 
 // Those at the end belong to it. Any other would hide the frames behind it.

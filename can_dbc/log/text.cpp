@@ -1,6 +1,7 @@
 #include "can_dbc/log/text.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <string>
 
@@ -10,15 +11,6 @@ namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::size_t kStampLengthMax = 32;
-
-std::optional<std::uint32_t> whole_number(std::string_view word, int base) {
-  std::uint32_t value = 0;
-  const char* const begin = word.data();
-  const char* const end = begin + word.size();
-  const auto [rest, status] = std::from_chars(begin, end, value, base);
-  if (status != std::errc{} || rest != end) return std::nullopt;
-  return value;
-}
 
 // Exactly `digits` digits from the front.
 std::optional<int> take_digits(std::string_view& text, std::size_t digits) {
@@ -47,10 +39,42 @@ std::int64_t days_since_1970(int year, int month, int day) {
 
 }  // namespace
 
-std::optional<std::uint32_t> hexadecimal(std::string_view word) { return whole_number(word, 16); }
-std::optional<std::uint32_t> decimal(std::string_view word) { return whole_number(word, 10); }
+std::optional<std::uint32_t> whole_number(std::string_view word, int base) {
+  std::uint32_t value = 0;
+  const char* const begin = word.data();
+  const char* const end = begin + word.size();
+  const auto [rest, status] = std::from_chars(begin, end, value, base);
+  if (status != std::errc{} || rest != end) return std::nullopt;
+  return value;
+}
 
-std::optional<std::int64_t> time_ns(std::string_view word, std::int64_t unit_ns) {
+bool take_hex_bytes(std::string_view& text, std::size_t count, std::uint8_t* bytes) noexcept {
+  constexpr std::size_t kChars = 3;  // "0A "
+  std::string_view rest = text;
+  skip_blanks(rest);
+  const std::size_t size = kChars * count - 1;
+  if (count == 0 || count > kMaxPayload || rest.size() < size ||
+      (rest.size() > size && !is_blank(rest[size]))) {
+    return false;
+  }
+  std::array<std::uint8_t, kMaxPayload> read;
+  const char* at = rest.data();
+  int wrong = 0;  // negative with the first that is no digit
+  for (std::size_t i = 0; i < count; ++i, at += kChars) {
+    const int high = hex_value(at[0]);
+    const int low = hex_value(at[1]);
+    wrong |= high | low;
+    read[i] = static_cast<std::uint8_t>(high << 4 | low);
+    if (i + 1 < count && !is_blank(at[2])) return false;
+  }
+  if (wrong < 0) return false;
+  std::copy_n(read.begin(), count, bytes);
+  rest.remove_prefix(size);
+  text = rest;
+  return true;
+}
+
+std::optional<std::int64_t> any_time_ns(std::string_view word, std::int64_t unit_ns) {
   const bool negative = word.starts_with('-');
   if (negative) word.remove_prefix(1);
   std::int64_t whole = 0;

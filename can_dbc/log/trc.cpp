@@ -16,6 +16,7 @@ using log_text::hexadecimal;
 using log_text::is_digit;
 using log_text::kFdLengths;
 using log_text::skip_blanks;
+using log_text::take_hex_bytes;
 using log_text::take_word;
 using log_text::time_ns;
 using log_text::trim_end;
@@ -112,6 +113,7 @@ class TrcParser : public LineParser {
     }
     if (!frame.fd && code > 8) return bad("more than 8 bytes in a classic frame");
     frame.length = static_cast<std::uint8_t>(code);
+    if (!frame.remote && take_hex_bytes(line, code, frame.data.data())) return LineKind::kFrame;
     skip_blanks(line);
     frame.remote |= line.starts_with("RTR");
     for (std::size_t i = 0; i < code && !frame.remote; ++i) {

@@ -1,12 +1,16 @@
 #include "can_dbc/log/can_log.h"
 
 #include <gtest/gtest.h>
+
 #include <unistd.h>
 #include <zlib.h>
 #include <zstd.h>
 
 #include <fstream>
 #include <iterator>
+#include <random>
+
+#include "can_dbc/log/text.h"
 
 namespace beltgrip::can {
 namespace {
@@ -595,6 +599,59 @@ TEST(CsvLog, BrokenRowsAreCounted) {
       "0.5,123,2,00112\n");
   EXPECT_EQ(log.frames.size(), 1U);
   EXPECT_EQ(log.stats.lines_bad, 5U);
+}
+
+// --- the quick ways against the plain ones -------------------------------------------------------
+
+// Changed here and there.
+std::string changed(std::string text, std::string_view pool, std::mt19937& random) {
+  const auto below = [&](std::size_t end) { return static_cast<std::size_t>(random()) % end; };
+  for (std::size_t changes = below(3); changes > 0 && !text.empty(); --changes) {
+    const std::size_t at = below(text.size());
+    const std::size_t kind = below(3);
+    if (kind == 0) text[at] = pool[below(pool.size())];
+    if (kind == 1) text.insert(at, 1, pool[below(pool.size())]);
+    if (kind == 2) text.erase(at, 1);
+  }
+  return text;
+}
+
+TEST(LogText, NumbersAndTimesAreReadAlikeBothWays) {
+  std::mt19937 random(5);
+  const std::vector<std::string> words{
+      "8",        "1FFFFFFF",          "00a0", "4294967295", "123456789",     "1234567890",
+      "12.34567", "1700000000.123456", "-0.5", "0,25",       "99999999999.9", "1.123456789"};
+  for (int round = 0; round < 100'000; ++round) {
+    const std::string word = changed(words[random() % words.size()], "0123456789aF.-, x", random);
+    ASSERT_EQ(log_text::hexadecimal(word), log_text::whole_number(word, 16)) << word;
+    ASSERT_EQ(log_text::decimal(word), log_text::whole_number(word, 10)) << word;
+    for (const std::int64_t unit_ns : {1'000'000'000, 1'000'000, 1'000, 1, 60}) {
+      ASSERT_EQ(log_text::time_ns(word, unit_ns), log_text::any_time_ns(word, unit_ns))
+          << word << ' ' << unit_ns;
+    }
+  }
+}
+
+// With two blanks for each the bytes are taken word by word.
+TEST(LogText, BytesAreReadAlikeBothWays) {
+  std::mt19937 random(6);
+  const std::string asc = "base hex  timestamps absolute\n";
+  const std::string trc = ";$FILEVERSION=2.1\n;$COLUMNS=N,O,T,B,I,d,R,L,D\n";
+  const std::string asc_line =
+      "   1.234567 1  123             Rx   d 8 64 00 0A ff 77 12 34 56 x = 1";
+  const std::string trc_line = "  2     1064.160 DT 1     0123 Rx -  8    64 00 0A FF 77 12 34 56 ";
+  for (int round = 0; round < 20'000; ++round) {
+    for (const bool is_asc : {true, false}) {
+      const std::string& head = is_asc ? asc : trc;
+      std::string line = changed(is_asc ? asc_line : trc_line, "0123456789aFRT x-", random);
+      const Log once = read(head + line + '\n');
+      std::string wide;
+      for (const char c : line) wide += c == ' ' ? "  " : std::string(1, c);
+      const Log twice = read(head + wide + '\n');
+      ASSERT_EQ(rewritten(once), rewritten(twice)) << line;
+      ASSERT_EQ(once.stats.lines_bad, twice.stats.lines_bad) << line;
+    }
+  }
 }
 
 // --- any format ----------------------------------------------------------------------------------
