@@ -8,6 +8,8 @@
 #include <string_view>
 #include <unordered_map>
 
+#include "can_dbc/dbc/bring_near.h"
+
 namespace beltgrip::can {
 
 namespace {
@@ -316,6 +318,13 @@ void MessageCodec::decode_selected(const Selector& selector, const Words& words,
     found = std::upper_bound(begin, cases_.data() + selector.cases_end, value, is_before) - 1;
   }
   decode_block(blocks_[found->block], words, out);
+}
+
+void MessageCodec::bring_near() const noexcept {
+  can::bring_near(steps_);
+  can::bring_near(presences_);
+  can::bring_near(signals_);
+  can::bring_near(others_);
 }
 
 void MessageCodec::decode(std::span<const std::uint8_t> payload,

@@ -69,6 +69,8 @@ class MessageCodec {
 
   std::size_t signal_count() const noexcept { return signals_.size(); }
   const SignalCodec& signal(std::size_t index) const noexcept { return signals_[index]; }
+  // What decode() will need, before it is called.
+  void bring_near() const noexcept;
   // out[i] is the i-th signal of the definition. Precondition: out.size() >= signal_count().
   void decode(std::span<const std::uint8_t> payload, DecodedMessage& out) const noexcept;
 

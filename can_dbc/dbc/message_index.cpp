@@ -2,6 +2,8 @@
 
 #include <bit>
 
+#include "can_dbc/dbc/bring_near.h"
+
 namespace beltgrip::can {
 
 namespace {
@@ -61,11 +63,15 @@ void MessageIndex::insert_message(const MessageDef& message, std::uint32_t place
   if (!insert(group, place) && is_new) conflict_with(*find(group));
 }
 
-std::size_t MessageIndex::slot_of(std::uint64_t key) const noexcept {
+std::size_t MessageIndex::first_slot_of(std::uint64_t key) const noexcept {
   // Multiplicative hashing: the high bits of the product with 2^64 / golden ratio.
   constexpr std::uint64_t kMultiplier = 0x9E37'79B9'7F4A'7C15U;
   const int bits = std::countr_zero(slots_.size());
-  std::size_t slot = bits == 0 ? 0 : static_cast<std::size_t>((key * kMultiplier) >> (64 - bits));
+  return bits == 0 ? 0 : static_cast<std::size_t>((key * kMultiplier) >> (64 - bits));
+}
+
+std::size_t MessageIndex::slot_of(std::uint64_t key) const noexcept {
+  std::size_t slot = first_slot_of(key);
   while (slots_[slot].place != kEmpty && slots_[slot].key != key) {
     slot = (slot + 1) & (slots_.size() - 1);
   }
@@ -82,6 +88,11 @@ bool MessageIndex::insert(std::uint64_t key, std::uint32_t place) {
   if (slot.place != kEmpty) return false;
   slot = {key, place};
   return true;
+}
+
+void MessageIndex::bring_near(CanId id) const noexcept {
+  if (!id.extended || places_.empty()) return;  // of 11 bits they are few
+  can::bring_near(&slots_[first_slot_of(key_of(Kind::kIdentifier, id.value))], sizeof(Slot));
 }
 
 const MessageIndex::Place* MessageIndex::lookup(CanId id) const noexcept {

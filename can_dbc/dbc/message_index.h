@@ -55,6 +55,8 @@ class MessageIndex {
   // The message of a frame with this identifier; nullptr if there is none. An exact identifier
   // wins, then the parameter group from the same source address, then the group from any source.
   const Place* lookup(CanId id) const noexcept;
+  // Before it is looked up.
+  void bring_near(CanId id) const noexcept;
   const std::vector<Conflict>& conflicts() const noexcept { return conflicts_; }
 
  private:
@@ -68,6 +70,7 @@ class MessageIndex {
   static std::uint64_t key_of(Kind kind, std::uint32_t value) noexcept {
     return (static_cast<std::uint64_t>(kind) << 32) | value;
   }
+  std::size_t first_slot_of(std::uint64_t key) const noexcept;
   std::size_t slot_of(std::uint64_t key) const noexcept;
   const Place* find(std::uint64_t key) const noexcept;
   // False if the key was taken; the place that has it stays.

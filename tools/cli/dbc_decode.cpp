@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cinttypes>
 #include <cmath>
 #include <cstdio>
@@ -12,6 +13,7 @@
 #include <set>
 #include <string_view>
 
+#include "can_dbc/dbc/bring_near.h"
 #include "can_dbc/dbc/message_index.h"
 #include "can_dbc/log/can_log.h"
 #include "can_dbc/text/printable.h"
@@ -72,17 +74,21 @@ class Decoder {
   // The messages of which something is wanted.
   const std::vector<const ChosenMessage*>& chosen() const { return chosen_; }
 
-  // nullptr: no DBC names the frame, or nothing of it is wanted.
-  const ChosenMessage* decode(const can::CanFrame& frame) {
+  // Before it is looked up.
+  void expect(const can::CanFrame& frame) const { index_.bring_near(frame.id); }
+  // nullptr: no DBC names the frame.
+  const ChosenMessage* message_of(const can::CanFrame& frame) const {
     if (frame.remote || frame.error) return nullptr;
     const can::MessageIndex::Place* place = index_.lookup(frame.id);
-    if (place == nullptr) return nullptr;
-    const ChosenMessage& message = messages_[place->database][place->message];
-    if (!message.definition) return nullptr;
+    return place == nullptr ? nullptr : &messages_[place->database][place->message];
+  }
+  // False: nothing of it is wanted.
+  bool decode(const can::CanFrame& frame, const ChosenMessage& message) {
+    if (!message.definition) return false;
     message.codec.decode(frame.payload(), values_);
     for (const std::size_t unwanted : message.unwanted) values_.drop(unwanted);
     if (message.names_repeat) keep_first_of_each_name(message);
-    return &message;
+    return true;
   }
   const can::DecodedMessage& values() const { return values_; }
 
@@ -128,13 +134,14 @@ class Decoder {
     }
     messages.demand_all_found("--messages", "message");
     signals.demand_all_found("--signals", "signal");
-    std::size_t column = 0;
+    std::uint32_t column = 0;
     for (std::vector<ChosenMessage>& database : messages_) {
       for (ChosenMessage& message : database) {
         if (!message.definition) continue;
-        message.first_column = column;
-        column += static_cast<std::size_t>(
-            std::count(message.wanted.begin(), message.wanted.end(), true));
+        for (const bool wanted : message.wanted) {
+          message.columns.push_back(column);
+          column += wanted ? 1U : 0U;
+        }
         chosen_.push_back(&message);
       }
     }
@@ -215,23 +222,92 @@ std::unique_ptr<can::LogReader> open_log(const std::string& path) {
   }
 }
 
+// The next frames of a log. What one of them needs is brought near in steps, each some frames
+// before the next, so that none of them waits for the memory that the step before has asked for.
+class FramesAhead {
+ public:
+  // step: frames between one step and the next; 0: each frame is handed on before the next is read.
+  FramesAhead(can::LogReader& log, Window window, const Decoder& decoder, const FrameWriter& writer,
+              std::size_t step)
+      : log_(log), window_(window), decoder_(decoder), writer_(writer), step_(step) {}
+
+  struct Frame {
+    can::LogRecord record;
+    std::string interface;  // that of the record is the log's until the next one is read
+    bool in_time = false;
+    const ChosenMessage* message = nullptr;  // of one in time
+  };
+
+  // nullptr at the end.
+  const Frame* next() {
+    while (taken_ == due(kSteps)) {
+      if (over_) return nullptr;
+      read();
+      for (; found_ < due(1); ++found_) {
+        Frame& frame = at(found_);
+        frame.message = frame.in_time ? decoder_.message_of(frame.record.frame) : nullptr;
+        if (frame.message != nullptr) can::bring_near(frame.message, sizeof(ChosenMessage));
+      }
+      for (; expected_ < due(2); ++expected_) {
+        const ChosenMessage* const message = at(expected_).message;
+        if (message == nullptr) continue;
+        message->codec.bring_near();
+        writer_.expect(*message);
+      }
+      for (; near_ < due(3); ++near_) {
+        if (const ChosenMessage* message = at(near_).message) writer_.expect_soon(*message);
+      }
+    }
+    return &at(taken_++);
+  }
+
+  static constexpr std::size_t kStep = 4;  // chosen by trying: 2 to 8 take the same time
+
+ private:
+  static constexpr std::size_t kSteps = 4;
+
+  // Frames that a number of steps lies behind.
+  std::size_t due(std::size_t steps) const {
+    return over_ ? read_ : read_ - std::min(read_, steps * step_);
+  }
+  Frame& at(std::size_t frame) { return frames_[frame % frames_.size()]; }
+
+  void read() {
+    Frame& frame = at(read_);
+    over_ = !log_.next(frame.record);
+    if (over_) return;
+    frame.in_time = window_.has(frame.record.t_ns);
+    if (frame.interface != frame.record.interface) frame.interface = frame.record.interface;
+    frame.record.interface = frame.interface;
+    decoder_.expect(frame.record.frame);
+    ++read_;
+  }
+
+  can::LogReader& log_;
+  Window window_;
+  const Decoder& decoder_;
+  const FrameWriter& writer_;
+  std::size_t step_;
+  bool over_ = false;
+  std::array<Frame, 2 * kSteps * kStep> frames_;
+  std::size_t read_ = 0, found_ = 0, expected_ = 0, near_ = 0, taken_ = 0;
+};
+
 void decode_log(Decoder& decoder, const DecodeOptions& options, const std::string& log_path,
                 FrameWriter& writer, OutputFile& out) {
   const std::unique_ptr<can::LogReader> log = open_log(log_path);
-  Window window(options.from_s, options.to_s);
-  can::LogRecord record;
   std::string lines;
   std::uint64_t decoded = 0;
   std::uint64_t in_time = 0;
   constexpr std::size_t kBlock = std::size_t{64} * 1024;
   const bool live = log_path == "-";
-  while (log->next(record)) {
-    if (window.has(record.t_ns)) {
-      ++in_time;
-      if (const ChosenMessage* message = decoder.decode(record.frame)) {
-        writer.append({record, *message, decoder.values()}, lines);
-        ++decoded;
-      }
+  FramesAhead frames(*log, Window(options.from_s, options.to_s), decoder, writer,
+                     live ? 0 : FramesAhead::kStep);
+  while (const FramesAhead::Frame* frame = frames.next()) {
+    if (frame->in_time) ++in_time;
+    if (frame->message != nullptr && decoder.decode(frame->record.frame, *frame->message)) {
+      writer.append({frame->record, *frame->message, decoder.values()}, lines);
+      ++decoded;
     }
     const bool hand_on = live && !input_waits();
     if (lines.size() < kBlock && !hand_on) continue;

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string_view>
 
+#include "can_dbc/dbc/bring_near.h"
 #include "can_dbc/text/printable.h"
 #include "tools/cli/failure.h"
 #include "tools/text/json_writer.h"
@@ -42,23 +43,32 @@ void append_value(std::string& line, double value, unsigned decimals) {
   line.append(text.data(), text::write_short(text.data(), value, decimals));
 }
 
-// Seconds with every digit that the log has, and no more zeros than needed.
-void append_seconds(std::string& line, std::int64_t t_ns) {
+// Seconds with every digit that the log has, and no more zeros than needed. Behind them; there must
+// be room for text::kNumberLongest characters.
+char* write_seconds(char* out, std::int64_t t_ns) {
   constexpr std::uint64_t kSecond_ns = 1'000'000'000;
-  constexpr std::size_t kPlaces = 9;
-  if (t_ns < 0) line += '-';
+  if (t_ns < 0) *out++ = '-';
   const auto magnitude =
       t_ns < 0 ? ~static_cast<std::uint64_t>(t_ns) + 1 : static_cast<std::uint64_t>(t_ns);
-  append_number(line, magnitude / kSecond_ns);
-  auto fraction = static_cast<std::uint32_t>(magnitude % kSecond_ns);
-  std::array<char, kPlaces + 1> text;
-  text[0] = '.';
-  for (std::size_t i = kPlaces; i > 0; --i, fraction /= 10) {
-    text[i] = static_cast<char>('0' + fraction % 10);
+  out = std::to_chars(out, out + text::kNumberLongest, magnitude / kSecond_ns).ptr;
+  const auto fraction_ns = static_cast<std::uint32_t>(magnitude % kSecond_ns);
+  if (fraction_ns % 1000 == 0) {
+    if (fraction_ns != 0) return text::write_fraction(out, fraction_ns / 1000);
+    *out++ = '.';
+    *out++ = '0';
+    return out;
   }
-  std::size_t length = text.size();
-  while (length > 2 && text[length - 1] == '0') --length;
-  line.append(text.data(), length);
+  const text::ThreeDigits& nanoseconds = text::kThreeDigits[fraction_ns % 1000];
+  *out = '.';
+  text::write_three(out + 1, text::kThreeDigits[fraction_ns / 1'000'000]);
+  text::write_three(out + 4, text::kThreeDigits[fraction_ns / 1000 % 1000]);
+  text::write_three(out + 7, nanoseconds);
+  return out + 7 + nanoseconds.without_zeros;
+}
+
+void append_seconds(std::string& line, std::int64_t t_ns) {
+  std::array<char, text::kNumberLongest> text;
+  line.append(text.data(), write_seconds(text.data(), t_ns));
 }
 
 std::string json_text(std::string_view text) { return text::JsonWriter().value(text).take(); }
@@ -108,20 +118,49 @@ class JsonFrames : public FrameWriter {
     out += "}}\n";
   }
 
+  void expect(const ChosenMessage& message) const override {
+    if (message.number < texts_.size()) can::bring_near(&texts_[message.number], sizeof(Texts));
+  }
+  void expect_soon(const ChosenMessage& message) const override {
+    if (message.number >= texts_.size()) return;
+    const Texts& texts = texts_[message.number];
+    for (const std::string* text : {&texts.head, &texts.pieces}) can::bring_near(*text);
+    can::bring_near(texts.keys);
+    can::bring_near(texts.labels);
+    can::bring_near(texts.of_labels);
+    can::bring_near(message.decimals);
+  }
+
  private:
+  // Pieces of one text, so that they lie together.
+  struct Piece {
+    std::uint32_t begin = 0;
+    std::uint32_t size = 0;
+  };
   struct Label {
     std::int64_t key = 0;
-    std::string member;  // "name":"text"
+    Piece member;  // "name":"text"
   };
   struct Labels {
-    std::size_t signal = 0;
-    std::vector<Label> of;  // by their keys
+    std::uint32_t signal = 0;
+    std::uint32_t first = 0, end = 0;  // in Texts::of_labels, by their keys
   };
   // What never changes of a message.
   struct Texts {
-    std::string head;               // ,"extended":false,"message":"X","signals":{
-    std::vector<std::string> keys;  // "name": of each signal
-    std::vector<Labels> labels;     // of the signals that have any
+    std::string head;            // ,"extended":false,"message":"X","signals":{
+    std::string pieces;          // all that the others are pieces of
+    std::vector<Piece> keys;     // "name": of each signal
+    std::vector<Labels> labels;  // of the signals that have any
+    std::vector<Label> of_labels;
+
+    Piece add(const std::string& text) {
+      pieces += text;
+      return {static_cast<std::uint32_t>(pieces.size() - text.size()),
+              static_cast<std::uint32_t>(text.size())};
+    }
+    std::string_view text(Piece piece) const {
+      return std::string_view(pieces).substr(piece.begin, piece.size);
+    }
   };
 
   const Texts& texts_of(const ChosenMessage& message) {
@@ -132,12 +171,15 @@ class JsonFrames : public FrameWriter {
     texts.head = R"(,"extended":)" + std::string(definition.id.extended ? "true" : "false") +
                  R"(,"message":)" + json_text(definition.name) + R"(,"signals":{)";
     for (const can::SignalDef& signal : definition.signals) {
-      texts.keys.push_back(json_text(signal.name) + ':');
+      const std::string key = json_text(signal.name) + ':';
+      texts.keys.push_back(texts.add(key));
       if (signal.values.empty()) continue;
-      texts.labels.push_back({texts.keys.size() - 1, {}});
-      for (const auto& [key, text] : signal.values) {
-        texts.labels.back().of.push_back({key, texts.keys.back() + json_text(text)});
+      const auto first = static_cast<std::uint32_t>(texts.of_labels.size());
+      for (const auto& [value, text] : signal.values) {
+        texts.of_labels.push_back({value, texts.add(key + json_text(text))});
       }
+      texts.labels.push_back({static_cast<std::uint32_t>(texts.keys.size() - 1), first,
+                              static_cast<std::uint32_t>(texts.of_labels.size())});
     }
     return texts;
   }
@@ -148,13 +190,14 @@ class JsonFrames : public FrameWriter {
       if (!frame.values.has(labels.signal)) continue;
       const std::optional<std::int64_t> key = table_key(frame, labels.signal);
       if (!key) continue;
-      const auto found = std::lower_bound(
-          labels.of.begin(), labels.of.end(), *key,
+      const Label* const end = texts.of_labels.data() + labels.end;
+      const Label* const found = std::lower_bound(
+          texts.of_labels.data() + labels.first, end, *key,
           [](const Label& label, std::int64_t wanted) { return label.key < wanted; });
-      if (found == labels.of.end() || found->key != *key) continue;
+      if (found == end || found->key != *key) continue;
       if (!first) out += ',';
       first = false;
-      out += found->member;
+      out += texts.text(found->member);
     }
   }
 
@@ -165,7 +208,7 @@ class JsonFrames : public FrameWriter {
     frame.values.for_each_present([&](std::size_t i) {
       if (!first) out += ',';
       first = false;
-      out += texts.keys[i];
+      out += texts.text(texts.keys[i]);
       write(i);
     });
   }
@@ -252,22 +295,25 @@ class CsvFrames : public FrameWriter {
   std::string head() const override { return head_ + '\n'; }
 
   void append(const DecodedFrame& frame, std::string& out) override {
-    append_seconds(out, frame.record.t_ns);
-    out += ',';
-    append_interface(frame.record.interface, out);
+    keep_interface(frame.record.interface);
+    char* at = write_seconds(row_.data(), frame.record.t_ns);
+    *at++ = ',';
+    at = std::copy(interface_cell_.begin(), interface_cell_.end(), at);
     std::size_t column = 0;
-    std::size_t next = frame.message.first_column;
-    for (std::size_t i = 0; i < frame.message.wanted.size(); ++i) {
-      if (!frame.message.wanted[i]) continue;
-      if (frame.values.has(i)) {
-        out.append(next + 1 - column, ',');
-        column = next + 1;
-        append_cell(frame, i, out);
-      }
-      ++next;
-    }
-    out.append(columns_ - column, ',');
-    out += '\n';
+    frame.values.for_each_present([&](std::size_t i) {
+      const std::size_t next = frame.message.columns[i] + std::size_t{1};
+      at = std::fill_n(at, next - column, ',');
+      column = next;
+      at = write_cell(frame, i, at);
+    });
+    at = std::fill_n(at, columns_ - column, ',');
+    *at++ = '\n';
+    out.append(row_.data(), at);
+  }
+
+  void expect_soon(const ChosenMessage& message) const override {
+    can::bring_near(message.columns);
+    can::bring_near(message.decimals);
   }
 
  private:
@@ -276,20 +322,22 @@ class CsvFrames : public FrameWriter {
     head_ += ',' + csv_cell(can::printable(message.definition->name + '.' +
                                            message.definition->signals[i].name));
   }
-  void append_cell(const DecodedFrame& frame, std::size_t i, std::string& out) const {
-    if (with_raw_) {
-      out += frame.message.codec.signal(i).raw_text(frame.values[i].raw);
-    } else {
-      append_value(out, plain(frame.values[i].physical), frame.message.decimals[i]);
+  char* write_cell(const DecodedFrame& frame, std::size_t i, char* at) const {
+    if (!with_raw_) {
+      return text::write_short(at, plain(frame.values[i].physical), frame.message.decimals[i]);
     }
+    const std::string raw = frame.message.codec.signal(i).raw_text(frame.values[i].raw);
+    return std::copy(raw.begin(), raw.end(), at);
   }
 
-  void append_interface(std::string_view interface, std::string& out) {
+  void keep_interface(std::string_view interface) {
     if (interface != interface_) {
       interface_ = interface;
       interface_cell_ = csv_cell(can::printable(interface_));
     }
-    out += interface_cell_;
+    // The longest row: a stamp, the interface, and in each column a number and its comma.
+    row_.resize(2 * text::kNumberLongest + interface_cell_.size() +
+                columns_ * (text::kNumberLongest + 1));
   }
 
   bool with_raw_;
@@ -297,6 +345,7 @@ class CsvFrames : public FrameWriter {
   std::string head_ = "t_s,iface";
   std::string interface_;
   std::string interface_cell_;
+  std::vector<char> row_;
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 // A frame of a log with what a DBC says of it, and its three forms. Tools only.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -16,12 +17,12 @@ namespace beltgrip::cli {
 struct ChosenMessage {
   const can::MessageDef* definition = nullptr;
   can::MessageCodec codec;
-  std::vector<bool> wanted;           // beside the definition's signals
-  std::vector<std::size_t> unwanted;  // the others
-  std::vector<unsigned> decimals;     // of each signal's values, as text::decimals_of() has it
-  std::size_t number = 0;             // among all messages of all DBC files
-  std::size_t first_column = 0;       // in CSV: of its first wanted signal
-  bool names_repeat = false;          // among its signals
+  std::vector<bool> wanted;            // beside the definition's signals
+  std::vector<std::size_t> unwanted;   // the others
+  std::vector<unsigned> decimals;      // of each signal's values, as text::decimals_of() has it
+  std::size_t number = 0;              // among all messages of all DBC files
+  std::vector<std::uint32_t> columns;  // in CSV: of each wanted signal
+  bool names_repeat = false;           // among its signals
 };
 
 struct DecodedFrame {
@@ -38,6 +39,10 @@ class FrameWriter {
   virtual ~FrameWriter() = default;
   virtual std::string head() const { return {}; }
   virtual void append(const DecodedFrame& frame, std::string& out) = 0;
+  // A frame of this message will come: what of it can be brought near; and some frames later what
+  // that leads to.
+  virtual void expect(const ChosenMessage& message) const { static_cast<void>(message); }
+  virtual void expect_soon(const ChosenMessage& message) const { static_cast<void>(message); }
 };
 
 // Each gets the messages in the order of their columns.

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 
 namespace beltgrip::text {
 
@@ -37,6 +38,52 @@ inline unsigned decimals_of(double value) {
   return decimals;
 }
 
+// Three digits at once, 0 to 999.
+struct ThreeDigits {
+  std::array<char, 5> text{};      // with room behind, so that three of them stand from each on
+  std::uint8_t zeros_before = 0;   // of a whole number: at most two
+  std::uint8_t without_zeros = 0;  // of a fraction: how many are left without those at its end
+};
+constexpr std::array<ThreeDigits, 1000> all_three_digits() {
+  std::array<ThreeDigits, 1000> table{};
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    ThreeDigits& three = table[i];
+    three.text = {static_cast<char>('0' + i / 100), static_cast<char>('0' + i / 10 % 10),
+                  static_cast<char>('0' + i % 10), '0', '0'};
+    three.zeros_before = i < 10 ? 2 : i < 100 ? 1 : 0;
+    three.without_zeros = i % 10 != 0 ? 3 : i % 100 != 0 ? 2 : i != 0 ? 1 : 0;
+  }
+  return table;
+}
+inline constexpr std::array<ThreeDigits, 1000> kThreeDigits = all_three_digits();
+
+// Always three characters from `from` on are written.
+inline void write_three(char* out, const ThreeDigits& three, std::size_t from = 0) {
+  std::memcpy(out, three.text.data() + from, 3);
+}
+
+// Below kFixedMost.
+inline char* write_whole(char* out, std::uint32_t whole) {
+  const bool thousands = whole >= 1000;
+  const ThreeDigits& first = kThreeDigits[thousands ? whole / 1000 : whole];
+  write_three(out, first, first.zeros_before);
+  out += 3 - first.zeros_before;
+  if (!thousands) return out;
+  write_three(out, kThreeDigits[whole % 1000]);
+  return out + 3;
+}
+
+// ".25" of 250,000 millionths; not of 0.
+inline char* write_fraction(char* out, std::uint32_t millionths) {
+  const ThreeDigits& first = kThreeDigits[millionths / 1000];
+  const ThreeDigits& second = kThreeDigits[millionths % 1000];
+  *out++ = '.';
+  write_three(out, first);
+  if (second.without_zeros == 0) return out + first.without_zeros;
+  write_three(out + 3, second);
+  return out + 3 + second.without_zeros;
+}
+
 // decimals: as many as the value is likely to have. Behind the text, for which there must be room
 // for kNumberLongest characters.
 inline char* write_short(char* out, double value, unsigned decimals) {
@@ -49,13 +96,11 @@ inline char* write_short(char* out, double value, unsigned decimals) {
   if (value < 0.0) *out++ = '-';
   // What is no whole number lies too far from one to have been rounded to it.
   const auto whole = static_cast<std::uint32_t>(magnitude);
-  auto rest = static_cast<std::uint32_t>(digits - std::uint64_t{whole} * kPowersOfTen[decimals]);
-  out = std::to_chars(out, out + kNumberLongest, whole).ptr;
+  const auto rest =
+      static_cast<std::uint32_t>(digits - std::uint64_t{whole} * kPowersOfTen[decimals]);
+  out = write_whole(out, whole);
   if (rest == 0) return out;
-  for (; rest % 10 == 0; rest /= 10) --decimals;
-  *out = '.';
-  for (unsigned i = decimals; i > 0; --i, rest /= 10) out[i] = static_cast<char>('0' + rest % 10);
-  return out + decimals + 1;
+  return write_fraction(out, rest * kPowersOfTen[kDecimalsMost - decimals]);
 }
 
 }  // namespace beltgrip::text
