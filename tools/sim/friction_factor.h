@@ -26,17 +26,27 @@ inline FrictionCurve shaped(FrictionCurve curve, const estimator::MachineEffects
   return curve;
 }
 
+// Most vehicles have few of the effects, and this is asked twice a step: what has no effect is 1
+// without a logarithm or a power.
 inline double friction_factor(const estimator::MachineEffects& e, const FrictionConditions& now) {
   constexpr double kLeast = 0.05;
   const double wear = (now.experiment >= e.wear_from ? 1.0 - e.wear_step : 1.0) *
                       (1.0 - e.wear_per_experiment * static_cast<double>(now.experiment));
+  const double speed =
+      e.friction_per_ln_speed == 0.0
+          ? 1.0
+          : 1.0 + e.friction_per_ln_speed * std::log(std::max(now.omega_p_rad_s, 5.0) / 105.0);
+  const double load =
+      e.friction_load_exponent == 0.0
+          ? 1.0
+          : std::pow(std::max(now.force_N, 1.0) / 3000.0, -e.friction_load_exponent);
+  const double started =
+      e.warm_up_per_start == 0.0
+          ? 1.0
+          : 1.0 + e.warm_up_per_start * -std::expm1(-std::max(now.time_s, 0.0) / 30.0);
   return std::max(kLeast, wear) * std::max(kLeast, 1.0 + e.friction_per_K * (now.oil_degC - 80.0)) *
-         std::max(kLeast, 1.0 + e.friction_per_ln_speed *
-                                    std::log(std::max(now.omega_p_rad_s, 5.0) / 105.0)) *
-         std::pow(std::max(now.force_N, 1.0) / 3000.0, -e.friction_load_exponent) *
-         (1.0 + now.low_share * e.friction_low_relative) *
-         std::max(kLeast, 1.0 + e.warm_up_per_kJ * now.slip_energy_kJ) *
-         (1.0 + e.warm_up_per_start * -std::expm1(-std::max(now.time_s, 0.0) / 30.0));
+         std::max(kLeast, speed) * load * (1.0 + now.low_share * e.friction_low_relative) *
+         std::max(kLeast, 1.0 + e.warm_up_per_kJ * now.slip_energy_kJ) * started;
 }
 
 }  // namespace beltgrip::sim

@@ -16,10 +16,11 @@ constexpr double kCoulombWidth_rad_s = 5.0;
 }  // namespace
 
 double VehicleEngine::step(double accelerator, double omega_rad_s, double extra_Nm, double step_s) {
+  const double coulomb = std::tanh(omega_rad_s / kCoulombWidth_rad_s);
   const double drag_Nm =
       std::max(0.0, parameters_.overrun_torque_Nm +
                         parameters_.overrun_slope_Nm_s * (omega_rad_s - kDragSpeed_rad_s)) *
-      std::tanh(omega_rad_s / kCoulombWidth_rad_s);
+      coulomb;
 
   if (running_ && omega_rad_s < parameters_.stall_rad_s) {
     running_ = false;
@@ -43,9 +44,13 @@ double VehicleEngine::step(double accelerator, double omega_rad_s, double extra_
   }
   requested_Nm_ = wanted_Nm - drag_Nm;
   demand_Nm_ = std::min(wanted_Nm, demand_Nm_ + parameters_.torque_rise_Nm_s * step_s);
-  torque_Nm_ += -std::expm1(-step_s / parameters_.torque_lag_s) * (demand_Nm_ - torque_Nm_);
+  if (step_s != lag_step_s_) {
+    lag_step_s_ = step_s;
+    lag_share_ = -std::expm1(-step_s / parameters_.torque_lag_s);
+  }
+  torque_Nm_ += lag_share_ * (demand_Nm_ - torque_Nm_);
   reported_Nm_ = torque_Nm_ - drag_Nm + extra_Nm;
-  return reported_Nm_ - parameters_.accessories_Nm * std::tanh(omega_rad_s / kCoulombWidth_rad_s);
+  return reported_Nm_ - parameters_.accessories_Nm * coulomb;
 }
 
 }  // namespace beltgrip::sim

@@ -21,6 +21,8 @@ class VehicleEngine {
 
  private:
   EngineParameters parameters_;
+  double lag_step_s_ = 0.0;  // of the step that lag_share_ was computed for
+  double lag_share_ = 0.0;
   double demand_Nm_ = 0.0;  // combustion as asked for, shaped
   double torque_Nm_ = 0.0;  // as it is, lagged
   double reported_Nm_ = 0.0;

@@ -74,6 +74,7 @@ VehiclePlant::VehiclePlant(const VehicleScenario& scenario)
                                body_.mass_kg *
                                    std::pow(body_.wheel_radius_m / body_.final_drive, 2)),
       cos_wedge_(std::cos(variator_.half_wedge_angle_rad)),
+      wedge_factor_(wedge_factor(variator_.half_wedge_angle_rad)),
       ln_span_(std::log(variator_.ratio_overdrive / variator_.ratio_low)) {
   belt_.overdrive = shaped(belt_.overdrive, effects_);
   variator_.secondary_loss_Nm += effects_.secondary_loss_constant_Nm;
@@ -219,9 +220,8 @@ void VehiclePlant::shift(const DrivelineInput& input, double step_s) {
   const double load = std::clamp(output_.belt_torque_Nm / std::max(capacity_Nm, 1.0), -1.0, 1.0);
   const double equilibrium =
       variator_.force_ratio_slope * std::log(state_.ratio) + variator_.force_ratio_load * load;
-  const double rate = std::max(state_.omega_p_rad_s, 0.0) * variator_.shift_gain *
-                      wedge_factor(variator_.half_wedge_angle_rad) * state_.ratio *
-                      (std::log(force_ratio) - equilibrium);
+  const double rate = std::max(state_.omega_p_rad_s, 0.0) * variator_.shift_gain * wedge_factor_ *
+                      state_.ratio * (std::log(force_ratio) - equilibrium);
   state_.ratio =
       std::clamp(state_.ratio + rate * step_s, variator_.ratio_low, variator_.ratio_overdrive);
   creep(std::log(force_ratio), step_s);

@@ -110,6 +110,7 @@ class VehiclePlant {
   double engine_inertia_kg_m2_;
   double secondary_inertia_kg_m2_;  // with the vehicle
   double cos_wedge_;
+  double wedge_factor_;
   Place place_;
   double ln_span_;                       // of the ratios
   std::array<double, kRadii> radius_m_;  // over ln(ratio) between the end stops
