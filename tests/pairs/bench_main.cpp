@@ -24,12 +24,15 @@ void show(const Pair& pair, int rounds, bool markdown) {
 int run(int argc, char** argv) {
   int rounds = 9;
   bool markdown = false;
+  bool large = false;
   std::string other, only;
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];
     const bool has_value = i + 1 < argc;
     if (word == "--markdown") {
       markdown = true;
+    } else if (word == "--large") {
+      large = true;
     } else if (word == "--rounds" && has_value) {
       rounds = std::atoi(argv[++i]);
     } else if (word == "--other" && has_value) {
@@ -38,7 +41,8 @@ int run(int argc, char** argv) {
       only = argv[++i];
     } else {
       std::fputs(
-          "usage: bench [--markdown] [--rounds N] [--only codec|logs|programs] [--other PROGRAM]\n",
+          "usage: bench [--markdown] [--rounds N] [--only codec|logs|programs|growth] [--large] "
+          "[--other PROGRAM]\n",
           stderr);
       return 64;
     }
@@ -56,6 +60,7 @@ int run(int argc, char** argv) {
   if (asked("codec")) show_all(codec_pairs());
   if (asked("logs")) show_all(log_pairs(folder));
   if (asked("programs")) show_all(program_pairs(folder, BELTGRIP_PROGRAM, other));
+  if (asked("growth")) show_growth(folder, BELTGRIP_PROGRAM, large);
   return 0;
 }
 

@@ -15,4 +15,7 @@ std::vector<Pair> log_pairs(const Folder& folder);
 std::vector<Pair> program_pairs(const Folder& folder, const std::string& beltgrip,
                                 const std::string& other);
 
+// Tables of what grows with messages, length and number of logs. large: with logs of 1 and 5 GB.
+void show_growth(const Folder& folder, const std::string& beltgrip, bool large);
+
 }  // namespace beltgrip::test

@@ -82,6 +82,11 @@ int run() {
   const std::string log = folder.path("fixed.log");
   write_log(log, kFrames, 0x100, 5);
   count("log_line", kFrames, [&] { read(log); });
+  for (const char* kind : {"asc", "trc", "csv"}) {
+    const std::string other = folder.path(std::string("fixed.") + kind);
+    write_as(log, other);
+    count((std::string(kind) + "_line").c_str(), kFrames, [&] { read(other); });
+  }
   count("replay_one_in_five", kFrames, [&] { follow(log, true); });
   count("replay_foreign", kFrames, [&] { follow(log, false); });
   count("number_text", kFrames, write_numbers);

@@ -100,21 +100,100 @@ void write_log(const std::string& path, int frames, unsigned first_id, unsigned 
   std::fclose(out);
 }
 
+namespace {
+
+class DilutedWriter {
+ public:
+  DilutedWriter(const std::string& path, int foreign)
+      : out_(std::fopen(path.c_str(), "wb")), writer_(out_), foreign_(foreign) {
+    if (out_ == nullptr) throw std::runtime_error(path + ": cannot be written");
+    frame_.length = 8;
+  }
+  ~DilutedWriter() { std::fclose(out_); }
+  DilutedWriter(const DilutedWriter&) = delete;
+  DilutedWriter& operator=(const DilutedWriter&) = delete;
+
+  void write(std::int64_t t_ns, const can::LogRecord& record) {
+    writer_.write(t_ns, record.interface, record.frame);
+    for (int i = 0; i < foreign_; ++i) {
+      frame_.id.value = kForeignId + static_cast<unsigned>(random_() % kForeignIds);
+      for (std::size_t k = 0; k < 8; ++k) frame_.data[k] = static_cast<std::uint8_t>(random_());
+      writer_.write(t_ns, record.interface, frame_);
+    }
+  }
+  std::int64_t bytes() const { return std::ftell(out_); }
+
+ private:
+  std::FILE* out_;
+  can::CandumpWriter writer_;
+  int foreign_;
+  std::mt19937_64 random_{2};
+  can::CanFrame frame_;
+};
+
+}  // namespace
+
 void write_diluted(const std::string& from, const std::string& to, int foreign) {
+  DilutedWriter out(to, foreign);
   const auto reader = can::LogReader::open(from);
+  can::LogRecord record;
+  while (reader->next(record)) out.write(record.t_ns, record);
+}
+
+void write_repeated(const std::string& from, const std::string& to, int foreign,
+                    std::int64_t bytes) {
+  DilutedWriter out(to, foreign);
+  constexpr std::int64_t kPause_ns = 1'000'000'000;
+  std::int64_t shift_ns = 0;
+  while (out.bytes() < bytes) {
+    const auto reader = can::LogReader::open(from);
+    can::LogRecord record;
+    std::int64_t first_ns = 0;
+    bool begun = false;
+    while (reader->next(record) && out.bytes() < bytes) {
+      if (!begun) first_ns = record.t_ns;
+      begun = true;
+      out.write(record.t_ns + shift_ns, record);
+    }
+    shift_ns += record.t_ns - first_ns + kPause_ns;
+  }
+}
+
+void write_as(const std::string& from, const std::string& to) {
+  const std::string kind = to.substr(to.rfind('.'));
   std::FILE* out = std::fopen(to.c_str(), "wb");
   if (out == nullptr) throw std::runtime_error(to + ": cannot be written");
-  can::CandumpWriter writer(out);
-  std::mt19937_64 random(2);
-  can::CanFrame frame;
-  frame.length = 8;
+  if (kind == ".asc") {
+    std::fputs("date Mon Nov 24 06:00:00.000 2025\nbase hex  timestamps absolute\n", out);
+  } else if (kind == ".trc") {
+    std::fputs(";$FILEVERSION=2.1\n;$COLUMNS=N,O,T,B,I,d,R,L,D\n", out);
+  } else {
+    std::fputs("timestamp,id,extended,dlc,data,bus\n", out);
+  }
+  const auto reader = can::LogReader::open(from);
   can::LogRecord record;
-  while (reader->next(record)) {
-    writer.write(record.t_ns, record.interface, record.frame);
-    for (int i = 0; i < foreign; ++i) {
-      frame.id.value = kForeignId + static_cast<unsigned>(random() % kForeignIds);
-      for (std::size_t k = 0; k < 8; ++k) frame.data[k] = static_cast<std::uint8_t>(random());
-      writer.write(record.t_ns, record.interface, frame);
+  std::int64_t first_ns = 0;
+  for (long number = 1; reader->next(record); ++number) {
+    if (number == 1) first_ns = record.t_ns;
+    const auto t_us = static_cast<long long>((record.t_ns - first_ns) / 1000);
+    std::string bytes, spaced;
+    for (const std::uint8_t byte : record.frame.payload()) {
+      std::array<char, 4> text;
+      std::snprintf(text.data(), text.size(), "%02X", byte);
+      bytes += text.data();
+      spaced += std::string(spaced.empty() ? "" : " ") + text.data();
+    }
+    const unsigned length = record.frame.length;
+    if (kind == ".asc") {
+      std::fprintf(out, "%4lld.%06lld 1  %-15X Rx   d %u %s  Length = 228000 BitCount = 117\n",
+                   t_us / 1'000'000, t_us % 1'000'000, record.frame.id.value, length,
+                   spaced.c_str());
+    } else if (kind == ".trc") {
+      std::fprintf(out, "%7ld %9lld.%03lld DT 1     %04X Rx -  %u    %s\n", number, t_us / 1000,
+                   t_us % 1000, record.frame.id.value, length, spaced.c_str());
+    } else {
+      std::fprintf(out, "%lld.%06lld,0x%X,0,%u,%s,1\n", t_us / 1'000'000, t_us % 1'000'000,
+                   record.frame.id.value, length, bytes.c_str());
     }
   }
   std::fclose(out);

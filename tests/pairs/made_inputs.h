@@ -1,6 +1,7 @@
 // DBC files and logs that the pairs work on, made from fixed seeds.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -35,5 +36,14 @@ void write_log(const std::string& path, int frames, unsigned first_id, unsigned 
 
 // Each line of the log once, and behind it `foreign` frames with other identifiers and its stamp.
 void write_diluted(const std::string& from, const std::string& to, int foreign);
+
+// The log again and again, each time behind the time before, with `foreign` frames behind each of
+// its own, until there are so many bytes.
+void write_repeated(const std::string& from, const std::string& to, int foreign,
+                    std::int64_t bytes);
+
+// The frames of a candump log in another form: .asc and .trc as the tools of Vector and PEAK write
+// them, .csv with a column for all data.
+void write_as(const std::string& from, const std::string& to);
 
 }  // namespace beltgrip::test

@@ -3,6 +3,7 @@
 // kernel. Prints the delays and their ratio; what they are is the machine's business.
 // tests/latency.
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -52,6 +53,58 @@ Delays delays(const std::vector<std::int64_t>& stamps_ns, std::int64_t start_ns)
   return found;
 }
 
+// What the kernel has counted of a process.
+struct Spent {
+  double processor_s = 0.0;
+  std::string peak;  // "6912 kB"
+};
+
+Spent spent_by(pid_t pid) {
+  const std::string place = "/proc/" + std::to_string(pid);
+  Spent spent;
+  std::string line;
+  std::ifstream stat(place + "/stat");
+  std::getline(stat, line);
+  unsigned long user = 0, system = 0;
+  // Behind the name in brackets: state, ten more, then the two.
+  std::sscanf(line.c_str() + line.rfind(')'),
+              ") %*c %*s %*s %*s %*s %*s %*s %*s %*s %*s %*s %lu %lu", &user, &system);
+  spent.processor_s =
+      static_cast<double>(user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
+  std::ifstream status(place + "/status");
+  while (std::getline(status, line)) {
+    constexpr std::string_view kPeak = "VmHWM:";
+    if (line.starts_with(kPeak)) spent.peak = line.substr(line.find_first_of("0123456789"));
+  }
+  return spent;
+}
+
+// System calls of the process while frames of the rig come, per frame.
+double calls_a_frame(pid_t pid, const std::string& folder, const BusSocket& bus) {
+  constexpr int kFrames = 600;
+  const std::string counted = folder + "/calls";
+  Process strace({"strace", "-c", "-f", "-o", counted, "-p", std::to_string(pid)});
+  if (!strace.wait_for_error("attached", kLimit)) return 0.0;
+  int frames = 0;
+  bus.receive_until(
+      [&](const SeenFrame& frame) {
+        const canid_t id = frame.frame.can_id;
+        if (id == 0x110 || id == 0x120 || id == 0x130) ++frames;
+        return frames >= kFrames;
+      },
+      kLimit);
+  strace.signal(SIGINT);
+  strace.wait(kLimit);
+  std::ifstream table(counted);
+  std::string line;
+  double calls = 0.0;
+  while (std::getline(table, line)) {
+    // 100.00    0.004321           3      1234        12 total
+    if (line.ends_with(" total")) std::sscanf(line.c_str(), "%*f %*f %*d %lf", &calls);
+  }
+  return calls / frames;
+}
+
 class Latency : public Vcan, public testing::WithParamInterface<bool> {};
 
 TEST_P(Latency, FromSampleToFrame) {
@@ -64,7 +117,9 @@ TEST_P(Latency, FromSampleToFrame) {
     return argv;
   };
   const BusSocket bus("vcan0");
-  const Process player(canplayer(write_steady_log(folder()), "vcan0", true));
+  const bool full = std::getenv("LATENCY_FULL") != nullptr;
+  const std::string log = full ? write_full_log(folder()) : write_steady_log(folder());
+  const Process player(canplayer(log, "vcan0", true));
   Process daemon(with({program("beltgripd"), "--config", write_rig_config(folder(), "vcan0"),
                        "--record", folder() + "/record"}));
   ASSERT_TRUE(daemon.wait_for_error("-> Ramping", kLimit)) << daemon.err();
@@ -72,6 +127,8 @@ TEST_P(Latency, FromSampleToFrame) {
                         std::to_string(kMinimal), std::to_string(kPeriod_ns)}));
   ASSERT_TRUE(minimal.wait_for_output("start ", kLimit));
   std::vector<std::int64_t> ours_ns, theirs_ns;
+  const Spent before_it = spent_by(daemon.pid());
+  const auto begin = std::chrono::steady_clock::now();
   const auto seen = bus.receive_until(
       [&](const SeenFrame& frame) {
         if (frame.frame.can_id == kSlip && !theirs_ns.empty()) ours_ns.push_back(frame.t_ns);
@@ -80,6 +137,10 @@ TEST_P(Latency, FromSampleToFrame) {
       },
       Milliseconds(static_cast<int>(wanted) * 40));
   ASSERT_TRUE(seen.has_value()) << daemon.err();
+  const double took_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const Spent spent = spent_by(daemon.pid());
+  const double calls = full ? calls_a_frame(daemon.pid(), folder(), bus) : 0.0;
   minimal.signal(SIGTERM);
   minimal.wait(kLimit);
   daemon.signal(SIGTERM);
@@ -90,14 +151,20 @@ TEST_P(Latency, FromSampleToFrame) {
   }
   const Delays ours = delays(ours_ns, start_of(record));
   const Delays theirs = delays(theirs_ns, std::stoll(minimal.out().substr(6)));
-  std::printf("%-22s %8s %8s %8s %8s\n", GetParam() ? "FIFO 60, us" : "ordinary, us", "p50", "p90",
-              "p99", "frames");
+  std::printf("%-22s %8s %8s %8s %8s %8s\n", GetParam() ? "FIFO 60, us" : "ordinary, us", "p50",
+              "p90", "p99", "p99.9", "frames");
   for (const auto& [name, each] : {std::pair{"beltgripd", &ours}, {"timer and write", &theirs}}) {
-    std::printf("%-22s %8.0f %8.0f %8.0f %8zu\n", name, each->at(0.5), each->at(0.9),
-                each->at(0.99), each->us.size());
+    std::printf("%-22s %8.0f %8.0f %8.0f %8.0f %8zu\n", name, each->at(0.5), each->at(0.9),
+                each->at(0.99), each->at(0.999), each->us.size());
   }
-  std::printf("%-22s %8.2f %8.2f %8.2f\n", "ratio", ours.at(0.5) / theirs.at(0.5),
-              ours.at(0.9) / theirs.at(0.9), ours.at(0.99) / theirs.at(0.99));
+  std::printf("%-22s %8.2f %8.2f %8.2f %8.2f\n", "ratio", ours.at(0.5) / theirs.at(0.5),
+              ours.at(0.9) / theirs.at(0.9), ours.at(0.99) / theirs.at(0.99),
+              ours.at(0.999) / theirs.at(0.999));
+  std::printf("beltgripd took %.1f %% of one processor and %s at its peak",
+              100.0 * (spent.processor_s - before_it.processor_s) / took_s, spent.peak.c_str());
+  if (calls > 0.0) std::printf("; %.2f system calls a frame of the rig", calls);
+  if (full && calls == 0.0) std::printf("; its system calls are not counted: no strace here");
+  std::printf("\n");
   const std::size_t own = daemon.err().find("latency: ");
   std::printf("of itself beltgripd says: %s\n",
               daemon.err().substr(own, daemon.err().find('\n', own) - own).c_str());

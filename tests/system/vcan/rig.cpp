@@ -23,8 +23,10 @@ std::string write_rig_config(const std::string& folder, const std::string& inter
   return path;
 }
 
-std::string write_steady_log(const std::string& folder) {
-  const std::string path = folder + "/steady.log";
+namespace {
+
+// foreign: frames behind those of each sample, evenly until the next.
+void write_second(const std::string& path, int foreign) {
   std::ofstream log(path);
   char stamp[32];
   for (int i = 0; i < 200; ++i) {
@@ -33,8 +35,26 @@ std::string write_steady_log(const std::string& folder) {
     log << stamp << "110#3E808B6000000000\n"
         << stamp << "120#C40900000000\n"
         << stamp << "130#A00FA00F0000\n";
+    for (int k = 1; k <= foreign; ++k) {
+      std::snprintf(stamp, sizeof stamp, "(%d.%06d) vcan0 ", 0,
+                    i * 5000 + k * 5000 / (foreign + 1));
+      log << stamp << std::hex << 0x400 + (i * foreign + k) % 64 << std::dec
+          << "#0123456789ABCDEF\n";
+    }
   }
-  return path;
+}
+
+}  // namespace
+
+std::string write_steady_log(const std::string& folder) {
+  write_second(folder + "/steady.log", 0);
+  return folder + "/steady.log";
+}
+
+std::string write_full_log(const std::string& folder) {
+  constexpr int kForeign = 17;  // beside the rig's 3: 20 in 5 ms
+  write_second(folder + "/full.log", kForeign);
+  return folder + "/full.log";
 }
 
 std::vector<std::string> canplayer(const std::string& log, const std::string& interface,

@@ -19,6 +19,8 @@ std::string write_rig_config(const std::string& folder, const std::string& inter
 // Writes one second of the rig's frames at a steady operating point, without macro-slip, as a
 // candump log of vcan0. Returns its path.
 std::string write_steady_log(const std::string& folder);
+// The same on a full bus: 4,000 frames a second, all others with identifiers that nobody asked for.
+std::string write_full_log(const std::string& folder);
 
 // canplayer, playing a log of vcan0 to `interface`, once or for ever.
 std::vector<std::string> canplayer(const std::string& log, const std::string& interface,
