@@ -277,6 +277,13 @@ std::string csv_cell(const std::string& text) {
   return quoted + '"';
 }
 
+// Mostly one: that is sooner done than a call.
+char* write_commas(char* out, std::size_t count) {
+  if (count != 1) return std::fill_n(out, count, ',');
+  *out = ',';
+  return out + 1;
+}
+
 class CsvFrames : public FrameWriter {
  public:
   CsvFrames(std::span<const ChosenMessage* const> messages, bool with_raw) : with_raw_(with_raw) {
@@ -302,11 +309,11 @@ class CsvFrames : public FrameWriter {
     std::size_t column = 0;
     frame.values.for_each_present([&](std::size_t i) {
       const std::size_t next = frame.message.columns[i] + std::size_t{1};
-      at = std::fill_n(at, next - column, ',');
+      at = write_commas(at, next - column);
       column = next;
       at = write_cell(frame, i, at);
     });
-    at = std::fill_n(at, columns_ - column, ',');
+    at = write_commas(at, columns_ - column);
     *at++ = '\n';
     out.append(row_.data(), at);
   }
