@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/signal/slow_noise.h"
+
 namespace beltgrip::estimator {
 namespace {
 
@@ -15,6 +17,7 @@ constexpr std::size_t kShortest = 4, kLongest = 128;  // cells on either side
 constexpr double kDeviations = 4.5;
 constexpr double kStudent = 2.0 * (kDeviations * kDeviations + 1.0) / 4.0;
 constexpr double kFewestSquares = 6.0;
+constexpr double kWhite_s = 0.2;             // longer means scatter by the slow error too
 constexpr double kShare = 0.03;              // of the value
 constexpr double kQuietSlip_percent = 0.15;  // slip that moves by less carries no other torque,
 constexpr double kFaster = 3.0;  // unless it grows faster by so many deviations: some inertia is
@@ -39,8 +42,8 @@ StepWatch::Means StepWatch::means(std::size_t from, std::size_t to) const noexce
   return {share * (late.value - early.value), share * (late.slip - early.slip)};
 }
 
-bool StepWatch::step(double value, double slip_percent, double slip_noise,
-                     const Trend& trend) noexcept {
+bool StepWatch::step(double value, double slip_percent, double slip_noise, const Trend& trend,
+                     double slow_variance) noexcept {
   sum_.value += value / per_cell_;
   sum_.slip += slip_percent / per_cell_;
   if (++filled_ < per_cell_) return false;
@@ -68,11 +71,12 @@ bool StepWatch::step(double value, double slip_percent, double slip_noise,
     if (change * before.value < 0.0 && faster > kFaster * std::sqrt(6.0 * slip_noise / length_s)) {
       continue;
     }
-    const double deviation = std::sqrt(2.0 * trend.density(length_s) / length_s);
-    if (std::abs(change) > deviations * deviation &&
-        std::abs(change) > kShare * std::abs(before.value)) {
-      return true;
-    }
+    if (!(std::abs(change) > kShare * std::abs(before.value))) continue;
+    const double apart_s = kCell_s * static_cast<double>(apart);
+    const double variance = std::max(2.0 * trend.density(length_s) / length_s,
+                                     2.0 * trend.density(kWhite_s) / length_s +
+                                         slow_variance * slow_variance_of_step(length_s, apart_s));
+    if (std::abs(change) > deviations * std::sqrt(variance)) return true;
   }
   return false;
 }

@@ -9,7 +9,9 @@ namespace {
 
 constexpr double kFinestCell_s = 0.01;
 constexpr std::size_t kTrendCells = 4096;  // 205 s
-constexpr double kLowered = 0.99;          // of the first clamp force
+// Cells of the torque's trend. Derived: the slow error shows in means of that many and more.
+constexpr std::size_t kSlowEvery = 8;
+constexpr double kLowered = 0.99;  // of the first clamp force
 constexpr double kSmooth_s = 0.1;
 constexpr double kRaised = 1.05;  // of the lowest clamp force, and beyond so many deviations
 constexpr double kRaisedDeviations = 5.0;
@@ -32,6 +34,7 @@ void ExperimentRecord::reset() noexcept {
   omega_p_.reset();
   slip_speed_.reset();
   force_line_ = torque_line_ = {};
+  torque_slow_variance_ = 0.0;
   torque_watch_.reset();
   held_count_ = 0;
   last_held_s_ = 0.0;
@@ -66,6 +69,7 @@ bool ExperimentRecord::step(const Cell& sample) noexcept {
   if (force_.step(sample.t_s, sample.clamp_force_N, 0.0)) force_line_ = force_.line();
   if (torque_.step(sample.t_s, sample.torque_Nm, slip)) {
     torque_line_ = torque_.line();
+    if (held_count_ % kSlowEvery == 0) torque_slow_variance_ = torque_.slow_variance();
     last_held_s_ = sample.t_s;
     held_[held_count_++ % held_.size()] = {
         torque_line_.at(last_held_s_), torque_line_.variance_at(last_held_s_), torque_line_.valid};
@@ -77,7 +81,8 @@ bool ExperimentRecord::step(const Cell& sample) noexcept {
     if (first_force_N_ <= 0.0) first_force_N_ = force_N;
     lowered_ = force_N < kLowered * first_force_N_;
   }
-  if (lowered_ && torque_watch_.step(sample.torque_Nm, slip, slip_noise(), torque_)) {
+  if (lowered_ &&
+      torque_watch_.step(sample.torque_Nm, slip, slip_noise(), torque_, torque_slow_variance_)) {
     torque_stepped_s_ = std::min(torque_stepped_s_, sample.t_s);
   }
   omega_p_.step(sample.t_s, sample.omega_p_rad_s, 0.0);

@@ -35,6 +35,8 @@ class ExperimentRecord {
   // Noise of the channels, as densities (variance of the mean over one second), without what is
   // true variation.
   double torque_noise() const noexcept { return torque_.density(kNoiseScale_s); }
+  // Variance of the error that readings of the torque close in time share.
+  double torque_slow_variance() const noexcept { return torque_slow_variance_; }
   // A shaft's speed is read with the same error at any speed; slip, which divides by it, is not.
   double slip_noise() const noexcept {
     return slip_speed_.density(kNoiseScale_s) / (last_omega_rad_s_ * last_omega_rad_s_);
@@ -67,6 +69,7 @@ class ExperimentRecord {
   Trend force_, torque_, omega_p_;
   Trend slip_speed_;  // slip times speed
   Line force_line_, torque_line_;
+  double torque_slow_variance_ = 0.0;
   std::vector<Held> held_;  // at the end of each cell of the torque's trend
   std::size_t held_count_ = 0;
   double last_held_s_ = 0.0;

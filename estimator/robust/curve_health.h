@@ -20,19 +20,35 @@ inline constexpr double kDeformation_percent_per_N = 2e-4;
 struct CurveSums {
   double weight = 0.0;                         // 1 / variance of mu
   double slip = 0.0, mu = 0.0, force_N = 0.0;  // times weight
+  double t_s = 0.0;                            // times duration
   double duration_s = 0.0;
 };
 
-// By how many deviations a group of `length` points lies below the chord of the groups before and
-// after it, at most. Noise of slip (a density) and deformation, which moves the slip with the
-// force, count as deviations. sums: one more than points.
-double below_chord(std::span<const CurveSums> sums, std::size_t length, double slip_noise) noexcept;
+// What is known of the errors, beside the points' own variance.
+struct SharedErrors {
+  double slip_noise = 0.0;     // of slip, a density
+  double slow_relative = 0.0;  // variance of the slow error of mu*, relative (slow_noise.h)
+};
 
-// Normalised residuals in the order of time.
+// By how many deviations a group of `length` points lies below the chord of the groups before and
+// after it, at most. Deformation, which moves the slip with the force, counts as deviation. sums:
+// one more than points.
+double below_chord(std::span<const CurveSums> sums, std::size_t length,
+                   const SharedErrors& errors) noexcept;
+
+struct Residual {
+  double t_s = 0.0;
+  double value = 0.0, variance = 0.0;  // of mu, without what the slow error adds
+  double slow_variance = 0.0;
+};
+// In the order of time, made free of the slow error that neighbours share: each becomes what a
+// Kalman filter did not expect, divided by its deviation.
+void whiten(std::span<Residual> residuals) noexcept;
+// Whitened residuals in the order of time.
 struct ResidualTests {
   double innovation = 0.0;  // largest mean of neighbours, in its deviations
   double runs = 0.0;        // deviations by which there are too few changes of sign
 };
-ResidualTests test_residuals(std::span<const double> residuals) noexcept;
+ResidualTests test_residuals(std::span<const Residual> residuals) noexcept;
 
 }  // namespace beltgrip::estimator

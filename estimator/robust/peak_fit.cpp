@@ -185,7 +185,8 @@ bool PeakFit::step() noexcept {
       do {
         result_.below_chord = std::max(
             result_.below_chord,
-            below_chord({health_sums_.data(), health_count_}, next_, record_->slip_noise()));
+            below_chord({health_sums_.data(), health_count_}, next_,
+                        {.slip_noise = record_->slip_noise(), .slow_relative = slow_relative()}));
         next_ *= 2;
       } while (next_ > 4 && next_ <= kLargestGroup);
       if (next_ > kLargestGroup) go_to(Stage::kResiduals);
@@ -744,6 +745,7 @@ void PeakFit::sum_for_health() noexcept {
                                      .slip = before.slip + w * point.slip,
                                      .mu = before.mu + w * point.mu,
                                      .force_N = before.force_N + w * point.force_N,
+                                     .t_s = before.t_s + point.t_s * point.duration_s,
                                      .duration_s = before.duration_s + point.duration_s};
   }
 }
@@ -771,6 +773,11 @@ bool PeakFit::slip_moves(double until_s) const noexcept {
   return moved(&Half::slip) > kDeformation_percent_per_N * moved(&Half::force_N);
 }
 
+// Variance of mu* by the torque's slow error.
+double PeakFit::slow_relative() const noexcept {
+  return record_->torque_slow_variance() / square(record_->torque_line().value);
+}
+
 void PeakFit::test_best_form() noexcept {
   const auto fitted_at = [this](double x) {
     const Eigen::Vector4d terms(1.0, -best_rise_.at(x), -x, -std::max(0.0, x - best_corner_));
@@ -778,15 +785,20 @@ void PeakFit::test_best_form() noexcept {
   };
   const double until_s = tested_until_s();
   if (!slip_moves(until_s)) return;
+  const double slow = slow_relative();
   std::size_t used = 0;
   for (std::size_t i = first_; i < point_count_ && points_[i].t_s < until_s; ++i) {
     const Point& point = points_[i];
     const double fitted = fitted_at(point.slip - slip_high_);
     // Further down deformation makes of it what is no function of slip any more.
     if (fitted < kNearTop * result_.mu) continue;
-    residuals_[used++] = (point.mu - fitted) / std::sqrt(point.variance + point.force_variance +
-                                                         square(kFormTolerance * fitted));
+    residuals_[used++] = {
+        .t_s = point.t_s,
+        .value = point.mu - fitted,
+        .variance = point.variance + point.force_variance + square(kFormTolerance * fitted),
+        .slow_variance = slow * square(fitted)};
   }
+  whiten({residuals_.data(), used});
   result_.residuals = test_residuals({residuals_.data(), used});
 }
 

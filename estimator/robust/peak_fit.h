@@ -143,6 +143,7 @@ class PeakFit {
   double tested_until_s() const noexcept;
   void sum_for_health() noexcept;
   bool slip_moves(double until_s) const noexcept;
+  double slow_relative() const noexcept;
   void test_best_form() noexcept;
   double speed_at_edge(std::size_t cell, double& t_s, double& weight_s) const noexcept;
 
@@ -182,7 +183,7 @@ class PeakFit {
   Rise best_rise_;
   Eigen::Vector4d best_theta_ = Eigen::Vector4d::Zero();
   double best_corner_ = 0.0;
-  std::vector<double> residuals_;
+  std::vector<Residual> residuals_;
   PeakFitResult result_;
 };
 

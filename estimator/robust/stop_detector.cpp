@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/signal/slow_noise.h"
 #include "estimator/statistics/square.h"
 
 namespace beltgrip::estimator {
@@ -16,20 +17,6 @@ constexpr double kSmallestLevelSlip = 0.5;  // percent: slip taken for elasticit
 constexpr double kQuietDeviation = 0.05;    // percent: noise of the smallest slip at most
 constexpr double kSettle_s = 1.2;           // load is being taken up: no slope before
 constexpr double kTiny = 1e-12;
-
-// Weighted over tau = 0..1, the window from begin to end.
-struct Weights {
-  Eigen::Vector2d value;
-  Eigen::Vector2d derivative;  // by tau
-};
-
-Weights sensor_weights(double tau) { return {{1.0, tau * tau}, {0.0, 0.0}}; }
-
-Weights engine_weights(double tau) {
-  const double rest = 1.0 - tau;
-  return {{tau * rest * rest, tau * tau * rest},
-          {1.0 - 4.0 * tau + 3.0 * tau * tau, 2.0 * tau - 3.0 * tau * tau}};
-}
 
 struct Known {
   double value, variance;
@@ -51,6 +38,16 @@ Known torque_at_begin(const ExperimentRecord& record, double begin_s, const Know
 
 }  // namespace
 
+StopDetector::Weights StopDetector::sensor_weights(double tau) noexcept {
+  return {{1.0, tau * tau}, {0.0, 0.0}};
+}
+
+StopDetector::Weights StopDetector::engine_weights(double tau) noexcept {
+  const double rest = 1.0 - tau;
+  return {{tau * rest * rest, tau * tau * rest},
+          {1.0 - 4.0 * tau + 3.0 * tau * tau, 2.0 * tau - 3.0 * tau * tau}};
+}
+
 StopDetector::StopDetector(const StopThresholds& limits) : limits_(limits) {
   const auto fill = [](MomentTable& table, Weights (*weights)(double)) {
     for (std::size_t n = 1; n < table.size(); ++n) {
@@ -64,16 +61,39 @@ StopDetector::StopDetector(const StopThresholds& limits) : limits_(limits) {
   };
   fill(sensor_moments_, sensor_weights);
   fill(engine_moments_, engine_weights);
-}
-
-void StopDetector::reset(double traction_per_Nm_N, double inertia_kg_m2) noexcept {
-  c_ = traction_per_Nm_N;
-  inertia_ = inertia_kg_m2;
   double window = kShortestWindow_s;
   for (double& w : window_s_) {
     w = window;
     window *= kWindowFactor;
   }
+  fill_slow(sensor_slow_, sensor_weights);
+  fill_slow(engine_slow_, engine_weights);
+}
+
+void StopDetector::fill_slow(SlowTable& table, Weights (*weights)(double)) const noexcept {
+  for (std::size_t window = 0; window < window_s_.size(); ++window) {
+    // Each half of so many parts: the time before, then the window.
+    constexpr std::size_t kParts = 40;
+    const double faded = std::exp(-window_s_[window] / (kSlowTime_s * double{kParts}));
+    Eigen::Vector3d recent = Eigen::Vector3d::Zero();  // sum of earlier weights, faded
+    table[window].setZero();
+    for (std::size_t i = 0; i < 2 * kParts; ++i) {
+      Eigen::Vector3d w = Eigen::Vector3d::UnitX();
+      if (i >= kParts) {
+        const double tau = (static_cast<double>(i - kParts) + 0.5) / double{kParts};
+        w << 0.0, weights(tau).value;
+      }
+      w /= double{kParts};
+      recent *= faded;
+      table[window] += w * w.transpose() + w * recent.transpose() + recent * w.transpose();
+      recent += w;
+    }
+  }
+}
+
+void StopDetector::reset(double traction_per_Nm_N, double inertia_kg_m2) noexcept {
+  c_ = traction_per_Nm_N;
+  inertia_ = inertia_kg_m2;
   turn_ = 0;
   smallest_slip_ = 1e9;
   slope_ = 0.0;
@@ -82,8 +102,9 @@ void StopDetector::reset(double traction_per_Nm_N, double inertia_kg_m2) noexcep
 }
 
 StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
-                                             double window_s) const noexcept {
+                                             std::size_t window) const noexcept {
   Slope out;
+  const double window_s = window_s_[window];
   const History& history = record.history();
   std::size_t level = 0;
   while (level + 1 < History::kLevels &&
@@ -196,14 +217,21 @@ StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
     m_1 = c_ * torque.value / F_1;
     m_1_variance = torque.variance + std::max(0.0, square(torque_turn) - 4.0 * density / W);
   }
-  m_1_variance = m_1_variance * square(c_ / F_1) + kTiny * square(m_1);
-  N.diagonal() += kTiny * (y.cwiseAbs2() + Eigen::Vector2d::Constant(kTiny));
-  const Eigen::Matrix2d weighted = A.transpose() * N.inverse();
-  Eigen::Matrix2d information = weighted * A;
-  Eigen::Vector2d right = weighted * y;
-  information(0, 0) += 1.0 / m_1_variance;
-  right(0) += m_1 / m_1_variance;
-  const Eigen::Matrix2d covariance = information.inverse();
+  m_1_variance *= square(c_ / F_1);
+  // Of what is known from before and of the two moments.
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  spread(0, 0) = m_1_variance;
+  spread.bottomRightCorner<2, 2>() = N;
+  const Eigen::Vector3d per_Nm(c_ / F_1, c_ * n, c_ * n);
+  spread += record.torque_slow_variance() * per_Nm.asDiagonal() *
+            (engine ? engine_slow_ : sensor_slow_)[window] * per_Nm.asDiagonal();
+  const Eigen::Vector3d seen(m_1, y(0), y(1));
+  spread.diagonal() += kTiny * (seen.cwiseAbs2() + Eigen::Vector3d::Constant(kTiny));
+  Eigen::Matrix<double, 3, 2> known;
+  known << 1.0, 0.0, A;
+  const Eigen::Matrix<double, 2, 3> weighted = known.transpose() * spread.inverse();
+  const Eigen::Matrix2d covariance = (weighted * known).inverse();
+  const Eigen::Vector2d right = weighted * seen;
   out.k = (covariance * right)(1);
 
   const double mu_1 = c_ * T_1 / F_1;
@@ -272,7 +300,7 @@ StopReason StopDetector::step(const ExperimentRecord& record) noexcept {
     // Long windows change slowly: each in its turn.
     const std::size_t every = window_s_[i] < 0.4 ? 1 : window_s_[i] < 1.6 ? 4 : 16;
     if ((turn_ + i) % every != 0) continue;
-    const Slope slope = slope_over(record, window_s_[i]);
+    const Slope slope = slope_over(record, i);
     if (!slope.valid) continue;
     seen_ = true;
     if (std::abs(slope.gained - 0.5) < nearest) {

@@ -76,6 +76,13 @@ class StopDetector {
   double smallest_slip_percent() const noexcept { return smallest_slip_; }
 
  private:
+  // Weighted over tau = 0..1, the window from begin to end.
+  struct Weights {
+    Eigen::Vector2d value;
+    Eigen::Vector2d derivative;  // by tau
+  };
+  static Weights sensor_weights(double tau) noexcept;
+  static Weights engine_weights(double tau) noexcept;
   static constexpr int kWindows = 30;            // 0.12 s * 1.3^n: up to 4 min
   static constexpr std::size_t kMostCells = 40;  // in a window
   // Sums over the cells of a window: of the weights, of their products, of those of their
@@ -86,6 +93,10 @@ class StopDetector {
     Eigen::Matrix2d derivative = Eigen::Matrix2d::Zero();
   };
   using MomentTable = std::array<Moments, kMostCells + 1>;
+  // Covariance of the torque's slow error, where its variance is 1, in each window: of its mean
+  // over as long a time before, and of its two weighted means within.
+  using SlowTable = std::array<Eigen::Matrix3d, kWindows>;
+  void fill_slow(SlowTable& table, Weights (*weights)(double)) const noexcept;
   struct Slope {
     bool valid = false;
     double gained = 0.0;
@@ -95,12 +106,13 @@ class StopDetector {
     double level = 0.0;                       // slope that counts as level
     double duration_s = 0.0;
   };
-  Slope slope_over(const ExperimentRecord& record, double window_s) const noexcept;
+  Slope slope_over(const ExperimentRecord& record, std::size_t window) const noexcept;
   void update_smallest_slip(const ExperimentRecord& record) noexcept;
   StopReason backup(const ExperimentRecord& record) const noexcept;
 
   StopThresholds limits_;
   MomentTable sensor_moments_, engine_moments_;
+  SlowTable sensor_slow_, engine_slow_;
   double c_ = 0.0;
   double inertia_ = 0.0;
   std::array<double, kWindows> window_s_{};

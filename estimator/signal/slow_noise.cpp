@@ -24,10 +24,17 @@ double slow_variance_of_mean(double length_s) noexcept {
   return variance(std::max(kShortest, length_s / kSlowTime_s));
 }
 
+double slow_covariance_of_means(double a_s, double b_s, double apart_s) noexcept {
+  const auto mean = [](double length_s) {
+    const double half = std::max(kShortest, 0.5 * length_s / kSlowTime_s);
+    return std::sinh(half) / half;
+  };
+  return mean(a_s) * mean(b_s) * std::exp(-apart_s / kSlowTime_s);
+}
+
 double slow_variance_of_step(double length_s, double apart_s) noexcept {
-  const double length = std::max(kShortest, length_s / kSlowTime_s);
-  const double gap = std::max(0.0, apart_s - length_s) / kSlowTime_s;
-  return 2.0 * (variance(length) - covariance(length, 1) * std::exp(-gap));
+  return 2.0 * (slow_variance_of_mean(length_s) -
+                slow_covariance_of_means(length_s, length_s, std::max(apart_s, length_s)));
 }
 
 double slow_variance(std::span<const Scatter> scatter, double white_density) noexcept {

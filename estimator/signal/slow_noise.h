@@ -12,7 +12,10 @@ inline constexpr double kSlowTime_s = 1.2;
 
 // Of a mean over this time, for an error of variance 1.
 double slow_variance_of_mean(double length_s) noexcept;
-// And of the difference of two such means that begin `apart_s` after each other, at least a length.
+// Covariance of two such means over times that do not overlap, whose middles are this far apart.
+double slow_covariance_of_means(double a_s, double b_s, double apart_s) noexcept;
+// Variance of the difference of two means of one length that begin `apart_s` after each other, at
+// least a length.
 double slow_variance_of_step(double length_s, double apart_s) noexcept;
 
 // How second differences of neighbouring means scatter, divided by 6: white noise gives the

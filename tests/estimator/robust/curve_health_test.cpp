@@ -30,7 +30,8 @@ std::vector<CurveSums> sums_of(double (*curve)(double), std::uint64_t seed) {
     const double weight = 1.0 / (kNoise * kNoise);
     const CurveSums& before = sums.back();
     sums.push_back({before.weight + weight, before.slip + weight * slip, before.mu + weight * mu,
-                    before.force_N + weight * 3000.0, before.duration_s + 0.05});
+                    before.force_N + weight * 3000.0, before.t_s + 0.05 * 0.05 * (i + 0.5),
+                    before.duration_s + 0.05});
   }
   return sums;
 }
@@ -39,7 +40,7 @@ double largest(double (*curve)(double), std::uint64_t seed) {
   double out = 0.0;
   const std::vector<CurveSums> sums = sums_of(curve, seed);
   for (std::size_t length = 1; length <= 16; length *= 2) {
-    out = std::max(out, below_chord(sums, length, 1e-8));
+    out = std::max(out, below_chord(sums, length, {.slip_noise = 1e-8}));
   }
   return out;
 }
@@ -62,20 +63,79 @@ TEST(CurveHealth, AStepOfTorqueOrSlipIsNot) {
   }
 }
 
+// An error that wanders (Ornstein-Uhlenbeck), one value each 50 ms.
+std::vector<double> wandering(std::size_t count, double deviation, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  const double faded = std::exp(-0.05 / 1.2);
+  std::vector<double> out(count);
+  double now = normal(random);
+  for (double& each : out) {
+    each = deviation * now;
+    now = faded * now + std::sqrt(1.0 - faded * faded) * normal(random);
+  }
+  return out;
+}
+
+TEST(CurveHealth, AnErrorThatWandersLeavesTheChord) {
+  int known = 0, unknown = 0, stepped = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    std::mt19937_64 random(seed);
+    for (const double step : {0.0, 0.4}) {
+      const std::vector<double> slow = wandering(100, 0.05, random);
+      std::vector<CurveSums> sums =
+          sums_of([](double slip) { return 0.1 * std::tanh(slip); }, seed);
+      double wandered = 0.0;
+      for (std::size_t i = 1; i < sums.size(); ++i) {
+        const double mu = (sums[i].mu - sums[i - 1].mu + wandered) * kNoise * kNoise;
+        wandered += mu * (slow[i - 1] + (i > 50 ? step : 0.0)) / (kNoise * kNoise);
+        sums[i].mu += wandered;
+      }
+      double with = 0.0, without = 0.0;
+      for (std::size_t length = 1; length <= 16; length *= 2) {
+        with = std::max(with, below_chord(sums, length, {1e-8, 0.05 * 0.05}));
+        without = std::max(without, below_chord(sums, length, {1e-8, 0.0}));
+      }
+      (step > 0.0 ? stepped : known) += with > 5.5;
+      unknown += step > 0.0 ? 0 : without > 5.5;
+    }
+  }
+  EXPECT_LE(known, 1);
+  EXPECT_GE(unknown, 50);
+  EXPECT_GE(stepped, 90);
+}
+
+std::vector<Residual> residuals_of(const std::vector<double>& values, double slow_variance) {
+  std::vector<Residual> out;
+  for (const double each : values) {
+    out.push_back({0.05 * static_cast<double>(out.size()), each, 1.0, slow_variance});
+  }
+  whiten(out);
+  return out;
+}
+
 TEST(CurveHealth, ResidualsOfNoiseAreNoneOfACurve) {
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
-  int rejected = 0;
+  int rejected = 0, wandering_rejected = 0, not_known = 0;
+  const auto rejects = [](const ResidualTests& tests) {
+    return tests.innovation > 5.0 || tests.runs > 4.5;
+  };
   for (int i = 0; i < 1000; ++i) {
     std::vector<double> residuals(64);
     for (double& each : residuals) each = normal(random);
-    const ResidualTests tests = test_residuals(residuals);
-    rejected += tests.innovation > 5.0 || tests.runs > 4.5;
+    rejected += rejects(test_residuals(residuals_of(residuals, 0.0)));
+    std::vector<double> wandered = wandering(64, 3.0, random);
+    for (std::size_t k = 0; k < residuals.size(); ++k) wandered[k] += residuals[k];
+    wandering_rejected += rejects(test_residuals(residuals_of(wandered, 9.0)));
+    not_known += rejects(test_residuals(residuals_of(wandered, 0.0)));
     for (std::size_t k = 0; k < residuals.size(); ++k) residuals[k] += k < 32 ? 1.5 : -1.5;
-    EXPECT_GT(test_residuals(residuals).innovation, 5.0);
-    EXPECT_GT(test_residuals(residuals).runs, 1.0);
+    const ResidualTests stepped = test_residuals(residuals_of(residuals, 0.0));
+    EXPECT_GT(stepped.innovation, 5.0);
+    EXPECT_GT(stepped.runs, 1.0);
   }
   EXPECT_LE(rejected, 3);
+  EXPECT_LE(wandering_rejected, 3);
+  EXPECT_GE(not_known, 900);
 }
 
 TEST(StepWatch, SeesAStepAndNoDriftAndNoneWhereSlipMoves) {
@@ -89,7 +149,7 @@ TEST(StepWatch, SeesAStepAndNoDriftAndNoneWhereSlipMoves) {
       const double t = i / 200.0;
       const double value = torque(t) + 0.3 * normal(random);
       trend.step(t, value, slip(t));
-      seen |= watch.step(value, slip(t), 1e-6, trend);
+      seen |= watch.step(value, slip(t), 1e-6, trend, 0.0);
     }
     return seen;
   };
@@ -107,6 +167,33 @@ TEST(StepWatch, SeesAStepAndNoDriftAndNoneWhereSlipMoves) {
   EXPECT_TRUE(steps(down, still));
   EXPECT_FALSE(steps(down, creeps));
   EXPECT_TRUE(steps(up, creeps));
+}
+
+TEST(StepWatch, ATorqueWhoseErrorWandersDoesNotStep) {
+  // Of 40 recordings of a minute.
+  const auto stepping = [](double step_Nm, double slow_variance) {
+    int seen = 0;
+    for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+      std::mt19937_64 random(seed);
+      std::normal_distribution<double> normal;
+      StepWatch watch(200.0);
+      Trend trend(200.0, 4096);
+      const double faded = std::exp(-1.0 / (200.0 * 1.2));
+      double slow = normal(random);
+      bool stepped = false;
+      for (int i = 0; i < 12000; ++i) {
+        slow = faded * slow + std::sqrt(1.0 - faded * faded) * normal(random);
+        const double value = 25.0 + 0.8 * slow + 1.5 * normal(random) + (i < 6000 ? 0.0 : step_Nm);
+        trend.step(i / 200.0, value, 0.3);
+        stepped |= watch.step(value, 0.3, 1e-6, trend, slow_variance);
+      }
+      seen += stepped;
+    }
+    return seen;
+  };
+  EXPECT_LE(stepping(0.0, 0.64), 1);
+  EXPECT_GE(stepping(0.0, 0.0), 4);
+  EXPECT_GE(stepping(6.0, 0.64), 38);
 }
 
 // The clamp force stays about where it counts as lowered, and the torque swings: read only while

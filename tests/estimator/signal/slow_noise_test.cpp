@@ -38,6 +38,10 @@ TEST(SlowNoise, OfAMeanAndOfAStep) {
     }
   }
   EXPECT_NEAR(slow_variance_of_mean(0.0), 1.0, 1e-3);
+  EXPECT_NEAR(slow_covariance_of_means(0.8, 0.8, 1.3), covariance(0.8, 1.3), 1e-3);
+  // A mean over 1.6 s is that of its two halves.
+  EXPECT_NEAR(slow_covariance_of_means(1.6, 0.8, 2.0),
+              0.5 * (covariance(0.8, 1.6) + covariance(0.8, 2.4)), 1e-3);
 }
 
 // Second differences by the same sums: 6 V - 8 C_1 + 2 C_2.
