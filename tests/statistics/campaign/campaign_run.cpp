@@ -156,7 +156,8 @@ void judge_reactions(const CampaignCase& given, const LoopRun& run, CampaignVerd
 }  // namespace
 
 CampaignVerdict run_case(const CampaignCase& given) {
-  const LoopRun run = run_closed(given.scenario, configuration(given), given.seed);
+  const daemon::Config config = configuration(given);
+  const LoopRun run = run_closed(given.scenario, config, given.seed);
   CampaignVerdict verdict;
   verdict.seed = given.seed;
   verdict.base = given.base;
@@ -174,6 +175,13 @@ CampaignVerdict run_case(const CampaignCase& given) {
   judge_slip(given, run, verdict);
   judge_results(run, verdict);
   judge_reactions(given, run, verdict);
+  if (given.faults.empty() && config.trigger == daemon::Trigger::kCoastDown) {
+    verdict.reach =
+        reach_of(given.scenario,
+                 {config.experiment.secondary_pressure_floor_Pa,
+                  config.estimator.ramp_rate_max_N_per_s, config.experiment.fall_max_per_percent},
+                 given.seed);
+  }
   return verdict;
 }
 
@@ -195,6 +203,14 @@ std::string to_json(const CampaignVerdict& v) {
     out["at_once"] = {{"slip_percent", rounded(*v.at_once_slip_percent)},
                       {"energy_J", rounded(*v.at_once_energy_J)},
                       {"broken", v.broken_at_once}};
+  }
+  if (v.reach) {
+    out["reach"] = {{"wall", wall_name(v.reach->wall)},
+                    {"from_s", rounded(v.reach->from_s)},
+                    {"to_s", rounded(v.reach->to_s)},
+                    {"peak_slip_percent", rounded(v.reach->peak_slip_percent)},
+                    {"noise", kNoiseBandNames.at(static_cast<std::size_t>(v.reach->noise))},
+                    {"slip_noise_percent", rounded(v.reach->slip_noise_percent)}};
   }
   out["experiments"] = nlohmann::ordered_json::array();
   for (const CampaignVerdict::Experiment& each : v.experiments) {

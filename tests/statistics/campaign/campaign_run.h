@@ -8,6 +8,7 @@
 
 #include "tests/loop/closed_loop.h"
 #include "tests/statistics/campaign/campaign_case.h"
+#include "tests/statistics/campaign/reach.h"
 
 namespace beltgrip::test {
 
@@ -35,6 +36,7 @@ struct CampaignVerdict {
   // any reaction can.
   std::optional<double> at_once_slip_percent, at_once_energy_J;
   bool broken_at_once = false;  // and G1 is broken even then
+  std::optional<Reach> reach;   // of a coast-down with nothing wrong
   std::vector<Reaction> reactions;
   std::vector<std::string> violations;
 };

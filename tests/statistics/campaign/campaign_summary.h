@@ -10,7 +10,8 @@ namespace beltgrip::test {
 
 using CampaignResults = std::map<std::uint64_t, nlohmann::json>;  // by seed
 
-// Prints the figures; returns the number of cases that broke a promise.
+// Prints the figures; returns the number of cases that broke a promise, one more
+// where too few peaks in reach came to a value.
 int summarise(const CampaignResults& results);
 // The seeds of the largest slips that a request had a part in, worst first.
 std::vector<std::uint64_t> worst_seeds(const CampaignResults& results, std::size_t count);
