@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "daemon/core/input/stop_cause.h"
 #include "daemon/core/publish/names.h"
 #include "tools/sim/vehicle_scenario.h"
 
@@ -123,7 +124,10 @@ void judge_results(const LoopRun& run, CampaignVerdict& verdict) {
         result.end == result.start && result.outcome == daemon::Outcome::kInconclusive;
     out.outcome = refused ? "Refused" : daemon::outcome_name(result.outcome);
     out.stop_reason = daemon::stop_reason_name(result.stop_reason);
+    out.cause = daemon::cause_text(result.stop_reason, result.cause);
     const double start_s = static_cast<double>(result.start) * 1e-9;
+    out.begin_s = start_s;
+    out.end_s = static_cast<double>(result.end) * 1e-9;
     for (const sim::RequestTruth& request : run.requests) {
       if (result.outcome != daemon::Outcome::kCompleted ||
           std::abs(request.begin_s - start_s) > kSame_s) {
@@ -214,7 +218,11 @@ std::string to_json(const CampaignVerdict& v) {
   }
   out["experiments"] = nlohmann::ordered_json::array();
   for (const CampaignVerdict::Experiment& each : v.experiments) {
-    nlohmann::ordered_json row{{"outcome", each.outcome}, {"stop_reason", each.stop_reason}};
+    nlohmann::ordered_json row{{"outcome", each.outcome},
+                               {"stop_reason", each.stop_reason},
+                               {"cause", each.cause},
+                               {"from_s", rounded(each.begin_s)},
+                               {"to_s", rounded(each.end_s)}};
     if (each.mu_error_percent) {
       row["mu_error_percent"] = rounded(*each.mu_error_percent);
       row["covered"] = each.covered;

@@ -16,6 +16,8 @@ struct CampaignVerdict {
   struct Experiment {
     std::string outcome;  // "Refused": no request was made
     std::string stop_reason;
+    std::string cause;  // in words, with its figures
+    double begin_s = 0.0, end_s = 0.0;
     std::optional<double> mu_error_percent;  // completed
     bool covered = false;                    // and the interval holds the truth
   };
