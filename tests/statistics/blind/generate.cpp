@@ -43,8 +43,11 @@ int main(int argc, char** argv) {
           trial.planted.push_back(draw_effect(random, each, number(argv[i + 1])));
         }
       }
-      for (const std::string& each : outside_causes()) {
-        if (each == name) trial.planted.push_back(draw_outside(random, each, number(argv[i + 1])));
+      for (const auto* causes : {&outside_causes(), &further_causes()}) {
+        for (const std::string& each : *causes) {
+          if (each != name) continue;
+          trial.planted.push_back(draw_outside(random, each, number(argv[i + 1])));
+        }
       }
     }
   }

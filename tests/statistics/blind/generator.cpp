@@ -35,6 +35,7 @@ namespace {
 constexpr double kStep_s = 1e-3;
 constexpr double kCosTheta = 0.98162718344766398;  // cos 11 degrees
 constexpr double kArea_m2 = 0.0113;
+constexpr double kBeltLength_m = 0.703;
 constexpr double kSpring_N = 500.0;
 constexpr double kConfiguredInertia = 0.18;
 
@@ -125,7 +126,7 @@ class Experiment {
   double level_ = 0.0, seat_ = 0.0, zero_Nm_ = 0.0;
   double creep_ = 0.0;
   double temperature_C_ = 80.0;
-  double hidden_phase_ = 0.0;
+  double hidden_phase_ = 0.0, belt_phase_ = 0.0;
   double pressure_p_Pa_ = 0.0, torque_now_Nm_ = 0.0;
 };
 
@@ -149,6 +150,8 @@ double Experiment::friction_level(double t_s, double force_N, double omega_p, do
   mu *= 1.0 + fault_("x_friction_torque.size") * (std::abs(torque_now_Nm_) - 50.0) / 50.0;
   mu *= 1.0 +
         fault_("x_friction_speed_bump.size") * std::exp(-std::pow((omega_p - 150.0) / 25.0, 2.0));
+  mu *= 1.0 - std::abs(fault_("x_friction_dip.size")) *
+                  std::exp(-std::pow((temperature_C_ - 70.0) / 8.0, 2.0));
   mu *= 1.0 + fault_("x_friction_hidden.size") * std::sin(0.9 * t_s + hidden_phase_);
   static_cast<void>(omega_s);
   return mu;
@@ -163,6 +166,7 @@ double Experiment::ratio_now(double force_N, double torque_Nm) const {
            fault_("pulley_deformation.per_kN2") * kN * kN;
   ratio *= 1.0 - fault_("radius_tilt.per_Nm") * torque_Nm;
   ratio *= 1.0 + fault_("x_ratio_temperature.size") * (temperature_C_ - 80.0) / 50.0;
+  ratio *= 1.0 + fault_("x_belt_passage.size") * std::sin(belt_phase_);
   return ratio * std::exp(low ? creep_ : -creep_);
 }
 
@@ -350,6 +354,7 @@ History Experiment::run() {
     belt_before = belt_torque;
     energy_J += std::abs(belt_torque * slip) * omega_p * kStep_s;
     angle_p += omega_p * kStep_s;
+    belt_phase_ += 2.0 * std::numbers::pi * omega_p * radius / kBeltLength_m * kStep_s;
     angle_s += omega_s * kStep_s;
     h.omega_p.push(omega_p);
     h.omega_s.push(omega_s);
@@ -357,7 +362,8 @@ History Experiment::run() {
         pressure_wanted);  // without a command in the table, lag and delay come after it
     h.command.push(pressure_wanted);
     h.torque_p.push((torque_p + zero_Nm_) *
-                    (1.0 + fault_("x_gain_temperature.size") * (temperature_C_ - 80.0) / 50.0));
+                    (1.0 + fault_("x_gain_temperature.size") * (temperature_C_ - 80.0) / 50.0 +
+                     fault_("x_gain_speed.size") * (omega_p - 105.0) / 100.0));
     h.torque_s.push(load_s);
     h.temperature.push(temperature_C_);
     h.pressure_p.push(pressure_p_Pa_);
@@ -574,6 +580,13 @@ const std::vector<std::string>& outside_causes() {
   return kAll;
 }
 
+const std::vector<std::string>& further_causes() {
+  static const std::vector<std::string> kAll{"x_gain_temperature", "x_gain_speed",
+                                             "x_friction_dip",     "x_friction_between",
+                                             "x_force_ripple",     "x_belt_passage"};
+  return kAll;
+}
+
 Planted draw_effect(Random& random, const Plantable& what, double size) {
   Planted out;
   out.effect = what.effect;
@@ -600,6 +613,12 @@ Planted draw_outside(Random& random, const std::string& cause, double size) {
   if (cause == "x_ratio_temperature") typical = 3e-3;
   if (cause == "x_loss_temperature") typical = 2.5;
   if (cause == "x_friction_hidden") typical = 0.03;
+  if (cause == "x_friction_between") typical = 0.02;
+  if (cause == "x_force_ripple") {
+    typical = 0.02;
+    out.parameters["hz"] = random.uniform(1.0, 4.0);
+  }
+  if (cause == "x_belt_passage") typical = 1e-3;
   out.parameters["size"] = sign * size * typical;
   return out;
 }

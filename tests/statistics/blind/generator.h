@@ -94,9 +94,10 @@ struct Plantable {
 };
 const std::vector<Plantable>& plantables();
 inline constexpr int kLaterPlantables = 2;  // of them, the last
-// Drawn by the blind test; x_gain_temperature, x_friction_between and x_force_ripple are planted by
-// name alone.
+// Drawn by the blind test.
 const std::vector<std::string>& outside_causes();
+// Planted by name alone.
+const std::vector<std::string>& further_causes();
 Planted draw_effect(Random& random, const Plantable& what, double size);
 Planted draw_outside(Random& random, const std::string& cause, double size);
 
