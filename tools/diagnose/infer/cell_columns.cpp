@@ -118,8 +118,7 @@ std::vector<Summary> summaries_with(const Engine& engine, CellBase& base, const 
   return out;
 }
 
-// Directions of the function that the machine's constants could as well be, whatever their usual
-// values: the data say nothing of them.
+// A projection on the directions that the machine's constants leave.
 KnotSquare own_directions(const std::vector<Summary>& summaries, Index n) {
   MatrixXd total = MatrixXd::Zero(n + kCellKnots, n + kCellKnots);
   for (const Summary& each : summaries) {
@@ -210,7 +209,6 @@ CellColumns cell_columns(const Engine& engine, CellBase& base, const Abscissa& a
                          const InjectionRow& row) {
   CellColumns out;
   out.summaries = summaries_with(engine, base, abscissa, row);
-  out.filter = own_directions(out.summaries, static_cast<Index>(base.parameters.size()));
   return out;
 }
 
@@ -225,11 +223,19 @@ std::vector<CellScore> scores_of(const CellColumns& columns, const CellBase& bas
     score.log_likelihood -=
         present.dot(score.score) + 0.5 * present.dot(score.information * present);
     score.misfit += present.dot(score.score + whole);
-    score.information = columns.filter * score.information * columns.filter.transpose();
-    score.score = columns.filter * whole;
+    score.score = whole;
     out.push_back(std::move(score));
   }
   return out;
+}
+
+void keep_own(const CellColumns& columns, const CellBase& base, std::vector<CellScore>& scores) {
+  const KnotSquare own =
+      own_directions(columns.summaries, static_cast<Index>(base.parameters.size()));
+  for (CellScore& each : scores) {
+    each.information = own * each.information * own.transpose();
+    each.score = own * each.score;
+  }
 }
 
 VectorXd step_beside(const CellColumns& columns, const CellBase& base, const KnotVector& change,

@@ -22,7 +22,6 @@ CellBase cell_base(const Engine& engine);
 
 struct CellColumns {
   std::vector<Summary> summaries;  // per run of the base: parameters, knots, residual
-  KnotSquare filter;               // what of the function the machine's constants leave
 };
 // The base is used on the way and left as it was.
 CellColumns cell_columns(const Engine& engine, CellBase& base, const Abscissa& abscissa,
@@ -32,6 +31,12 @@ CellColumns cell_columns(const Engine& engine, CellBase& base, const Abscissa& a
 // whole function. left_out: runs that do not count.
 std::vector<CellScore> scores_of(const CellColumns& columns, const CellBase& base,
                                  const KnotVector& present, const std::vector<int>& left_out = {});
+
+// Takes out of the scores the directions of the function that the machine's constants could as well
+// be, whatever their usual values: what they say of those rests on priors alone. For judging
+// whether there is anything; in a fit, where both are free, priors share such a direction out, and
+// scores without it would move it a little further with every step.
+void keep_own(const CellColumns& columns, const CellBase& base, std::vector<CellScore>& scores);
 
 // Where the machine and the accepted effects go, scaled, when the function changes by so much.
 Eigen::VectorXd step_beside(const CellColumns& columns, const CellBase& base,

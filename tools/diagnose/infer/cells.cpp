@@ -39,6 +39,7 @@ std::vector<Cell> score_cells(const Engine& engine) {
       cell.injection = &row;
       cell.abscissa = *abscissa;
       cell.scores = scores_of(columns, base, KnotVector::Zero());
+      keep_own(columns, base, cell.scores);
       judge_cell(cell);
       out.push_back(std::move(cell));
     }

@@ -87,7 +87,8 @@ std::optional<Abscissa> abscissa_of(const Campaign& campaign, const IndexVariabl
     if (run.valid_count == 0) continue;
     const ArrayXd value = variable.value(run, static_cast<int>(e));
     if (value.size() == 0 || !value.allFinite()) return std::nullopt;
-    out.x.back() = low_passed(value, run.dt_s);
+    out.x.back() =
+        variable.learnable ? regressor(run, *variable.learnable) : low_passed(value, run.dt_s);
     const std::vector<double> here = valid_values(run, out.x.back());
     out.mean.back() =
         std::accumulate(here.begin(), here.end(), 0.0) / static_cast<double>(here.size());

@@ -64,12 +64,18 @@ ArrayXd recorded(const ExperimentData& run, LearnedVariable variable) {
   return run.torque.slow;
 }
 
+ArrayXd regressor(const ExperimentData& run, LearnedVariable variable) {
+  const ArrayXd value = recorded(run, variable);
+  const bool is_quiet =
+      variable == LearnedVariable::kPrimarySpeed || variable == LearnedVariable::kPrimaryPressure;
+  return is_quiet || value.size() == 0 ? value : low_passed(value, run.dt_s);
+}
+
 void apply_learned(Context& c, const estimator::LearnedTerm& term, Stage stage) {
   if (stage_of(term.point) != stage || term.count == 0) return;
-  const ArrayXd variable = recorded(c.run, term.variable);
+  const ArrayXd variable = regressor(c.run, term.variable);
   if (variable.size() == 0) return;
-  const ArrayXd by =
-      low_passed(variable, c.run.dt_s).unaryExpr([&](double x) { return term.at(x); });
+  const ArrayXd by = variable.unaryExpr([&](double x) { return term.at(x); });
   switch (term.point) {
     case LearnedPoint::kTorque:
       c.torque -= by;

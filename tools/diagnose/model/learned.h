@@ -15,6 +15,11 @@ Eigen::ArrayXd low_passed(const Eigen::ArrayXd& in, double dt_s);
 // What a function depends on, sample by sample, not yet low-passed; empty: not recorded.
 Eigen::ArrayXd recorded(const ExperimentData& run, estimator::LearnedVariable variable);
 
+// The same as the function sees it. Torque and oil temperature low-passed; the slow copies of speed
+// and primary pressure are not: their noise is far below what they cover, and a sweep of 9 s would
+// lose a sixth of its amplitude.
+Eigen::ArrayXd regressor(const ExperimentData& run, estimator::LearnedVariable variable);
+
 // Does what the term does at this stage; nothing where its variable is not recorded.
 void apply_learned(Context& context, const estimator::LearnedTerm& term, estimator::Stage stage);
 
