@@ -22,6 +22,9 @@ constexpr double kWhite_s = 0.2;            // longer means scatter by the slow 
 constexpr std::size_t kFirstSlowScale = 3;  // of 0.4 s
 constexpr double kMedianOfSquare = 0.455;   // of a normal variable with variance 1
 constexpr double kUnbounded = 1e100;
+// Weight of the newest in how slip follows the value. Chosen: along the curve slip follows by more
+// and more, so that a few differences count.
+constexpr double kFading = 0.4;
 
 }  // namespace
 
@@ -71,46 +74,54 @@ void Trend::add(double t_s, double value, double slip_percent) noexcept {
     scale.sum = scale.slip_sum = 0.0;
     scale.filled = 0;
     const bool quiet = std::abs(scale.slips[2] - scale.slips[0]) < kQuietSlip_percent;
-    if (++scale.count < 3 || (scale.squares_count > kEnough && !quiet)) continue;
-    // Of white noise the second difference has six times the variance of a mean.
-    const double second = scale.means[0] - 2.0 * scale.means[1] + scale.means[2];
-    scale.take(second * second / 6.0);
+    if (++scale.count < 3 || (scale.squares.count > kEnough && !quiet)) continue;
+    scale.take(scale.means[0] - 2.0 * scale.means[1] + scale.means[2],
+               scale.slips[0] - 2.0 * scale.slips[1] + scale.slips[2]);
   }
 }
 
-void Trend::Scale::take(double square) noexcept {
+void Trend::Squares::take(double square) noexcept {
   const int highest_bin = kLowestBin + static_cast<int>(bins.size()) - 1;
   const int bin = std::clamp(std::ilogb(square), kLowestBin, highest_bin) - kLowestBin;
-  first_bin = squares_count > 0.0 ? std::min(first_bin, bin) : bin;
-  last_bin = squares_count > 0.0 ? std::max(last_bin, bin) : bin;
+  first_bin = count > 0.0 ? std::min(first_bin, bin) : bin;
+  last_bin = count > 0.0 ? std::max(last_bin, bin) : bin;
   bins[static_cast<std::size_t>(bin)].count += 1.0;
   bins[static_cast<std::size_t>(bin)].sum += square;
-  squares_count += 1.0;
+  count += 1.0;
+}
+
+// The load that is taken up makes some squares large; half of them know nothing of it.
+double Trend::Squares::median() const noexcept {
+  double so_far = 0.0;
+  for (int k = first_bin; k <= last_bin; ++k) {
+    const Bin& each = bins[static_cast<std::size_t>(k)];
+    so_far += each.count;
+    if (so_far >= 0.5 * count && each.count > 0.0) return each.sum / each.count;
+  }
+  return 0.0;
+}
+
+void Trend::Scale::take(double second, double slip_second) noexcept {
+  // Of white noise the second difference has six times the variance of a mean.
+  squares.take(second * second / 6.0);
+  const double rest = slip_square > 0.0 ? second - slip_cross / slip_square * slip_second : second;
+  without_slip.take(rest * rest / 6.0);
+  slip_square += slip_second * slip_second - kFading * slip_square;
+  slip_cross += slip_second * second - kFading * slip_cross;
   // A corner of the course or a step (the load is taken up, a ramp begins or ends) is no noise:
   // what lies beyond kLargestSquare times the mean counts for no more, and the mean is without it.
   mean_square = kUnbounded;
   for (int i = 0; i < kCuts; ++i) {
     const double cut = kLargestSquare * mean_square;
     double cut_sum = 0.0;
-    for (int k = first_bin; k <= last_bin; ++k) {
-      const Bin& each = bins[static_cast<std::size_t>(k)];
+    for (int k = squares.first_bin; k <= squares.last_bin; ++k) {
+      const Squares::Bin& each = squares.bins[static_cast<std::size_t>(k)];
       cut_sum += std::min(each.sum, each.count * cut);
     }
     const double before = mean_square;
-    mean_square = cut_sum / squares_count;
+    mean_square = cut_sum / squares.count;
     if (mean_square > kSettled * before) return;
   }
-}
-
-// The load that is taken up makes some squares large; half of them know nothing of it.
-double Trend::Scale::median_square() const noexcept {
-  double so_far = 0.0;
-  for (int k = first_bin; k <= last_bin; ++k) {
-    const Bin& each = bins[static_cast<std::size_t>(k)];
-    so_far += each.count;
-    if (so_far >= 0.5 * squares_count && each.count > 0.0) return each.sum / each.count;
-  }
-  return 0.0;
 }
 
 double Trend::density(double over_s) const noexcept {
@@ -118,28 +129,32 @@ double Trend::density(double over_s) const noexcept {
   for (int i = 0; i < kScales; ++i) {
     const Scale& scale = scales_[static_cast<std::size_t>(i)];
     const double length_s = cell_s_ * (1 << i);
-    if (scale.squares_count < (i == 0 ? 1.0 : kEnough) || (i > 0 && length_s > over_s)) break;
+    if (scale.squares.count < (i == 0 ? 1.0 : kEnough) || (i > 0 && length_s > over_s)) break;
     largest = std::max(largest, scale.mean_square * length_s);
   }
   return largest;
 }
 
-double Trend::slow_variance() const noexcept {
+double Trend::slow_variance_of(Squares Scale::*squares) const noexcept {
   std::array<Scatter, kScales> scatter;
   std::size_t count = 0;
   for (std::size_t i = kFirstSlowScale; i < kScales; ++i) {
-    if (scales_[i].squares_count < kEnough) break;
+    const Squares& each = scales_[i].*squares;
+    if (each.count < kEnough) break;
     const double length_s = cell_s_ * static_cast<double>(std::size_t{1} << i);
-    scatter[count++] = {length_s, scales_[i].median_square() / kMedianOfSquare,
-                        scales_[i].squares_count};
+    scatter[count++] = {length_s, each.median() / kMedianOfSquare, each.count};
   }
   return estimator::slow_variance({scatter.data(), count}, density(kWhite_s));
+}
+
+double Trend::slow_variance() const noexcept {
+  return std::min(slow_variance_of(&Scale::squares), slow_variance_of(&Scale::without_slip));
 }
 
 double Trend::squares(double over_s) const noexcept {
   std::size_t i = 0;
   while (i + 1 < kScales && cell_s_ * static_cast<double>(std::size_t{1} << i) < over_s - 1e-9) ++i;
-  return scales_[i].squares_count;
+  return scales_[i].squares.count;
 }
 
 Line Trend::through(std::size_t begin, std::size_t end, double cell_variance) const noexcept {

@@ -46,7 +46,8 @@ class Trend {
   double density(double over_s) const noexcept;
   // How many differences of means over this time have been seen.
   double squares(double over_s) const noexcept;
-  // Variance of the error that readings close in time share (slow_noise.h).
+  // Variance of the error that readings close in time share (slow_noise.h): without variation that
+  // slip follows in proportion, which is the load's own.
   double slow_variance() const noexcept;
   double cell_s() const noexcept { return cell_s_; }
   // The longest line that ends now. Not valid before a few cells have come.
@@ -56,24 +57,32 @@ class Trend {
   struct Sums {  // of all cells before this one, relative to the first
     double t = 0.0, y = 0.0, tt = 0.0, ty = 0.0;
   };
+  struct Squares {
+    struct Bin {
+      double count = 0.0, sum = 0.0;
+    };
+    std::array<Bin, 64> bins{};  // by their power of two
+    int first_bin = 0, last_bin = 0;
+    double count = 0.0;
+    void take(double square) noexcept;
+    double median() const noexcept;
+  };
   struct Scale {  // second differences of means over 2^i cells
     double sum = 0.0, slip_sum = 0.0;
     int filled = 0;
     int count = 0;
     std::array<double, 3> means{};
     std::array<double, 3> slips{};
-    double squares_count = 0.0;
+    Squares squares;
     double mean_square = 0.0;
-    struct Bin {
-      double count = 0.0, sum = 0.0;
-    };
-    std::array<Bin, 64> bins{};  // squares by their power of two
-    int first_bin = 0, last_bin = 0;
-    void take(double square) noexcept;
-    double median_square() const noexcept;
+    // Without what the load's own variation makes of it, which slip follows.
+    Squares without_slip;
+    double slip_square = 0.0, slip_cross = 0.0;  // sums: of slip's differences, by the value's
+    void take(double second, double slip_second) noexcept;
   };
   static constexpr int kScales = 9;  // up to 256 cells
   void add(double t_s, double value, double slip_percent) noexcept;
+  double slow_variance_of(Squares Scale::*squares) const noexcept;
   const Sums& sums(std::size_t cell) const noexcept { return sums_[cell % sums_.size()]; }
   Line through(std::size_t begin, std::size_t end, double cell_variance) const noexcept;
   bool fits(const Line& line, std::size_t begin, std::size_t end,

@@ -87,5 +87,32 @@ TEST(SlowNoise, IsFoundInADrawnErrorAndNotInWhiteNoiseNorInTheTakingUpOfTheLoad)
   EXPECT_NEAR(sum, 0.4, 0.12);
 }
 
+// What wanders is the load, 0.4 Nm, and slip follows it; or it is the reading alone.
+double wandering(bool slip_follows, std::uint64_t seed) {
+  constexpr double kRate_hz = 200.0;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  Trend trend(kRate_hz, 4096);
+  const double keeps = std::exp(-1.0 / (kRate_hz * kTime_s));
+  double load_Nm = 0.4 * normal(random);
+  for (int i = 0; i < 40 * 200; ++i) {
+    const double t_s = i / kRate_hz;
+    load_Nm = keeps * load_Nm + 0.4 * std::sqrt(1.0 - keeps * keeps) * normal(random);
+    const double slip_percent = 1.0 + 0.02 * t_s + (slip_follows ? 0.03 * load_Nm : 0.0);
+    trend.step(t_s, 50.0 + load_Nm + 0.1 * normal(random), slip_percent + 0.002 * normal(random));
+  }
+  return std::sqrt(trend.slow_variance());
+}
+
+TEST(SlowNoise, IsNoLoadThatSlipFollows) {
+  double sum = 0.0;
+  constexpr int kSeeds = 10;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    EXPECT_LT(wandering(true, seed), 0.12) << seed;
+    sum += wandering(false, seed) / kSeeds;
+  }
+  EXPECT_GT(sum, 0.25);
+}
+
 }  // namespace
 }  // namespace beltgrip::estimator
