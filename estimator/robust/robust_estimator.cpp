@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "estimator/method/possible_friction.h"
 #include "estimator/physics/clamp_force.h"
@@ -252,14 +253,22 @@ class RobustEstimator final : public SlipCurveEstimator {
   }
 
   // What the curve may still rise by beyond the data, if they do not hold its top: as much as a
-  // power law of that slope, the friction that bends least, up to where friction counts.
-  static double further_rise(const PeakFitResult& fit) noexcept {
+  // power law of that slope, the friction that bends least, up to where friction counts. In drive
+  // what the clamp force deforms is read as slip: the belt may slip by less.
+  double further_rise(const PeakFitResult& fit) const noexcept {
     const double outside = 1.0 - fit.inside;  // probability
     if (!fit.end_slope_valid) return outside * kUnknownRise * fit.mu;
     if (!(fit.end_slip > 0.0)) return 0.0;
     const double slope = fit.end_slope + kRiseDeviations * std::sqrt(fit.end_slope_variance);
-    const double to_come = std::max(0.0, std::log(kFrictionTo_percent / fit.end_slip));
-    return outside * std::max(0.0, slope) * fit.end_slip * to_come;
+    const bool drive = chain_.point().direction == Direction::kDrive;
+    const double deformed =
+        drive ? kPercent * kDeformationMost_1_N * record_.force_line().at(record_.duration_s())
+              : 0.0;
+    // Of all slips that it may be, the one from which such a law rises most.
+    const double slip = std::min(
+        fit.end_slip, std::max(fit.end_slip - deformed, kFrictionTo_percent / std::numbers::e));
+    const double to_come = std::max(0.0, std::log(kFrictionTo_percent / slip));
+    return outside * std::max(0.0, slope) * slip * to_come;
   }
 
   // A value is an interval that is narrow enough, whether friction turned down or lies level.
@@ -366,7 +375,8 @@ class RobustEstimator final : public SlipCurveEstimator {
     const PeakFitResult& fit = fit_.result();
     peak_ = {};
     // Torque that fades is no friction that falls.
-    const bool seen = out_.stop == StopReason::kSlope ||
+    const bool seen = out_.stop == StopReason::kSlope || out_.stop == StopReason::kSlip ||
+                      out_.stop == StopReason::kSlipRate ||
                       (out_.stop != StopReason::kTorque && fit.inside >= kInsideWithoutStop &&
                        fit.passed && fit.fall > kFallDeviations * std::sqrt(fit.fall_variance));
     peak_.samples = std::lround(fit.duration_s * sample_rate_hz_);

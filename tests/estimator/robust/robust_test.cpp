@@ -222,6 +222,22 @@ TEST(Robust, WhereFrictionRisesOnTheUpperEndOfTheIntervalIsOpen) {
   }
 }
 
+TEST(Robust, WhatRisesOnToTheBackupsIsAValueThatHoldsTheRestOfTheRise) {
+  // A power law: it rises by 2 % from 8.5 to 10 % of slip. The ratio gives way by 0.35 % per kN.
+  const auto rising = [](double slip) { return 0.08 * std::pow(std::max(0.0, slip), 0.12); };
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Outcome out = run({.friction = rising,
+                             .mu_begin = 0.07,
+                             .end_slip_percent = 12.0,
+                             .deformation_percent_per_kN = 0.35,
+                             .seed = seed});
+    EXPECT_TRUE(out.stop == StopReason::kSlip || out.stop == StopReason::kSlipRate) << seed;
+    ASSERT_EQ(out.peak.kind, PeakKind::kValue) << seed;
+    EXPECT_GT(out.peak.noise_high, rising(10.0)) << seed;
+    EXPECT_LT(out.peak.noise_high, 1.1 * rising(10.0)) << seed;
+  }
+}
+
 TEST(Robust, TheDeformationBranchIsNotThePeak) {
   // 3 % of the ratio at the begin: sigma* falls by one percent while mu* rises, until the belt's
   // own slip takes over. The ramp ends before the peak.
