@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/signal/slow_noise.h"
 #include "estimator/statistics/square.h"
 
 namespace beltgrip::estimator {
@@ -15,7 +16,8 @@ constexpr std::size_t kFewestPoints = 8;
 // Work of one step; that on forms in instructions, about.
 constexpr std::size_t kCellsPerStep = 48, kPointsPerStep = 64, kFormsPerStep = 128;
 constexpr std::size_t kLevelsPerStep = 4;
-constexpr int kFormWork = 10000, kPointWork = 60, kSolveWork = 650;
+constexpr int kFormWork = 10000, kPointWork = 130, kSolveWork = 650;
+constexpr std::size_t kTermsPerStep = 16;
 constexpr double kSlipStep = 0.04;  // percent: slip moves on by this, or
 constexpr double kShortestPoint_s = 0.02;
 constexpr std::size_t kTailCells = 4;  // of a point; by so many deviations they leave its mean
@@ -91,8 +93,8 @@ PeakFit::PeakFit()
       lengths_s_(kMostCells),
       points_(2 * kMostPoints),
       sums_(2 * kMostPoints + 1, Eigen::Vector2d::Zero()),
-      order_(kMostPoints),
-      rises_(kMostPoints),
+      whitening_(kMostPoints),
+      terms_(kMostPoints, Terms::Zero()),
       forms_(kMostForms),
       health_sums_(kMostPoints + 1),
       residuals_(kMostPoints) {}
@@ -142,19 +144,13 @@ bool PeakFit::step() noexcept {
         seen += point_count_ - first_;
       }
       if (next_ <= point_count_ - first_) return false;
-      go_to(point_count_ - first_ < kFewestPoints ? Stage::kIdle : Stage::kSort);
-      return stage_ == Stage::kIdle;
-    case Stage::kSort: {
-      const std::size_t count = point_count_ - first_;
-      for (std::size_t i = 0; i < count; ++i) order_[i] = first_ + i;
-      std::sort(order_.begin(), order_.begin() + static_cast<std::ptrdiff_t>(count),
-                [this](std::size_t a, std::size_t b) { return points_[a].slip < points_[b].slip; });
-      slip_low_ = points_[order_[0]].slip;
-      slip_high_ = points_[order_[count - 1]].slip;
-      go_to(Stage::kForms);
-      begin_rise({.lambda = kFirstLambda * span(), .span = span()});
+      go_to(point_count_ - first_ < kFewestPoints ? Stage::kIdle : Stage::kTerms);
+      if (stage_ == Stage::kIdle) return true;
+      find_span();
       return false;
-    }
+    case Stage::kTerms:
+      whiten_terms();
+      return false;
     case Stage::kForms:
       fit_forms();
       return false;
@@ -166,7 +162,7 @@ bool PeakFit::step() noexcept {
       go_to(result_.valid ? Stage::kEndSlope : Stage::kIdle);
       if (stage_ == Stage::kIdle) return true;
       next_ = first_;
-      end_slope_.begin(slip_high_, record_->torque().slow_variance(), record_->torque_line(),
+      end_slope_.begin(slip_high_, record_->torque_slow_variance(), record_->torque_line(),
                        record_->force_line());
       return false;
     case Stage::kEndSlope:
@@ -446,12 +442,63 @@ double PeakFit::corner(std::size_t index) const noexcept {
   return -span() * kCornersOver * (static_cast<double>(index) + 0.5) / kCorners;
 }
 
+void PeakFit::find_span() noexcept {
+  slip_low_ = slip_high_ = points_[first_].slip;
+  for (std::size_t i = first_; i < point_count_; ++i) {
+    slip_low_ = std::min(slip_low_, points_[i].slip);
+    slip_high_ = std::max(slip_high_, points_[i].slip);
+  }
+  slow_terms_.setZero();
+  slow_spread_ = 1.0;
+  term_sums_.setZero();
+}
+
+void PeakFit::whiten_terms() noexcept {
+  static_assert(kTermCount == kCorner + kCorners);
+  const double slow = record_->torque_slow_variance();
+  const std::size_t end = std::min(point_count_ - first_, next_ + kTermsPerStep);
+  for (; next_ < end; ++next_) {
+    const Point& point = points_[first_ + next_];
+    Whitening& filter = whitening_[next_];
+    filter.faded = 0.0;
+    if (next_ > 0) {
+      const double since_s = std::max(0.0, point.t_s - points_[first_ + next_ - 1].t_s);
+      filter.faded = std::exp(-since_s / kSlowTime_s);
+      slow_spread_ = 1.0 - square(filter.faded) * (1.0 - slow_spread_);
+    }
+    filter.per_Nm = c_ / point.force_N;
+    const double seen = filter.per_Nm * slow * slow_spread_;
+    const double variance = point.variance + filter.per_Nm * seen;
+    filter.gain = seen / variance;
+    filter.per_deviation = 1.0 / std::sqrt(variance);
+    slow_spread_ *= 1.0 - filter.gain * filter.per_Nm;
+
+    Terms& terms = terms_[next_];
+    const double x = point.slip - slip_high_;
+    terms(kOne) = 1.0;
+    terms(kX) = x;
+    terms(kY) = point.mu - mu_top_;
+    for (std::size_t i = 0; i < kCorners; ++i) {
+      terms(kCorner + static_cast<Eigen::Index>(i)) = std::max(0.0, x - corner(i));
+    }
+    slow_terms_ *= filter.faded;
+    terms -= filter.per_Nm * slow_terms_;
+    slow_terms_ += filter.gain * terms;
+    terms *= filter.per_deviation;
+    for (Eigen::Index i = kOne; i <= kY; ++i) term_sums_.col(i) += terms(i) * terms;
+    for (Eigen::Index i = kCorner; i < kTermCount; ++i) term_sums_(i, i) += square(terms(i));
+  }
+  if (next_ < point_count_ - first_) return;
+  go_to(Stage::kForms);
+  begin_rise({.lambda = kFirstLambda * span(), .span = span()});
+}
+
 void PeakFit::begin_rise(const Rise& rise) noexcept {
   rise_ = rise;
-  form_sums_ = {};
+  slow_rise_ = rise_square_ = 0.0;
+  rise_sums_.setZero();
   summed_ = 0;
   next_corner_ = rise.power == 0 ? 0 : 1;
-  before_corner_ = point_count_ - first_;
 }
 
 // Exponentials of growing length, then powers that end at every second corner. False: no more.
@@ -474,23 +521,13 @@ bool PeakFit::next_rise() noexcept {
 }
 
 void PeakFit::sum_up(std::size_t at) noexcept {
-  const Point& point = points_[order_[at]];
-  const double w = 1.0 / point.variance;
-  const double x = point.slip - slip_high_;
-  const double e = rise_.at(x);
-  const double y = point.mu - mu_top_;
-  rises_[at] = e;
-  SumsOfForm& sums = form_sums_;
-  sums.w += w;
-  sums.e += w * e;
-  sums.x += w * x;
-  sums.ee += w * e * e;
-  sums.ex += w * e * x;
-  sums.xx += w * x * x;
-  sums.y += w * y;
-  sums.ey += w * e * y;
-  sums.xy += w * x * y;
-  sums.yy += w * y * y;
+  const Whitening& filter = whitening_[at];
+  slow_rise_ *= filter.faded;
+  const double rest = rise_.at(points_[first_ + at].slip - slip_high_) - filter.per_Nm * slow_rise_;
+  slow_rise_ += filter.gain * rest;
+  const double e = rest * filter.per_deviation;
+  rise_square_ += e * e;
+  rise_sums_ += e * terms_[at];
 }
 
 void PeakFit::fit_forms() noexcept {
@@ -509,54 +546,33 @@ void PeakFit::fit_forms() noexcept {
       go_to(Stage::kAverage);
       return;
     }
-    if (form == 0) {
-      solve(0.0, false);
-    } else {
-      fit_corner(corner(form - 1));
-    }
+    solve(form);
     work += kSolveWork;
   }
 }
 
-void PeakFit::fit_corner(double corner) noexcept {
-  SumsOfForm& sums = form_sums_;
-  while (before_corner_ > 0 && points_[order_[before_corner_ - 1]].slip - slip_high_ > corner) {
-    --before_corner_;
-    const Point& point = points_[order_[before_corner_]];
-    const double w = 1.0 / point.variance;
-    const double x = point.slip - slip_high_;
-    const double y = point.mu - mu_top_;
-    const double e = rises_[before_corner_];
-    sums.cw += w;
-    sums.ce += w * e;
-    sums.cx += w * x;
-    sums.cex += w * e * x;
-    sums.cxx += w * x * x;
-    sums.cy += w * y;
-    sums.cxy += w * x * y;
-  }
-  solve(corner, true);
-}
-
-// corner: relative to the highest slip.
-void PeakFit::solve(double corner, bool has_corner) noexcept {
-  const SumsOfForm& s = form_sums_;
+// corner_number: 0: none, i + 1: corner(i).
+void PeakFit::solve(std::size_t corner_number) noexcept {
+  const bool has_corner = corner_number > 0;
+  const double corner = has_corner ? this->corner(corner_number - 1) : 0.0;
   const Rise& rise = rise_;
+  const auto sum = [this](Eigen::Index a, Eigen::Index b) { return term_sums_(a, b); };
   // Terms 1, -e, -x, -max(0, x - corner).
   Eigen::Matrix4d A = Eigen::Matrix4d::Zero();
-  Eigen::Vector4d b(s.y, -s.ey, -s.xy, 0.0);
-  A(0, 0) = s.w;
-  A(0, 1) = A(1, 0) = -s.e;
-  A(0, 2) = A(2, 0) = -s.x;
-  A(1, 1) = s.ee;
-  A(1, 2) = A(2, 1) = s.ex;
-  A(2, 2) = s.xx;
+  Eigen::Vector4d b(sum(kY, kOne), -rise_sums_(kY), -sum(kY, kX), 0.0);
+  A(0, 0) = sum(kOne, kOne);
+  A(0, 1) = A(1, 0) = -rise_sums_(kOne);
+  A(0, 2) = A(2, 0) = -sum(kX, kOne);
+  A(1, 1) = rise_square_;
+  A(1, 2) = A(2, 1) = rise_sums_(kX);
+  A(2, 2) = sum(kX, kX);
   if (has_corner) {
-    A(0, 3) = A(3, 0) = -(s.cx - corner * s.cw);
-    A(1, 3) = A(3, 1) = s.cex - corner * s.ce;
-    A(2, 3) = A(3, 2) = s.cxx - corner * s.cx;
-    A(3, 3) = s.cxx - 2.0 * corner * s.cx + square(corner) * s.cw;
-    b(3) = -(s.cxy - corner * s.cy);
+    const Eigen::Index k = kCorner + static_cast<Eigen::Index>(corner_number) - 1;
+    A(0, 3) = A(3, 0) = -sum(k, kOne);
+    A(1, 3) = A(3, 1) = rise_sums_(k);
+    A(2, 3) = A(3, 2) = sum(k, kX);
+    A(3, 3) = sum(k, k);
+    b(3) = -sum(k, kY);
   }
   // Weak priors: coefficients of a curve of this height, slopes of 0.05 and 0.02 per percent.
   Eigen::Matrix4d R = A;
@@ -600,7 +616,7 @@ void PeakFit::solve(double corner, bool has_corner) noexcept {
   const double prior = rise.power > 0 ? 4.0 / square(kCorners) : has_corner ? 1.0 / kCorners : 1.0;
   const Eigen::Vector4d g = terms(best);
   const Eigen::Vector4d g_fall = g - terms(0.0);
-  forms_[form_count_++] = {.chi2 = s.yy - 2.0 * theta.dot(b) + theta.dot(A * theta),
+  forms_[form_count_++] = {.chi2 = sum(kY, kY) - 2.0 * theta.dot(b) + theta.dot(A * theta),
                            .prior = prior,
                            .mu = mu_top_ + g.dot(theta),
                            .variance = factors.square_of(g),

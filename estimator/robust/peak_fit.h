@@ -7,9 +7,11 @@
 // is fitted by weighted least squares for a grid of lambda and s_k: a round peak where h = 0 or s_k
 // lies elsewhere, a corner or the end of a plateau at s_k; and, for tops that are flat from s_e on,
 //   mu(s) = a - B max(0, s_e - s)^n - h max(0, s - s_k),   n = 2, 3,   s_k >= s_e.
-// The forms are averaged with the weights that the data give them, so that the uncertainty of the
-// form is in the result. No form is taken from a friction model: near the top, rise and fall of all
-// of them look like this.
+// The points share the slow error of the torque (slow_noise.h): all terms and the points pass the
+// same Kalman filter, which leaves what is independent from point to point. The forms are averaged
+// with the weights that the data give them, so that the uncertainty of the form is in the result.
+// No form is taken from a friction model: near the top, rise and fall of all of them look like
+// this.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,7 +31,7 @@ inline constexpr double kReachedDeviations = 3.3;
 struct PeakFitResult {
   bool valid = false;
   double mu = 0.0;        // largest value of the curve within the data
-  double variance = 0.0;  // of mu, without what is common to all points
+  double variance = 0.0;  // of mu, with the torque's slow error, without what all points share
   double slip = 0.0;      // where it is
   double t_s = 0.0;       // when slip was there last
   // Part that the line of the engine's torque has in the torque there; the readings have the rest.
@@ -86,7 +88,7 @@ class PeakFit {
     kCourse,
     kStretch,
     kReached,
-    kSort,
+    kTerms,
     kForms,
     kAverage,
     kResult,
@@ -105,11 +107,14 @@ class PeakFit {
     double span = 1.0;
     double at(double x) const noexcept;
   };
-  // Weighted sums for the normal equations: 1, e = rise, x = slip - highest slip, y = mu - top.
-  struct SumsOfForm {
-    double w = 0, e = 0, x = 0, ee = 0, ex = 0, xx = 0, y = 0, ey = 0, xy = 0, yy = 0;
-    // The same over the points beyond the corner only.
-    double cw = 0, ce = 0, cx = 0, cex = 0, cxx = 0, cy = 0, cxy = 0;
+  // Terms of the curves, whitened: 1, x = slip - highest slip, y = mu - top, and for each corner
+  // what lies beyond it. One column each; the products of two are summed over the points.
+  enum : Eigen::Index { kOne, kX, kY, kCorner, kTermCount = kCorner + 20 };
+  using Terms = Eigen::Matrix<double, kTermCount, 1>;
+  // The filter of the slow error, at a point: by what the error before has faded, what of it is in
+  // the reading, by how much of what was not expected it changes, and that one's deviation.
+  struct Whitening {
+    double faded, per_Nm, gain, per_deviation;
   };
   struct Average {
     double weight = 0, mu = 0, squares = 0, variance = 0, slip = 0, inside = 0, fall = 0,
@@ -129,12 +134,13 @@ class PeakFit {
   double force_variance(double begin_s, double end_s) const noexcept;
   double span() const noexcept { return std::max(0.3, slip_high_ - slip_low_); }
   double corner(std::size_t index) const noexcept;
+  void find_span() noexcept;
+  void whiten_terms() noexcept;
   void begin_rise(const Rise& rise) noexcept;
   bool next_rise() noexcept;
   void sum_up(std::size_t point) noexcept;
   void fit_forms() noexcept;
-  void fit_corner(double corner) noexcept;
-  void solve(double corner, bool has_corner) noexcept;
+  void solve(std::size_t corner) noexcept;
   void average() noexcept;
   void finish() noexcept;
   EndPoint end_point(const Point& point) const noexcept;
@@ -165,14 +171,18 @@ class PeakFit {
   double mu_top_ = 0.0;
   double slip_low_ = 0.0, slip_high_ = 0.0;  // of the stretch
   double slip_low_s_ = 0.0;                  // duration of the lowest point
-  std::vector<std::size_t> order_;           // points of the stretch by rising slip
-  std::vector<double> rises_;                // at the points, in that order
-  std::size_t next_ = 0;                     // where the work on this stage goes on
-  Rise rise_;                                // that is being fitted, with
-  SumsOfForm form_sums_;
-  std::size_t summed_ = 0;         // so many points in the sums,
-  std::size_t next_corner_ = 0;    // the corner of the next form; 0: none, i + 1: corner(i)
-  std::size_t before_corner_ = 0;  // and so many points that do not lie beyond the last corner
+  std::vector<Whitening> whitening_;         // of the points of the stretch
+  std::vector<Terms> terms_;                 // likewise
+  Terms slow_terms_ = Terms::Zero();         // slow error in them, as expected
+  double slow_spread_ = 1.0;                 // its variance, in that of the slow error
+  Eigen::Matrix<double, kTermCount, kTermCount> term_sums_;
+  std::size_t next_ = 0;             // where the work on this stage goes on
+  Rise rise_;                        // that is being fitted, with
+  double slow_rise_ = 0.0;           // slow error in it, as expected
+  double rise_square_ = 0.0;         // sums: of the whitened rise, by itself
+  Terms rise_sums_ = Terms::Zero();  // and by the terms
+  std::size_t summed_ = 0;           // so many points in the sums
+  std::size_t next_corner_ = 0;      // the corner of the next form; 0: none, i + 1: corner(i)
   double best_chi2_ = 0.0;
   Average average_;
   std::vector<Form> forms_;

@@ -18,7 +18,6 @@
 #include "estimator/robust/thresholds.h"
 #include "estimator/signal/excitation.h"
 #include "estimator/signal/signal_chain.h"
-#include "estimator/signal/slow_noise.h"
 #include "estimator/statistics/interval.h"
 
 namespace beltgrip::estimator {
@@ -348,16 +347,6 @@ class RobustEstimator final : public SlipCurveEstimator {
     return relative + kFormDeviation * kFormDeviation;
   }
 
-  // Variance of mu by the torque's slow error, which the readings near the top share: white noise
-  // tells over how long a time the fit takes its mean there.
-  double slow_variance(const PeakFitResult& fit) const noexcept {
-    const double per_Nm = traction_ / record_.force_line().at(fit.t_s);  // of mu
-    const double white = record_.torque_noise() * per_Nm * per_Nm;
-    const double mean_s =
-        fit.variance > 0.0 ? std::min(fit.duration_s, white / fit.variance) : fit.duration_s;
-    return record_.torque().slow_variance() * per_Nm * per_Nm * slow_variance_of_mean(mean_s);
-  }
-
   // And of those errors.
   double sensor_variance(double mu, double F) const noexcept {
     const double sensors =
@@ -392,8 +381,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     }
     const double F = record_.force_line().at(fit.t_s);
     const double square = fit.mu * fit.mu;
-    const double noise_variance =
-        fit.variance + square * alike_variance(fit.t_s, fit.held_share) + slow_variance(fit);
+    const double noise_variance = fit.variance + square * alike_variance(fit.t_s, fit.held_share);
     const double noise = kNormal95 * std::max(std::sqrt(noise_variance), kSmallestStd);
     const double low = fit.mu - noise, high = fit.mu + std::hypot(noise, further_rise(fit));
     if (fit.valid && seen && is_value(fit.mu, low, high)) {
