@@ -9,6 +9,7 @@
 #include <memory>
 #include <numbers>
 #include <ostream>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -236,6 +237,33 @@ TEST(Robust, WhatRisesOnToTheBackupsIsAValueThatHoldsTheRestOfTheRise) {
     EXPECT_GT(out.peak.noise_high, rising(10.0)) << seed;
     EXPECT_LT(out.peak.noise_high, 1.1 * rising(10.0)) << seed;
   }
+}
+
+// The torque's reading with an error that wanders by 3 %.
+Outcome run_wandering(const Rig& rig, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<TracePoint> trace = rig_trace(rig);
+  const double faded = std::exp(-1.0 / (rig_settings(rig).sample_rate_hz * 1.2));
+  double error = normal(random);
+  for (TracePoint& point : trace) {
+    error = faded * error + std::sqrt(1.0 - faded * faded) * normal(random);
+    point.sample.torque_Nm *= 1.0 + 0.03 * error;
+  }
+  return run(*estimator_for(rig), trace);
+}
+
+TEST(Robust, ATorqueThatWandersIsInTheInterval) {
+  int held = 0, values = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const Outcome peak =
+        run_wandering({.friction = test::round_peak(0.105, 2.5), .seed = seed}, seed);
+    if (peak.peak.kind != PeakKind::kValue) continue;
+    ++values;
+    held += peak.peak.noise_low < 0.105 && peak.peak.noise_high > 0.105;
+  }
+  EXPECT_GE(values, 14);
+  EXPECT_GE(held, values - 2);
 }
 
 TEST(Robust, TheDeformationBranchIsNotThePeak) {
