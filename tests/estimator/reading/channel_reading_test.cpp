@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 namespace beltgrip::estimator {
 namespace {
@@ -84,6 +85,28 @@ TEST(ChannelReading, AGlitchIsLeftOutAndAJumpIsNot) {
   }
   EXPECT_EQ(value_of(150.0), 150.0);
   EXPECT_TRUE(channel.jumped());
+}
+
+// 1 rpm a step, and a speed whose noise is a fifth of that: at an edge of two steps it changes all
+// the time, then it moves on to the middle of one. With noise of three steps it never rests.
+TEST(ChannelReading, ARoundedReadingMayRestInTheMiddleOfAStep) {
+  const auto frozen = [](double noise_rpm, bool stands) {
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal;
+    ChannelReading channel(200.0);
+    double read_rpm = 0.0;
+    for (int i = 0; i < 4000; ++i) {
+      if (i % 4 == 0 && !(stands && i > 3000)) {
+        const double speed_rpm = i < 2000 ? 1000.5 : 1001.0;
+        read_rpm = std::round(speed_rpm + noise_rpm * normal(random));
+      }
+      channel.follow(read_rpm);
+    }
+    return channel.verdict() == ReadingVerdict::kFrozen;
+  };
+  EXPECT_FALSE(frozen(0.2, false));
+  EXPECT_FALSE(frozen(3.0, false));
+  EXPECT_TRUE(frozen(3.0, true));
 }
 
 }  // namespace
