@@ -92,13 +92,15 @@ void apply_model(const std::string& path, sim::VehicleScenario& scenario) {
   v.primary_inertia_kg_m2 += model.variator.primary_inertia_kg_m2 - known_inertia;
   take(model.driveline, "deformation_per_kN", v.deformation_per_N, 1e-3);
   take(model.driveline, "loss_constant_Nm", v.primary_loss_Nm);
+  take(model.driveline, "loss_per_kN_Nm", v.primary_loss_Nm_per_N, 1e-3);
   take(model.friction, "mu_max", scenario.belt.overdrive.mu_max);
   take(model.friction, "peak_slip_overdrive_percent", scenario.belt.overdrive.peak_slip_percent);
   take(model.friction, "peak_slip_low_percent", scenario.belt.low_peak_slip_percent);
-  // The first two are the variator's; the drag at the wheels' side no model of a car has measured.
+  // The first three are the variator's; the drag at the wheels' side no model of a car has
+  // measured.
   ModelFile rest = model;
-  for (const char* key : {"deformation_per_kN", "loss_constant_Nm", "secondary_loss_constant_Nm",
-                          "secondary_loss_per_rad_s_Nm"}) {
+  for (const char* key : {"deformation_per_kN", "loss_constant_Nm", "loss_per_kN_Nm",
+                          "secondary_loss_constant_Nm", "secondary_loss_per_rad_s_Nm"}) {
     rest.driveline.erase(key);
   }
   lay(daemon::whole_machine(rest), scenario.effects);

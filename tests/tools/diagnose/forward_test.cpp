@@ -17,7 +17,8 @@ using Course = std::function<double(double t_s)>;
 
 constexpr double kEnd_s = 12.0;
 constexpr double kMuMax = 0.1, kPeakSlipLow = 0.03, kPeakSlipOverdrive = 0.02;
-constexpr double kDeformationPerN = 1e-6, kLoss_Nm = 0.5, kLossPerSpeed_Nms = 5e-3;
+constexpr double kDeformationPerN = 1e-6, kLoss_Nm = 0.5, kLossPerSpeed_Nms = 5e-3,
+                 kLossPerN_Nm = 0.05e-3;
 constexpr double kDrag_Nm = 0.5, kDragPerSpeed_Nms = 2e-3;  // at the secondary shaft
 constexpr double kSecondaryInertia_kgm2 = 0.1, kPrimaryInertia_kgm2 = 0.18;
 constexpr double kArea_m2 = 0.0113, kSpring_N = 500.0;
@@ -164,7 +165,8 @@ TEST(Forward, PredictsTheTorqueAtTheRigsPrimaryShaft) {
     const double force_N = kArea_m2 * data.pressure.value[k] + kSpring_N;
     const double ratio = kLow * (1.0 - kDeformationPerN * force_N);
     const double slip = 1.0 - omega_s[k] / (data.omega_p.value[k] * ratio);
-    const double loss_Nm = kLoss_Nm + kLossPerSpeed_Nms * data.omega_p.value[k];
+    const double loss_Nm =
+        kLoss_Nm + kLossPerSpeed_Nms * data.omega_p.value[k] + kLossPerN_Nm * force_N;
     EXPECT_NEAR(torque[k],
                 capacity_Nm(force_N, kRadiusLow_m) * traction(slip, kPeakSlipLow) + loss_Nm, 1e-4);
     ++compared;
@@ -194,7 +196,7 @@ TEST(Forward, VehicleFollowsTheFineIntegration) {
     const double slip = 1.0 - at(data.omega_s.value, t_s) / (omega_p * ratio);
     const double belt_Nm =
         capacity_Nm(force_N, kRadiusOverdrive_m) * traction(slip, kPeakSlipOverdrive);
-    const double loss_Nm = kLoss_Nm + kLossPerSpeed_Nms * omega_p;
+    const double loss_Nm = kLoss_Nm + kLossPerSpeed_Nms * omega_p + kLossPerN_Nm * force_N;
     return (at(data.torque.value, t_s) - loss_Nm - belt_Nm) / kPrimaryInertia_kgm2;
   };
   const ArrayXd truth = integrated(rate, simulated[begin], begin, end, 1e-5);
@@ -233,7 +235,8 @@ TEST(Forward, RigWithoutSecondaryTorqueCarriesThePrimaryOne) {
     const double ratio = kLow * (1.0 - kDeformationPerN * force_N);
     const double slip = 1.0 - omega_s[k] / (data.omega_p.value[k] * ratio);
     if (slip > 0.7 * kPeakSlipLow) continue;  // about to run away: no longer at rest
-    const double carried_Nm = 17.0 - kLoss_Nm - kLossPerSpeed_Nms * data.omega_p.value[k];
+    const double carried_Nm =
+        17.0 - kLoss_Nm - kLossPerSpeed_Nms * data.omega_p.value[k] - kLossPerN_Nm * force_N;
     EXPECT_NEAR(capacity_Nm(force_N, kRadiusLow_m) * traction(slip, kPeakSlipLow), carried_Nm, 0.1)
         << k;
     ++compared;

@@ -76,6 +76,48 @@ std::vector<std::string> aliases_of(const Campaign& campaign, const Criticism& f
   return out;
 }
 
+// What the function can do as well: an effect at the same point over the same variable, or a
+// constant of what the machine has no constant for.
+bool is_superseded(const EffectRow& row, const Cell& cell) {
+  const std::string_view variable = cell.abscissa.variable->name;
+  switch (cell.injection->injection) {
+    case Injection::kFriction:
+      return row.stage == Stage::kFriction && row.depends_on == variable;
+    case Injection::kTorqueGain:
+      return row.id == "torque_gain";
+    case Injection::kTorque:
+      return row.id == "torque_loss" && row.depends_on == variable;
+    case Injection::kClampForce:
+      return row.id == "spring_force";
+    case Injection::kRatio:
+      break;
+  }
+  return false;
+}
+
+void drop_superseded(Engine& engine, const Cell& cell) {
+  std::vector<int> kept = engine.accepted();
+  std::erase_if(kept, [&](int slot) {
+    return is_superseded(*engine.campaign().slots[static_cast<std::size_t>(slot)].row, cell);
+  });
+  if (kept.size() == engine.accepted().size()) return;
+  engine.accept(engine.refine(kept));
+  engine.update_noise();
+}
+
+// Without the torque behind the belt friction, gain of the torque and clamp force are one.
+bool acts_there(const EffectRow& row, std::string_view point, const Campaign& campaign) {
+  const bool is_friction = row.acts_on == "friction", is_force = row.acts_on == "clamp force";
+  const bool is_torque = row.acts_on == "torque";
+  const bool is_grip = point == "friction" || point == "clamp_force" || point == "torque_gain";
+  if (!campaign.has_balance && is_grip && (is_friction || is_force || row.id == "torque_gain")) {
+    return true;
+  }
+  if (point == "torque" || point == "torque_gain") return is_torque;
+  if (point == "ratio") return row.acts_on == "ratio" || row.acts_on == "speed";
+  return point == "friction" ? is_friction : is_force;
+}
+
 struct Trial {
   Engine engine;
   Learned learned;
@@ -87,6 +129,7 @@ struct Trial {
 std::optional<Trial> tried(const Engine& engine, const Criticism& before, const Cell& cell,
                            bool coarse) {
   Trial out{engine, {}, {}, 0.0};
+  drop_superseded(out.engine, cell);
   out.learned.fit = fit_learned(out.engine, *cell.injection, cell.abscissa);
   const LearnedFit& fit = out.learned.fit;
   if (fit.left_out_gain < thresholds::kLeftOutLevels || !is_possible(fit)) return {};
@@ -121,6 +164,15 @@ const LawEvidence* named_law(const LearnedFit& fit, const std::vector<LawEvidenc
   const bool stands = possible.size() == 1 &&
                       possible.front().left_out_gain >= fit.left_out_gain - thresholds::kLawWorse;
   return stands ? &possible.front() : nullptr;
+}
+
+bool is_shadowed(const Campaign& campaign, const std::vector<int>& accepted,
+                 const Criticism& without, const Criticism& with) {
+  if (accepted.empty() || excess_left(without, with) <= 1.0 - thresholds::kHealed) return false;
+  const std::string left = what_is_left(with).acts_on;
+  return std::any_of(accepted.begin(), accepted.end(), [&](int slot) {
+    return acts_there(*campaign.slots[static_cast<std::size_t>(slot)].row, left, campaign);
+  });
 }
 
 double excess_left(const Criticism& before, const Criticism& after) {

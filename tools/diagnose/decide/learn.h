@@ -37,6 +37,11 @@ std::vector<LawEvidence> possible_laws(const LearnedFit& fit);
 // none does.
 const LawEvidence* named_law(const LearnedFit& fit, const std::vector<LawEvidence>& possible);
 
+// Names are put to the same test as a function: false where the failed tests lost most of their
+// excess, or where what is left acts elsewhere than any of them.
+bool is_shadowed(const Campaign& campaign, const std::vector<int>& accepted,
+                 const Criticism& without, const Criticism& with);
+
 // Share of the failed tests' excess over their limits that is left, of the one that keeps most.
 double excess_left(const Criticism& before, const Criticism& after);
 

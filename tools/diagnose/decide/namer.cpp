@@ -49,9 +49,9 @@ constexpr double kLeftOutMin = 0.0;      // of the log predictive density
 constexpr double kLeftOutPlain = 200.0;  // the same: beyond doubt, however few experiments show it
 constexpr double kRippleMin = 1e-4;      // of the speed: less is of no consequence for slip
 
-constexpr std::array kConstants{kDeformationPerkN,         kLossConstant_Nm, kLossPerSpeed_Nms,
-                                kLnRatioOverdrive,         kLnRatioLow,      kSecondaryLoss_Nm,
-                                kSecondaryLossPerSpeed_Nms};
+constexpr std::array kConstants{kDeformationPerkN, kLossConstant_Nm,          kLossPerSpeed_Nms,
+                                kLossPerkN_Nm,     kLnRatioOverdrive,         kLnRatioLow,
+                                kSecondaryLoss_Nm, kSecondaryLossPerSpeed_Nms};
 
 std::string_view id_of(const Engine& engine, int slot) {
   return engine.campaign().slots[static_cast<std::size_t>(slot)].row->id;
@@ -541,6 +541,15 @@ double find_effects(Engine& engine, Naming& out, const std::function<bool()>& st
   return first_gain;
 }
 }  // namespace
+
+void forget_names(Engine& engine, Naming& naming) {
+  engine.accept(engine.refine_from(naming.sharp.state, {}, kSettling));
+  engine.update_noise();
+  naming.accepted.clear();
+  naming.unknown.reset();
+  naming.hypothesis = engine.refine({}, 3);
+  naming.last_screen = engine.screen();
+}
 
 void name_anew(Engine& engine, Naming& naming, const std::function<bool()>& stop) {
   naming.unknown.reset();

@@ -62,6 +62,9 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop);
 // makes superfluous goes, what it hid is found.
 void name_anew(Engine& engine, Naming& naming, const std::function<bool()>& stop);
 
+// The machine alone, as it was before anything was named: the engine's state and the naming.
+void forget_names(Engine& engine, Naming& naming);
+
 // Chi-square(1) value that the largest of so many candidates exceeds by chance with this
 // probability.
 double chance_threshold(int candidates, double probability);

@@ -28,6 +28,7 @@ constexpr double kNothingMore = 0.02;  // of the same, for a step: the end
 constexpr double kSameStep = 1e-3;     // apart by less of their length: both fail
 constexpr double kCurveFault = 0.1;    // one sigma of curve_faults()
 constexpr int kSettled = 20;           // steps, where all else stays
+constexpr double kReach = 3.0;         // chosen, tolerances: no healthy machine is farther off
 constexpr double kSizePrior = 3.0;     // one sigma of an effect's size, in usual sizes
 
 bool stop_used(const Campaign& campaign, int stop) {
@@ -602,7 +603,15 @@ void Engine::move(const std::vector<int>& parameters, const VectorXd& step, doub
     if (const int first = first_knot(parameters[j]); first >= 0) {
       state.nuisance.segment(first, kShapeKnots) += by * curve_modes().col(parameters[j] - first);
     } else if (parameters[j] < kNuisanceCount) {
-      state.nuisance[parameters[j]] += by;
+      double& value = state.nuisance[parameters[j]];
+      value += by;
+      // The data hold it far better than the usual values do: without a bound any drag would be the
+      // machine's own, and what it explains would be no gain.
+      if (parameters[j] == kLossPerkN_Nm) {
+        const NuisanceRow& row = campaign_.nuisances[kLossPerkN_Nm];
+        value = std::clamp(value, row.nominal - kReach * row.tolerance,
+                           row.nominal + kReach * row.tolerance);
+      }
     } else {
       const int slot = parameters[j] - kNuisanceCount;
       const EffectRow& row = *campaign_.slots[static_cast<std::size_t>(slot)].row;

@@ -272,6 +272,8 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
       return torque_change(ArrayXd::Constant(n, -1.0));
     case kLossPerSpeed_Nms:
       return torque_change(-data.omega_p.value);
+    case kLossPerkN_Nm:
+      return torque_change(-1e-3 * at.there.force_N);
     case kLnRatioOverdrive:
     case kLnRatioLow: {
       const int stop = parameter == kLnRatioLow ? kLowStop : kOverdriveStop;

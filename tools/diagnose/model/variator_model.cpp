@@ -50,6 +50,7 @@ NuisanceTable default_nuisances() {
       {"deformation_per_kN", 1.0e-3, 0.7e-3, 1e-5},
       {"loss_constant_Nm", 0.5, 0.6, 1e-2},
       {"loss_per_rad_s_Nm", 5e-3, 4e-3, 1e-4},
+      {"loss_per_kN_Nm", 0.05, 0.04, 1e-3},
       {"ln_ratio_overdrive", 0.0, 6e-4, 1e-5},
       {"ln_ratio_low", 0.0, 6e-4, 1e-5},
       {"secondary_inertia_kg_m2", 0.1, 0.3, 1e-3},
@@ -235,7 +236,8 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
   c.force_N = variator.secondary_piston_area_m2 * c.pressure + variator.secondary_spring_force_N +
               variator.secondary_centrifugal_N_s2 * c.omega_s.square();
   apply(Stage::kForce);
-  c.loss_Nm = nuisance[kLossConstant_Nm] + nuisance[kLossPerSpeed_Nms] * c.omega_p;
+  c.loss_Nm = nuisance[kLossConstant_Nm] + nuisance[kLossPerSpeed_Nms] * c.omega_p +
+              nuisance[kLossPerkN_Nm] * 1e-3 * c.force_N;
   if (run.torque_is_engine) {
     c.loss_Nm +=
         variator.primary_inertia_kg_m2 * (run.omega_p.slope + c.slope_p - run.omega_p.slow_slope);

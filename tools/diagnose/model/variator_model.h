@@ -42,6 +42,7 @@ enum Nuisance : int {
   kDeformationPerkN,
   kLossConstant_Nm,
   kLossPerSpeed_Nms,
+  kLossPerkN_Nm,
   kLnRatioOverdrive,
   kLnRatioLow,
   kSecondaryInertia_kgm2,

@@ -80,6 +80,7 @@ class Run {
     progress(0.1, "fit");
     Engine engine(make_campaign(std::move(runs), request_.model), request_.jobs);
     Naming naming = name_effects(engine, stop());
+    name_until_settled(engine, naming);
     progress(0.6, "tests");
     const Learning learning = criticise_and_learn(engine, naming);
     progress(0.8, "gain");
@@ -153,12 +154,48 @@ class Run {
                       [](const ExperimentData& run) { return run.valid_count > 0; }));
   }
 
+  // Beside what was accepted, the whole naming anew: the first pass weighs a second effect against
+  // the first one's evidence, which is in the machine now.
+  void name_until_settled(Engine& engine, Naming& naming) {
+    for (int round = 0; round < kRoundsMax && !naming.unknown && !stop()(); ++round) {
+      const std::vector<int> before = engine.accepted();
+      if (before.empty()) return;
+      name_anew(engine, naming, stop());
+      if (engine.accepted() == before) return;
+    }
+  }
+
   // What fails the tests is learned where it can be; with it the whole analysis anew, until nothing
   // changes.
   Learning criticise_and_learn(Engine& engine, Naming& naming) {
     Learning out;
     if (stop()()) return out;
     out.left = criticise(engine, is_coarse_);
+    if (out.left.passed()) return out;
+    if (engine.accepted().empty()) {
+      learn_in_turn(engine, naming, out);
+      return out;
+    }
+    // Names that leave something: are they needed beside a function, or its shadows?
+    Engine bare = engine;
+    Naming forgotten = naming;
+    forget_names(bare, forgotten);
+    Learning alone;
+    alone.left = criticise(bare, is_coarse_);
+    const Criticism nothing = alone.left;
+    learn_in_turn(bare, forgotten, alone);
+    const bool is_alone = !alone.terms.empty() && alone.left.passed();
+    if (!is_alone) learn_in_turn(engine, naming, out);
+    const bool are_shadows =
+        is_alone || (!out.left.passed() &&
+                     is_shadowed(engine.campaign(), engine.accepted(), nothing, out.left));
+    if (!are_shadows) return out;
+    engine = std::move(bare);
+    naming = std::move(forgotten);
+    return alone;
+  }
+
+  void learn_in_turn(Engine& engine, Naming& naming, Learning& out) {
     const bool sensible = !doubts_.impossible && used_runs(engine.campaign()) >= kLearningRunsMin;
     for (int round = 0; round < kRoundsMax && sensible && !out.left.passed(); ++round) {
       Learning more = learn(engine, out.left, is_coarse_, stop());
@@ -173,7 +210,6 @@ class Run {
       relearn(engine, out);
       out.left = criticise(engine, is_coarse_);
     }
-    return out;
   }
 
   static void relearn(Engine& engine, Learning& learning) {

@@ -48,6 +48,7 @@ constexpr OptionRow kDriveline[] = {
         "Share of the ratio that the deformation of the pulleys takes, per clamping force."),
     key("driveline", "loss_constant_Nm", "Nm", "Torque that is lost before the belt, constant."),
     key("driveline", "loss_per_rad_s_Nm", "Nm s/rad", "And per speed of the primary pulley."),
+    key("driveline", "loss_per_kN_Nm", "Nm/kN", "And per clamping force."),
     key("driveline", "ratio_overdrive_relative", "",
         "By which share the ratio at the overdrive end stop is greater than in [variator]."),
     key("driveline", "ratio_low_relative", "", "The same at the low end stop."),
@@ -271,6 +272,7 @@ MachineEffects whole_machine(const ModelFile& model) {
   };
   out.loss_constant_Nm += given("loss_constant_Nm");
   out.loss_per_rad_s_Nm += given("loss_per_rad_s_Nm");
+  out.loss_per_kN_Nm += given("loss_per_kN_Nm");
   out.secondary_loss_constant_Nm += given("secondary_loss_constant_Nm");
   out.secondary_loss_per_rad_s_Nm += given("secondary_loss_per_rad_s_Nm");
   out.deformation_per_kN += given("deformation_per_kN");
