@@ -44,6 +44,7 @@ struct Unexplained {
   double share = 0.0;
   MisfitKind kind = MisfitKind::kFunction;
   std::optional<double> frequency_Hz = std::nullopt;  // of a line
+  bool is_belt = false;                               // a line at the belt's passage
 };
 
 // A cause without a name, as learned: a function of one recorded variable.

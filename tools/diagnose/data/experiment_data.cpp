@@ -368,6 +368,27 @@ ArrayXd shifted_slope(const GridSignal& signal, double dt_s, double shift_s) {
   return out;
 }
 
+namespace {
+
+void add_belt_lines(const SignalTable& table, const estimator::VariatorParameters& variator,
+                    ExperimentData& data) {
+  constexpr double kBeltLength_m = 0.703;  // of the contract's variator; scales with its radii
+  const auto mean = [](const ArrayXd& values) {
+    const ArrayXd finite = values.isFinite().select(values, 0.0);
+    return finite.sum() / std::max(1.0, static_cast<double>(values.isFinite().count()));
+  };
+  const double omega_p = mean(data.omega_p.value), omega_s = mean(data.omega_s.value);
+  if (!(omega_p > kSpeedMin_rad_s) || !(omega_s > 0.0)) return;
+  const bool low = omega_s < omega_p;
+  const double radius_m = low ? variator.primary_radius_low_m : variator.primary_radius_overdrive_m;
+  const double order = 2.0 * std::numbers::pi * radius_m / kBeltLength_m;
+  data.belt_p = belt_lines(table[Role::kPrimarySpeed], order);
+  data.belt_s = belt_lines(table[Role::kSecondarySpeed], order * omega_p / omega_s);
+  data.belt_Hz = omega_p * radius_m / kBeltLength_m;
+}
+
+}  // namespace
+
 ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator,
                        Reaches reached) {
   widen(reached, table);
@@ -403,6 +424,7 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
 
   data.line_p = order_line(speed);
   data.line_s = order_line(table[Role::kSecondarySpeed]);
+  add_belt_lines(table, variator, data);
 
   const auto saturated_on = [&](Role role) {
     return saturated_samples(table[role], reached[static_cast<std::size_t>(role)], start_s, n,

@@ -39,6 +39,8 @@ struct ExperimentData {
   Eigen::ArrayXd t_s;  // from the first sample of the experiment
   GridSignal omega_p, omega_s, pressure, torque, torque_s, pressure_p, command, temperature;
   OrderLine line_p, line_s;  // once per revolution, primary and secondary speed
+  BeltLines belt_p, belt_s;  // at the belt's passage, in the same
+  double belt_Hz = 0.0;      // of that, mean
   bool torque_is_engine = false;
   std::vector<int> stop;           // EndStopIndex per sample
   std::vector<bool> valid;         // may carry a conclusion

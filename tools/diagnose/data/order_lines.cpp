@@ -81,6 +81,7 @@ namespace {
 struct Piece {
   std::vector<double> angle, rest;
   double passed = 0.0;  // of a line once per revolution: what the smoothing leaves of it
+  double omega_rad_s = 0.0, period_s = 0.0;
   double power_at(double order) const {
     std::complex<double> sum;
     for (std::size_t i = 0; i < rest.size(); ++i) {
@@ -124,6 +125,8 @@ std::vector<Piece> pieces_of(const Channel& speed) {
     for (std::size_t i = begin; i < end; ++i) {
       piece.passed += (1.0 - followed(smooth[i], period_s)) / static_cast<double>(end - begin);
     }
+    piece.omega_rad_s = phi / std::max(span_s, period_s);
+    piece.period_s = period_s;
     const bool usable = piece.rest.size() >= kSamplesMin && span_s > 0.8 * kPiece_s &&
                         std::isfinite(phi) && phi > kSpeedMin_rad_s * span_s &&
                         std::all_of(piece.rest.begin(), piece.rest.end(), [](double v) {
@@ -137,23 +140,46 @@ std::vector<Piece> pieces_of(const Channel& speed) {
 
 }  // namespace
 
+namespace {
+
+double noise_about(const Piece& piece, double order) {
+  double noise = 0.0;
+  for (const double neighbour : kNeighbours) noise += piece.power_at(neighbour * order);
+  return noise / static_cast<double>(std::size(kNeighbours));
+}
+
+void add_piece(double here, double noise, double passed, OrderLine& out) {
+  // The noise itself is a mean of a few: its inverse is biased by n / (n - 1).
+  constexpr double kMean = static_cast<double>(std::size(kNeighbours));
+  const double excess = here / noise * (kMean - 1.0) / kMean - 1.0;
+  out.excess += std::min(excess, 50.0);
+  const double power = (here - noise) / (passed * passed);
+  out.power += power;
+  out.power_squares += power * power;
+  out.noise += noise;
+  ++out.pieces;
+}
+
+}  // namespace
+
 OrderLine order_line(const Channel& speed) {
   OrderLine out;
   for (const Piece& piece : pieces_of(speed)) {
-    double noise = 0.0;
-    for (const double order : kNeighbours) noise += piece.power_at(order);
-    noise /= static_cast<double>(std::size(kNeighbours));
+    const double noise = noise_about(piece, 1.0);
+    if (noise > 0.0) add_piece(piece.power_at(1.0), noise, piece.passed, out);
+  }
+  return out;
+}
+
+BeltLines belt_lines(const Channel& speed, double order) {
+  BeltLines out;
+  for (const Piece& piece : pieces_of(speed)) {
+    const double noise = noise_about(piece, order);
     if (!(noise > 0.0)) continue;
-    const double here = piece.power_at(1.0);
-    // The noise itself is a mean of a few: its inverse is biased by n / (n - 1).
-    constexpr double kMean = static_cast<double>(std::size(kNeighbours));
-    const double excess = here / noise * (kMean - 1.0) / kMean - 1.0;
-    out.excess += std::min(excess, 50.0);
-    const double power = (here - noise) / (piece.passed * piece.passed);
-    out.power += power;
-    out.power_squares += power * power;
-    out.noise += noise;
-    ++out.pieces;
+    const double passed = 1.0 - followed(order * piece.omega_rad_s, piece.period_s);
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      add_piece(piece.power_at(kBeltOrders[i] * order), noise, passed, out[i]);
+    }
   }
   return out;
 }

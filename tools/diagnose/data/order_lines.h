@@ -3,6 +3,8 @@
 // sampling below the line's frequency do not matter.
 #pragma once
 
+#include <array>
+
 #include "tools/diagnose/data/signal_table.h"
 
 namespace beltgrip::diagnose {
@@ -21,6 +23,13 @@ struct OrderLine {
 };
 
 OrderLine order_line(const Channel& speed);
+
+// Lines at the belt's passage, which no whole order is: its speed is that of the primary shaft
+// times the running radius. The radius is known to a few percent: orders about the given one, these
+// shares of it, within each as narrow as a piece resolves.
+inline constexpr std::array kBeltOrders{0.96, 0.98, 1.0, 1.02, 1.04};
+using BeltLines = std::array<OrderLine, kBeltOrders.size()>;
+BeltLines belt_lines(const Channel& speed, double order);
 
 // Amplitude of a speed's departure from its smooth course over the cycles per revolution of its
 // shaft, share of the speed; empty where no piece is usable.

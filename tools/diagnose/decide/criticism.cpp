@@ -30,6 +30,29 @@ double least_whiteness(const Engine& engine) {
   return least;
 }
 
+// The line at the belt's passage, of the speed and the order that show it best, in sigmas; Hz:
+// mean.
+double belt_line(const Campaign& campaign, double& frequency_Hz) {
+  constexpr double kAmplitudeMin = 1e-4;  // of the speed: less is of no consequence for slip
+  double most = 0.0, cycles = 0.0, pieces = 0.0;
+  for (const auto lines : {&ExperimentData::belt_p, &ExperimentData::belt_s}) {
+    for (std::size_t i = 0; i < kBeltOrders.size(); ++i) {
+      OrderLine all;
+      for (const ExperimentData& run : campaign.runs) all.add((run.*lines)[i]);
+      const double sigmas = all.amplitude() / std::max(all.amplitude_sigma(), 1e-12);
+      if (all.amplitude() > kAmplitudeMin) {
+        most = std::max(most, std::min(sigmas, std::sqrt(all.chi2())));
+      }
+    }
+  }
+  for (const ExperimentData& run : campaign.runs) {
+    cycles += run.belt_Hz * run.belt_p.front().pieces;
+    pieces += run.belt_p.front().pieces;
+  }
+  frequency_Hz = cycles / std::max(pieces, 1.0);
+  return most;
+}
+
 double decades(double p) { return -std::log10(std::max(p, 1e-300)); }
 
 }  // namespace
@@ -44,7 +67,7 @@ const JudgedTest& Criticism::test(const std::string& name) const {
                        [&](const JudgedTest& each) { return each.name == name; });
 }
 
-Criticism criticise(const Engine& engine, bool coarse) {
+Criticism criticise(const Engine& engine, Steps steps) {
   Criticism out;
   out.cells = score_cells(engine);
   demote_order(out.cells);
@@ -59,12 +82,14 @@ Criticism criticise(const Engine& engine, bool coarse) {
   const ScatterRatios ratio = scatter_ratios(engine, out.base.scatter);
   const ScatterRatios unusual = scatter_ratios(engine, default_scatter());
   using namespace thresholds;
-  const double times = coarse ? kCoarse : 1.0;
+  const double times = steps == Steps::kCoarse ? kCoarse : 1.0;
+  const bool fine = steps == Steps::kFine;
   out.tests = {
       {"law_cell", law, times * kLawCell},
       {"smooth_cell", smooth, times * kSmoothCell},
-      {"line", coarse ? 0.0 : out.line.excess, kLine},
-      {"whiteness", coarse ? 0.0 : decades(least_whiteness(engine)), decades(kWhiteness)},
+      {"line", fine ? out.line.excess : 0.0, kLine},
+      {"belt_passage", belt_line(engine.campaign(), out.belt_Hz), kBeltLine},
+      {"whiteness", fine ? decades(least_whiteness(engine)) : 0.0, decades(kWhiteness)},
       {"scatter_friction", ratio.friction, kScatterFriction},
       {"scatter_ratio", ratio.ratio, kScatterRatio},
       {"scatter_torque", ratio.torque, kScatterTorque},
@@ -77,6 +102,13 @@ Criticism criticise(const Engine& engine, bool coarse) {
 Unexplained what_is_left(const Criticism& criticism) {
   const auto fails = [&](const char* name) { return !criticism.test(name).passed(); };
   Unexplained out;
+  if (fails("belt_passage")) {
+    out.acts_on = "ratio";
+    out.kind = MisfitKind::kLine;
+    out.frequency_Hz = criticism.belt_Hz;
+    out.is_belt = true;
+    return out;
+  }
   const Cell* best = criticism.cells.empty() ? nullptr : &criticism.cells.front();
   // A function of something that sweeps leaves a weak line as well.
   const bool is_line =

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tools/diagnose/data/diagnosis.h"
+#include "tools/diagnose/decide/plausibility.h"
 #include "tools/diagnose/infer/cells.h"
 #include "tools/diagnose/infer/line_test.h"
 #include "tools/diagnose/infer/scatter_base.h"
@@ -22,15 +23,16 @@ struct JudgedTest {
 struct Criticism {
   std::vector<Cell> cells;  // the best first
   SpectralLine line;
+  double belt_Hz = 0.0;  // of the belt's passage, mean
   ScatterBase base;
   std::vector<JudgedTest> tests;
   bool passed() const;
   const JudgedTest& test(const std::string& name) const;
 };
 
-// At the engine's state. coarse: channels move in steps, which leave lines and slow courses of
-// their own; those tests are left out, and a function has to explain more.
-Criticism criticise(const Engine& engine, bool coarse);
+// At the engine's state. Where channels move in steps, these leave lines and slow courses of their
+// own: those tests are left out, and where they are coarse a function has to explain more.
+Criticism criticise(const Engine& engine, Steps steps);
 
 // What is to be said of residuals that fail.
 Unexplained what_is_left(const Criticism& criticism);

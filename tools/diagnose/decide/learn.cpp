@@ -127,13 +127,13 @@ struct Trial {
 
 // Nothing where the function is not kept.
 std::optional<Trial> tried(const Engine& engine, const Criticism& before, const Cell& cell,
-                           bool coarse) {
+                           Steps steps) {
   Trial out{engine, {}, {}, 0.0};
   drop_superseded(out.engine, cell);
   out.learned.fit = fit_learned(out.engine, *cell.injection, cell.abscissa);
   const LearnedFit& fit = out.learned.fit;
   if (fit.left_out_gain < thresholds::kLeftOutLevels || !is_possible(fit)) return {};
-  out.after = criticise(out.engine, coarse);
+  out.after = criticise(out.engine, steps);
   out.excess = excess_left(before, out.after);
   if (out.excess > 1.0 - thresholds::kHealed) return {};
   out.learned.aliases = aliases_of(engine.campaign(), before, cell);
@@ -187,7 +187,7 @@ double excess_left(const Criticism& before, const Criticism& after) {
   return most;
 }
 
-Learning learn(Engine& engine, const Criticism& failed, bool coarse,
+Learning learn(Engine& engine, const Criticism& failed, Steps steps,
                const std::function<bool()>& stop) {
   Learning out;
   out.left = failed;
@@ -196,7 +196,7 @@ Learning learn(Engine& engine, const Criticism& failed, bool coarse,
     std::optional<Trial> best;
     for (const Cell* cell : candidates(before, out)) {
       if (stop()) return out;
-      std::optional<Trial> trial = tried(engine, before, *cell, coarse);
+      std::optional<Trial> trial = tried(engine, before, *cell, steps);
       if (trial && (!best || trial->excess < best->excess)) best = std::move(trial);
       if (best && best->after.passed()) break;
     }

@@ -33,7 +33,9 @@ void check_friction(const std::vector<ExperimentData>& runs,
 // By the fit of the machine's constants.
 void check_fitted_friction(const std::map<std::string, Interval>& machine, Doubts& doubts);
 
-// Pressure or torque move in steps well beyond their noise: means do not smooth that.
-bool is_coarse(const SignalTable& table);
+// Steps of pressure and torque against their noise: means smooth fine ones; something of those that
+// leak stays in means, and coarse ones stay as they are.
+enum class Steps { kFine, kLeak, kCoarse };
+Steps steps_of(const SignalTable& table);
 
 }  // namespace beltgrip::diagnose

@@ -20,6 +20,9 @@ inline constexpr double kCellBesideScatter = 9.0;
 inline constexpr double kOrderAhead = 10.0;
 // The strongest line of the residuals, in sigmas of the pooled spectrum.
 inline constexpr double kLine = 5.5;
+// The line at the belt's passage, in sigmas. That of a ripple once per revolution: sums of
+// exponential variables have heavier tails than the normal.
+inline constexpr double kBeltLine = 6.5;
 // Of the residual's fast power: what is a line and not the trace of a function that sweeps.
 inline constexpr double kLineShare = 0.2;
 // Common p-value of the residuals' autocorrelation.

@@ -130,6 +130,10 @@ std::string sentence(const Unexplained& left) {
       return "something that has no name here acts on " + left.acts_on + " and follows " +
              joined(left.depends_on) + " (" + share + ")";
     case MisfitKind::kLine:
+      if (left.is_belt) {
+        return "a line at the belt's passage (" + number(left.frequency_Hz.value_or(0.0)) +
+               " Hz in the mean, with the speed): a place of the belt that runs otherwise";
+      }
       return "a line at " + number(left.frequency_Hz.value_or(0.0)) + " Hz in " + left.acts_on +
              (left.depends_on.empty() ? "" : ", stronger with " + joined(left.depends_on));
     case MisfitKind::kBetweenRuns:

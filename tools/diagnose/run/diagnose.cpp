@@ -52,7 +52,9 @@ class Run {
     answer_.extended = request_.model;
     std::vector<ExperimentData> runs;
     drop_copies(request_.experiments, doubts_);
-    is_coarse_ = std::any_of(request_.experiments.begin(), request_.experiments.end(), is_coarse);
+    for (const SignalTable& table : request_.experiments) {
+      steps_ = std::max(steps_, steps_of(table));
+    }
     for (const SignalTable& table : request_.experiments) widen(reached_, table);
     for (const SignalTable& table : request_.held_out) widen(reached_, table);
     runs.resize(request_.experiments.size());
@@ -170,7 +172,7 @@ class Run {
   Learning criticise_and_learn(Engine& engine, Naming& naming) {
     Learning out;
     if (stop()()) return out;
-    out.left = criticise(engine, is_coarse_);
+    out.left = criticise(engine, steps_);
     if (out.left.passed()) return out;
     if (engine.accepted().empty()) {
       learn_in_turn(engine, naming, out);
@@ -181,7 +183,7 @@ class Run {
     Naming forgotten = naming;
     forget_names(bare, forgotten);
     Learning alone;
-    alone.left = criticise(bare, is_coarse_);
+    alone.left = criticise(bare, steps_);
     const Criticism nothing = alone.left;
     learn_in_turn(bare, forgotten, alone);
     const bool is_alone = !alone.terms.empty() && alone.left.passed();
@@ -198,7 +200,7 @@ class Run {
   void learn_in_turn(Engine& engine, Naming& naming, Learning& out) {
     const bool sensible = !doubts_.impossible && used_runs(engine.campaign()) >= kLearningRunsMin;
     for (int round = 0; round < kRoundsMax && sensible && !out.left.passed(); ++round) {
-      Learning more = learn(engine, out.left, is_coarse_, stop());
+      Learning more = learn(engine, out.left, steps_, stop());
       out.needs_levels = more.needs_levels;
       if (more.terms.empty()) break;
       out.left = std::move(more.left);
@@ -208,7 +210,7 @@ class Run {
       if (stop()() || engine.accepted() == before) break;
       // Other effects: what was learned beside the old ones is learned beside these.
       relearn(engine, out);
-      out.left = criticise(engine, is_coarse_);
+      out.left = criticise(engine, steps_);
     }
   }
 
@@ -388,10 +390,12 @@ class Run {
       out().verdict = Verdict::kNone;
       return;
     }
-    if (is_coarse_) {
+    if (steps_ != Steps::kFine) {
       out().notes.emplace_back(
-          "a pressure or torque moves in steps beyond its noise: lines and slow courses are not "
-          "judged, and only what is large is seen");
+          std::string(
+              "a pressure or torque moves in steps beyond its noise: lines and slow courses "
+              "are not judged") +
+          (steps_ == Steps::kCoarse ? ", and only what is large is seen" : ""));
     }
     out().scatter_from_replicates = criticism.base.from_replicates;
     for (const JudgedTest& test : criticism.tests) out().left[test.name] = {test.value, test.limit};
@@ -447,7 +451,7 @@ class Run {
     }
     const auto floors = noise_floors(campaign, naming.nominal.state);
     std::vector<ResidualTest> tests = test_residuals(engine, naming.nominal.state);
-    if (is_coarse_) {  // steps are not white, whatever the model
+    if (steps_ != Steps::kFine) {  // steps are not white, whatever the model
       std::erase_if(tests, [](const ResidualTest& test) { return test.name == "whiteness"; });
     }
     for (const UnknownGroup& group : naming.nominal_groups) {
@@ -621,7 +625,7 @@ class Run {
   Request request_;
   Answer answer_;
   Doubts doubts_;
-  bool is_coarse_ = false;
+  Steps steps_ = Steps::kFine;
   Reaches reached_{};  // by what is fitted and what is held out
 };
 
