@@ -319,6 +319,12 @@ StopReason StopDetector::step(const ExperimentRecord& record) noexcept {
       level_ = true;
       level_until_s_ = std::max(level_until_s_, now_s + slope.duration_s);
     }
+    // A friction curve rises less and less: where it rises now it was not level before.
+    if (level_ && slope.slip - slope.gained >= level_slip_ &&
+        slope.k - limits_.falling_deviations * slope.k_deviation > slope.level) {
+      level_ = false;
+      level_until_s_ = now_s;
+    }
     const bool falling =
         slope.k + std::max(limits_.falling_deviations, evidence) * slope.k_deviation < 0.0;
     if (falling || (level_ && slope.slip + limits_.ahead_s * 2.0 * slope.gained / slope.duration_s >

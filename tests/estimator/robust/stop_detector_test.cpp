@@ -18,10 +18,12 @@ double with_peak(double slip_percent) {
   return slip_percent < 3.0 ? linear(slip_percent) : linear(3.0) - 0.004 * (slip_percent - 3.0);
 }
 
-// Slip at the stop, or at the end, 5 %. Slip gains 0.12 % a second; the load is constant, and the
-// clamp force is what it takes.
-double slip_at_stop(double (*curve)(double), double wander_Nm, std::uint64_t seed) {
-  constexpr double kTorque_Nm = 25.0, kBegin_s = 4.0;
+double slowly(double t_s) { return 0.5 + 0.12 * std::max(0.0, t_s - 4.0); }
+
+// Slip at the stop, or at the end, 5 %. The load is constant, and the clamp force is what it takes.
+double slip_at_stop(double (*curve)(double), double wander_Nm, std::uint64_t seed,
+                    double (*slip_at)(double) = slowly) {
+  constexpr double kTorque_Nm = 25.0;
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
   ExperimentRecord record(kRate_hz);
@@ -31,7 +33,7 @@ double slip_at_stop(double (*curve)(double), double wander_Nm, std::uint64_t see
   double wander = normal(random), slip = 0.5;
   for (int i = 0; slip < 5.0; ++i) {
     const double t_s = i / kRate_hz;
-    slip = 0.5 + 0.12 * std::max(0.0, t_s - kBegin_s);
+    slip = slip_at(t_s);
     wander = faded * wander + std::sqrt(1.0 - faded * faded) * normal(random);
     const Cell sample{.t_s = t_s,
                       .slip_percent = slip + 0.01 * normal(random),
@@ -51,6 +53,20 @@ TEST(StopDetector, ATorqueThatWandersIsNoFrictionThatFalls) {
   }
   EXPECT_LE(early, 1);
   EXPECT_LE(late, 2);
+}
+
+// Before the ramp slip drifts by 0.4 % under one force, and friction seems level. In the ramp, slip
+// gains as much as a level curve is followed for, and more, within a second: friction rises.
+TEST(StopDetector, WhatRisesNowWasNotLevelBefore) {
+  const auto drifts = [](double slip) { return 0.05 + 0.012 * std::max(0.0, slip - 0.9); };
+  const auto then_fast = [](double t_s) {
+    return 0.5 + 0.1 * std::clamp(t_s - 4.0, 0.0, 4.0) + 0.9 * std::max(0.0, t_s - 8.0);
+  };
+  int early = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    early += slip_at_stop(drifts, 0.0, seed, then_fast) < 4.0;
+  }
+  EXPECT_LE(early, 1);
 }
 
 TEST(StopDetector, StopsSoonBehindAPeak) {
