@@ -254,11 +254,13 @@ class RobustEstimator final : public SlipCurveEstimator {
   // What the curve may still rise by beyond the data, if they do not hold its top: as much as a
   // power law of that slope, the friction that bends least, up to where friction counts. In drive
   // what the clamp force deforms is read as slip: the belt may slip by less.
-  double further_rise(const PeakFitResult& fit) const noexcept {
+  struct Rise {
+    double expected = 0.0, uncertain = 0.0;  // its one-sided 95 % beyond that
+  };
+  Rise further_rise(const PeakFitResult& fit) const noexcept {
     const double outside = 1.0 - fit.inside;  // probability
-    if (!fit.end_slope_valid) return outside * kUnknownRise * fit.mu;
-    if (!(fit.end_slip > 0.0)) return 0.0;
-    const double slope = fit.end_slope + kRiseDeviations * std::sqrt(fit.end_slope_variance);
+    if (!fit.end_slope_valid) return {.expected = outside * kUnknownRise * fit.mu};
+    if (!(fit.end_slip > 0.0)) return {};
     const bool drive = chain_.point().direction == Direction::kDrive;
     const double deformed =
         drive ? kPercent * kDeformationMost_1_N * record_.force_line().at(record_.duration_s())
@@ -266,8 +268,10 @@ class RobustEstimator final : public SlipCurveEstimator {
     // Of all slips that it may be, the one from which such a law rises most.
     const double slip = std::min(
         fit.end_slip, std::max(fit.end_slip - deformed, kFrictionTo_percent / std::numbers::e));
-    const double to_come = std::max(0.0, std::log(kFrictionTo_percent / slip));
-    return outside * std::max(0.0, slope) * slip * to_come;
+    const double per_slope = outside * slip * std::max(0.0, std::log(kFrictionTo_percent / slip));
+    const double most = fit.end_slope + kRiseDeviations * std::sqrt(fit.end_slope_variance);
+    const double expected = std::max(0.0, fit.end_slope);
+    return {per_slope * expected, per_slope * std::max(0.0, most - expected)};
   }
 
   // A value is an interval that is narrow enough, whether friction turned down or lies level.
@@ -383,7 +387,9 @@ class RobustEstimator final : public SlipCurveEstimator {
     const double square = fit.mu * fit.mu;
     const double noise_variance = fit.variance + square * alike_variance(fit.t_s, fit.held_share);
     const double noise = kNormal95 * std::max(std::sqrt(noise_variance), kSmallestStd);
-    const double low = fit.mu - noise, high = fit.mu + std::hypot(noise, further_rise(fit));
+    const Rise rise = further_rise(fit);
+    const double low = fit.mu - noise;
+    const double high = fit.mu + rise.expected + std::hypot(noise, rise.uncertain);
     if (fit.valid && seen && is_value(fit.mu, low, high)) {
       const double sensors = kNormal95 * fit.mu * std::sqrt(sensor_variance(fit.mu, F));
       peak_.kind = PeakKind::kValue;

@@ -72,7 +72,7 @@ TEST(Panel, OnTheForceFloorTheBoundComesToWhatTheDataCarry) {
 }
 
 // A value is an interval; where friction rises on it should reach up to the truth at 10 % of slip.
-// Known to miss it in one trace of twelve: noise that looks like a fall.
+// Known to miss it in one value of five: noise that looks like a fall.
 TEST(Panel, ACurveThatRisesForEverSeldomGivesAValueThatMisses) {
   const auto rising = [](std::uint64_t seed) {
     Scenario scenario = draw_scenario(seed);
@@ -88,7 +88,11 @@ TEST(Panel, ACurveThatRisesForEverSeldomGivesAValueThatMisses) {
     return peak.kind == estimator::PeakKind::kValue &&
            (trace.mu_max < peak.noise_low || trace.mu_max > peak.noise_high);
   });
-  EXPECT_LE(misses, kRisingTraces / 10);
+  const auto values = std::count_if(traces.begin(), traces.end(), [](const Judged& trace) {
+    return trace.robust.peak.kind == estimator::PeakKind::kValue;
+  });
+  EXPECT_GE(values, kRisingTraces / 3);
+  EXPECT_LE(misses, values / 4);
   EXPECT_GE(robust.bound_right, 97.0);
 }
 
