@@ -13,6 +13,9 @@ namespace beltgrip::can::dbc {
 template <typename Object, typename Said>
 class Gathered {
  public:
+  // notes: about as many as there will be.
+  explicit Gathered(std::size_t notes) { notes_.reserve(notes); }
+
   void add(Object* object, Said said) { notes_.push_back({object, std::move(said)}); }
 
   // take(object, said) with all that was noted of it, in the order in which it was.

@@ -838,7 +838,7 @@ bool StatementReader::comment() {
   expect_semicolon();
   comment.offset = start_;
   comment.end = scan_.position();
-  draft_.comments.push_back(std::move(comment));
+  draft_.comments.push_back(comment);
   return true;
 }
 
@@ -915,7 +915,7 @@ bool StatementReader::attribute_default() {
   expect_semicolon();
   reference.offset = start_;
   reference.end = scan_.position();
-  draft_.attributes.push_back(std::move(reference));
+  draft_.attributes.push_back(reference);
   return true;
 }
 
@@ -929,7 +929,7 @@ bool StatementReader::attribute() {
   expect_semicolon();
   reference.offset = start_;
   reference.end = scan_.position();
-  draft_.attributes.push_back(std::move(reference));
+  draft_.attributes.push_back(reference);
   return true;
 }
 
@@ -960,7 +960,7 @@ bool StatementReader::relation() {
   expect_semicolon();
   reference.offset = start_;
   reference.end = scan_.position();
-  draft_.relations.push_back(std::move(reference));
+  draft_.relations.push_back(reference);
   return true;
 }
 
@@ -1020,7 +1020,7 @@ bool StatementReader::value_table() {
   if (!value_list(table)) return false;
   expect_semicolon();
   const auto [place, is_new] =
-      draft_.database.value_tables.insert_or_assign(draft_.utf8(name), std::move(table));
+      draft_.database.value_tables.insert_or_assign(draft_.utf8(name), table);
   if (!is_new) {
     draft_.problems.warn(start_, "duplicate-table",
                          "value table \"" + clip(place->first) + "\" again; this one is used");
@@ -1047,7 +1047,7 @@ bool StatementReader::values() {
   expect_semicolon();
   reference.offset = start_;
   reference.end = scan_.position();
-  draft_.values.push_back(std::move(reference));
+  draft_.values.push_back(reference);
   return true;
 }
 
@@ -1132,7 +1132,7 @@ bool StatementReader::multiplex_values() {
   expect_semicolon();
   reference.offset = start_;
   reference.end = scan_.position();
-  draft_.multiplexes.push_back(std::move(reference));
+  draft_.multiplexes.push_back(reference);
   return true;
 }
 

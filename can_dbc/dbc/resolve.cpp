@@ -53,9 +53,9 @@ class Resolver {
   void attribute_defaults();
   void attributes();
   struct AttributeValue {
-    Text name;
+    const AttributeRef* reference = nullptr;
     Text text;
-    std::size_t offset = 0;
+    Text name() const { return reference->attribute; }
   };
   Attributes attribute_table(std::vector<AttributeValue>& values);
   void relations();
@@ -188,7 +188,7 @@ EnvironmentVariable* Resolver::find_variable(std::string_view name) {
 }
 
 void Resolver::comments() {
-  Gathered<Text, const CommentRef*> said;
+  Gathered<Text, const CommentRef*> said(draft_.comments.size());
   for (const CommentRef& reference : draft_.comments) {
     const auto take = [&](Text& comment) { said.add(&comment, &reference); };
     if (reference.object.empty()) {
@@ -314,10 +314,10 @@ void Resolver::attribute_defaults() {
 }
 
 void Resolver::attributes() {
-  Gathered<Attributes, AttributeValue> said;
+  Gathered<Attributes, AttributeValue> said(draft_.attributes.size());
   for (const AttributeRef& reference : draft_.attributes) {
     if (reference.object == "default") continue;
-    const AttributeValue value{reference.attribute, attribute_text(reference), reference.offset};
+    const AttributeValue value{&reference, attribute_text(reference)};
     const auto take = [&](Attributes& attributes) { said.add(&attributes, value); };
     if (reference.object.empty()) {
       take(db_.attributes);
@@ -350,17 +350,17 @@ void Resolver::attributes() {
 Attributes Resolver::attribute_table(std::vector<AttributeValue>& values) {
   std::stable_sort(
       values.begin(), values.end(),
-      [](const AttributeValue& a, const AttributeValue& b) { return a.name < b.name; });
+      [](const AttributeValue& a, const AttributeValue& b) { return a.name() < b.name(); });
   entries_.clear();
   for (const AttributeValue& value : values) {
-    if (entries_.empty() || entries_.back().first != value.name) {
-      entries_.emplace_back(value.name, value.text);
+    if (entries_.empty() || entries_.back().first != value.name()) {
+      entries_.emplace_back(value.name(), value.text);
       continue;
     }
     entries_.back().second = value.text;
     draft_.problems.warn(
-        value.offset, "duplicate-attribute",
-        "attribute \"" + clip(value.name) + "\" of the same object again; this value is used");
+        value.reference->offset, "duplicate-attribute",
+        "attribute \"" + clip(value.name()) + "\" of the same object again; this value is used");
   }
   return draft_.arena().table(entries_);
 }
@@ -386,7 +386,7 @@ void Resolver::relations() {
         relation.object = draft_.arena().keep(relation.object + "." + draft_.utf8(reference.name));
       }
     }
-    db_.relations.push_back(std::move(relation));
+    db_.relations.push_back(relation);
   }
 }
 
@@ -654,7 +654,7 @@ void Resolver::long_names() {
     for (auto& [name, node] : db_.node_details) {
       const auto found = nodes.find(name);
       if (found != nodes.end()) node.short_name = name;
-      details.insert_or_assign(found != nodes.end() ? found->second : name, std::move(node));
+      details.insert_or_assign(found != nodes.end() ? found->second : name, node);
     }
     db_.node_details = std::move(details);
     for (Text& name : db_.nodes) rename_node(name);

@@ -187,6 +187,7 @@ can::ValueTable values_of(std::vector<std::string> texts, can::Arena& arena) {
     values[usual >= 0 && !values.contains(usual) ? usual : next++] = text;
   }
   std::vector<std::pair<std::int64_t, can::Text>> entries;
+  entries.reserve(values.size());
   for (const auto& [value, text] : values) entries.emplace_back(value, arena.keep(text));
   return arena.table(entries);
 }
