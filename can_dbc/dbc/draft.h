@@ -28,12 +28,14 @@ struct MessageSource {
   std::vector<SignalSource> signals;
 };
 
+enum class Object : std::uint8_t { kNetwork, kNode, kMessage, kSignal, kVariable, kDefault };
+
 // A statement that refers to objects by identifier and name.
 struct Reference {
   std::size_t offset = 0;  // of the statement
   std::size_t end = 0;
-  std::string_view object;  // "BU_", "BO_", "SG_", "EV_"; empty: the network
   std::uint32_t raw_id = 0;
+  Object object = Object::kNetwork;
   std::string_view name;  // of the signal, node or variable
 };
 

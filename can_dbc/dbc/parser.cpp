@@ -816,7 +816,10 @@ bool StatementReader::object_of(Reference& reference) {
   const std::string_view word = scan_.peek_word();
   if (word != "BU_" && word != "BO_" && word != "SG_" && word != "EV_") return true;
   scan_.word();
-  reference.object = word;
+  reference.object = word == "BU_"   ? Object::kNode
+                     : word == "BO_" ? Object::kMessage
+                     : word == "SG_" ? Object::kSignal
+                                     : Object::kVariable;
   if ((word == "BO_" || word == "SG_") && !expect_id(reference.raw_id)) return false;
   if (word == "BO_") return true;
   scan_.skip_blank();
@@ -907,7 +910,7 @@ bool StatementReader::attribute_value(Text& value) {
 
 bool StatementReader::attribute_default() {
   AttributeRef reference;
-  reference.object = "default";
+  reference.object = Object::kDefault;
   if (!expect_string(reference.attribute, StringContext::kName, "the attribute's name in quotes")) {
     return false;
   }
@@ -1033,7 +1036,7 @@ bool StatementReader::values() {
   scan_.skip_blank();
   // "id signal", or the name of an environment variable.
   const bool signal = is_digit(scan_.peek()) || scan_.peek() == '-';
-  reference.object = signal ? "SG_" : "EV_";
+  reference.object = signal ? Object::kSignal : Object::kVariable;
   if (signal && !expect_id(reference.raw_id)) return false;
   if (!expect_name(reference.name, "a name")) return false;
   scan_.skip_blank();
@@ -1068,7 +1071,7 @@ void StatementReader::names_until_semicolon(std::vector<Text>& names) {
 
 bool StatementReader::signal_group() {
   GroupRef reference;
-  reference.object = "BO_";
+  reference.object = Object::kMessage;
   std::string_view name;
   if (!expect_id(reference.raw_id) || !expect_name(name, "the group's name")) return false;
   scan_.skip_blank();
@@ -1088,7 +1091,7 @@ bool StatementReader::signal_group() {
 
 bool StatementReader::value_type() {
   ValueTypeRef reference;
-  reference.object = "SG_";
+  reference.object = Object::kSignal;
   if (!expect_id(reference.raw_id) || !expect_name(reference.name, "the signal's name")) {
     return false;
   }
@@ -1104,7 +1107,7 @@ bool StatementReader::value_type() {
 bool StatementReader::multiplex_values() {
   MultiplexRef reference;
   std::vector<ValueRange> ranges;
-  reference.object = "SG_";
+  reference.object = Object::kSignal;
   if (!expect_id(reference.raw_id) || !expect_name(reference.name, "the signal's name") ||
       !expect_name(reference.selector, "the multiplexer's name")) {
     return false;
@@ -1138,7 +1141,7 @@ bool StatementReader::multiplex_values() {
 
 bool StatementReader::senders() {
   SendersRef reference;
-  reference.object = "BO_";
+  reference.object = Object::kMessage;
   if (!expect_id(reference.raw_id)) return false;
   scan_.accept(':');
   names_until_semicolon(reference.senders);

@@ -191,15 +191,15 @@ void Resolver::comments() {
   Gathered<Text, const CommentRef*> said(draft_.comments.size());
   for (const CommentRef& reference : draft_.comments) {
     const auto take = [&](Text& comment) { said.add(&comment, &reference); };
-    if (reference.object.empty()) {
+    if (reference.object == Object::kNetwork) {
       take(db_.comment);
-    } else if (reference.object == "BO_") {
+    } else if (reference.object == Object::kMessage) {
       for_messages(reference, [&](MessageDef& message) { take(message.comment); });
-    } else if (reference.object == "SG_") {
+    } else if (reference.object == Object::kSignal) {
       for_signals(reference, [&](SignalDef& signal) { take(signal.comment); });
     } else if (reference.name.empty()) {
       draft_.keep(reference.offset, reference.end);
-    } else if (reference.object == "BU_") {
+    } else if (reference.object == Object::kNode) {
       const Text name = draft_.utf8(reference.name);
       if (!nodes_.contains(name)) {
         unresolved(reference, "unknown-node", "no node is named \"" + clip(name) + "\"");
@@ -302,7 +302,7 @@ Text Resolver::attribute_text(const AttributeRef& reference) {
 
 void Resolver::attribute_defaults() {
   for (const AttributeRef& reference : draft_.attributes) {
-    if (reference.object != "default") continue;
+    if (reference.object != Object::kDefault) continue;
     const auto found = definitions_.find(reference.attribute);
     if (found == definitions_.end()) {
       unresolved(reference, "undefined-attribute",
@@ -316,18 +316,18 @@ void Resolver::attribute_defaults() {
 void Resolver::attributes() {
   Gathered<Attributes, AttributeValue> said(draft_.attributes.size());
   for (const AttributeRef& reference : draft_.attributes) {
-    if (reference.object == "default") continue;
+    if (reference.object == Object::kDefault) continue;
     const AttributeValue value{&reference, attribute_text(reference)};
     const auto take = [&](Attributes& attributes) { said.add(&attributes, value); };
-    if (reference.object.empty()) {
+    if (reference.object == Object::kNetwork) {
       take(db_.attributes);
-    } else if (reference.object == "BO_") {
+    } else if (reference.object == Object::kMessage) {
       for_messages(reference, [&](MessageDef& message) { take(message.attributes); });
-    } else if (reference.object == "SG_") {
+    } else if (reference.object == Object::kSignal) {
       for_signals(reference, [&](SignalDef& signal) { take(signal.attributes); });
     } else if (reference.name.empty()) {
       draft_.keep(reference.offset, reference.end);  // said before
-    } else if (reference.object == "BU_") {
+    } else if (reference.object == Object::kNode) {
       const Text name = draft_.utf8(reference.name);
       if (!nodes_.contains(name)) {
         unresolved(reference, "unknown-node", "no node is named \"" + clip(name) + "\"");
@@ -422,7 +422,7 @@ void Resolver::values() {
       }
       values = reference.values;
     };
-    if (reference.object == "SG_") {
+    if (reference.object == Object::kSignal) {
       if (reference.values.empty()) continue;
       for_signals(reference, [&](SignalDef& signal) { take(signal.values); });
     } else if (EnvironmentVariable* variable = find_variable(draft_.utf8(reference.name))) {

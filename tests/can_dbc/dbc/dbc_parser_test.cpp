@@ -437,7 +437,7 @@ TEST(DbcParser, UndeclaredNodesAreOneWarningEach) {
 
 TEST(DbcParser, EncodingsGiveUtf8) {
   const std::string rest = " A\n";
-  const auto unit_of = [](const std::string& text) {
+  const auto unit_of = [](const std::string& text) -> std::string {
     const DbcParseResult result = parse(text);
     EXPECT_EQ(result.database.messages.size(), 1U);
     return result.database.messages.at(0).signals.at(0).unit;
