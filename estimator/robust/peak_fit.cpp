@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/robust/thresholds.h"
 #include "estimator/signal/slow_noise.h"
 #include "estimator/statistics/square.h"
 
@@ -423,6 +424,9 @@ void PeakFit::find_reached(std::size_t length) noexcept {
     if (inertia_ > 0.0) {
       torque_variance += square(end.held_share) * record_->torque_line().variance_at(end.t_s);
     }
+    // Windows share the slow error: it is not the largest of many.
+    torque_variance += square(kBoundDeviations / kReachedDeviations) *
+                       record_->torque_slow_variance() * slow_variance_of_mean(time_s);
     const double deviation =
         std::sqrt(torque_variance / square(T) + force_variance(begin.t_s - 0.5 * begin.duration_s,
                                                                end.t_s + 0.5 * end.duration_s) /

@@ -41,7 +41,6 @@ constexpr double kChordDeviations = 5.5;   // beyond these the points lie on no 
 constexpr double kInnovation = 5.0;
 constexpr double kRuns = 4.5;
 constexpr double kSlipOfATop_percent = 1.5;  // less of it is that of a belt that grips
-constexpr double kBoundDeviations = 2.33;    // 99 %, one-sided
 
 class RobustEstimator final : public SlipCurveEstimator {
  public:

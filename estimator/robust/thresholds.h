@@ -13,6 +13,9 @@ inline constexpr double kRiseDeviations = 1.64;
 // half of an interval that is a value by default.
 inline constexpr double kUnknownRise = 0.05;
 
+// One-sided 99 % of what a lower bound rests on, in deviations. Derived: a normal quantile.
+inline constexpr double kBoundDeviations = 2.33;
+
 // Stretch of slip over which the slope at the end is taken: so many percent, or this share of the
 // slip. Chosen: long enough for the noise of a car, short beside the rise.
 inline constexpr double kEndLeast_percent = 0.5;
