@@ -65,6 +65,9 @@ class SlipCurveEstimator {
   virtual void reset() noexcept = 0;
   // One sample. An unusable sample changes no state and yields usable = false.
   virtual const CurveEstimate& step(const VariatorSample& sample) noexcept = 0;
+  // Whoever lowers the force has seen friction rise no more and ends there: the data hold the top,
+  // whether it is flat or falls. Before conclude().
+  virtual void ends_at_the_top() noexcept {}
   // After the last step (stop, end of trace, abort): call once per sample until it returns true.
   // Steps may follow: the curve goes on, the peak stays.
   virtual bool conclude() noexcept = 0;

@@ -17,7 +17,7 @@ constexpr std::size_t kFewestPoints = 8;
 // Work of one step; that on forms in instructions, about.
 constexpr std::size_t kCellsPerStep = 48, kPointsPerStep = 64, kFormsPerStep = 128;
 constexpr std::size_t kLevelsPerStep = 4;
-constexpr int kFormWork = 10000, kPointWork = 130, kSolveWork = 650;
+constexpr int kFormWork = 8000, kPointWork = 130, kSolveWork = 650;
 constexpr std::size_t kTermsPerStep = 16;
 constexpr double kSlipStep = 0.04;  // percent: slip moves on by this, or
 constexpr double kShortestPoint_s = 0.02;

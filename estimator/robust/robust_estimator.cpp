@@ -84,7 +84,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     narrow_ = 0;
     first_mu_ = first_force_N_ = 0.0;
     started_ = concluding_ = concluded_ = false;
-    waiting_ = refitting_ = stepped_ = false;
+    waiting_ = refitting_ = stepped_ = at_the_top_ = false;
   }
 
   const CurveEstimate& step(const VariatorSample& read) noexcept override {
@@ -124,6 +124,8 @@ class RobustEstimator final : public SlipCurveEstimator {
     return out_;
   }
 
+  void ends_at_the_top() noexcept override { at_the_top_ = true; }
+
   bool conclude() noexcept override {
     if (concluded_ || !started_) return true;
     if (!concluding_) {
@@ -146,8 +148,8 @@ class RobustEstimator final : public SlipCurveEstimator {
     judge();
     refuse_impossible(peak_, reading_reach_);
     // What the belt did next may tell what the curve up to the stop leaves open.
-    waiting_ = !refitting_ && out_.stop == StopReason::kSlope && peak_.kind != PeakKind::kValue &&
-               !peak_.contradictory && !peak_.impossible;
+    waiting_ = !refitting_ && (out_.stop == StopReason::kSlope || at_the_top_) &&
+               peak_.kind != PeakKind::kValue && !peak_.contradictory && !peak_.impossible;
     concluded_ = !waiting_;
     return concluded_;
   }
@@ -369,6 +371,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     // Torque that fades is no friction that falls.
     const bool seen = out_.stop == StopReason::kSlope || out_.stop == StopReason::kSlip ||
                       out_.stop == StopReason::kSlipRate ||
+                      (at_the_top_ && fit.passed) ||
                       (out_.stop != StopReason::kTorque && fit.inside >= kInsideWithoutStop &&
                        fit.passed && fit.fall > kFallDeviations * std::sqrt(fit.fall_variance));
     peak_.samples = std::lround(fit.duration_s * sample_rate_hz_);
@@ -465,7 +468,8 @@ class RobustEstimator final : public SlipCurveEstimator {
   bool started_ = false, concluding_ = false, concluded_ = false;
   bool waiting_ = false;    // for what comes after the stop
   bool refitting_ = false;  // with it
-  bool stepped_ = false;    // since the last conclude()
+  bool at_the_top_ = false;
+  bool stepped_ = false;  // since the last conclude()
 };
 
 }  // namespace

@@ -21,6 +21,7 @@ class EstimateStage {
   void step(const estimator::VariatorSample& sample, const estimator::LearnedConditions& now,
             bool only_watches) noexcept;
   void reset() noexcept { method_->reset(); }  // the curve of the last sample stays
+  void ends_at_the_top() noexcept { method_->ends_at_the_top(); }
   // Once per sample after the last step of an experiment, until it returns true: then peak().
   bool conclude() noexcept { return method_->conclude(); }
   const estimator::PeakEstimate& peak() const noexcept { return method_->peak(); }

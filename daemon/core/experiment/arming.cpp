@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "daemon/core/experiment/ramp_rate.h"
 #include "estimator/physics/slip.h"
 #include "estimator/signal/signal_chain.h"
 
@@ -24,12 +25,13 @@ constexpr double kLeastFriction = 0.085;
 constexpr double kKnownLeast = 0.95;
 constexpr double kDetection_s = 0.03;  // derived: six samples, of filters and sampler
 constexpr double kBeyondPeak_s = 1.0;  // acquisition at the start, and slip until it is seen
-// Chosen: of the coast-down, kept when a request waits; more of it waits less.
-constexpr double kSpare_s = 0.5;
+// Measured: of the coast-down, kept when a request waits. A car leaves the end stop before the
+// least speed that is configured, and a ramp may last longer than reckoned: with 0.5 s 29 of 179
+// peaks in reach were lost to the end of the coast-down, with 3 s 7 (campaign --nothing-wrong).
+constexpr double kSpare_s = 3.0;
+constexpr double kRideSpare_s = 0.5;  // chosen: the same, where a request rides the floor
 // Chosen: the middle of the slip rates that a crossing may have, before one is found.
 constexpr double kPlanned_1_s = 0.025;
-// Chosen: of the patience, so that what was found at its end can still be begun.
-constexpr Duration kWaits = Arming::kPatience - 500 * kMillisecond;
 constexpr double kRoomGained = 0.001;  // chosen: of slip, a tenth of a point is worth waiting for
 constexpr double kFurther = 0.95;      // chosen: of the speed; is there more room a little later?
 // A fall that was seen once may be steeper the next time.
@@ -163,7 +165,7 @@ void Arming::look(const Now& now) noexcept {
   const double least_rad_s = settings_.primary_speed_min_rad_s;
   const double ramp_rad_s = slowing * ramp_s(here, kPlanned_1_s);
   const RampPoint soon = point_at(now, std::max(least_rad_s, now.omega_p_rad_s - ramp_rad_s));
-  const double spare_rad_s = slowing * (kBeyondPeak_s + kSpare_s);
+  const double spare_rad_s = slowing * (kBeyondPeak_s + kRideSpare_s);
   // What a request that began now could ride the floor to.
   const double longest_s = seconds(limits::kRequestLongest);
   const double ridden_rad_s =
@@ -200,6 +202,8 @@ RampPoint Arming::point_at(const Now& now, double omega_p_rad_s) const noexcept 
   point.fall = now.shown.fall > 0.0 ? std::max(kFallLeast, kFallMargin * now.shown.fall)
                                     : kPercent * settings_.fall_max_per_percent;
   point.fall_at_fault = now.shown.fall > 0.0 ? point.fall : kFaultShare * point.fall;
+  const double noise_1_s = slip_course_.rate_deviation_1_s();
+  point.slip_rate_noise_1_s = std::isfinite(noise_1_s) ? noise_1_s : 0.0;  // nothing has moved yet
   return point;
 }
 
@@ -212,11 +216,12 @@ Reaction Arming::reaction(const Now& now) const noexcept {
   return reaction;
 }
 
-// Fast to half the friction expected, then at the rate near the top.
+// Fast to where the first peaks may lie, then at the rate near the top.
 double Arming::ramp_s(const RampPoint& point, double slip_rate_1_s) const noexcept {
   const double peak_N = peak_force_N(point, point.mu_expected);
-  const double near_N = std::clamp(2.0 * peak_N, std::min(peak_N, point.own_force_N),
-                                   std::max(peak_N, point.own_force_N));
+  const double near_N =
+      std::clamp(peak_force_N(point, kBelowPeaks * point.mu_least),
+                 std::min(peak_N, point.own_force_N), std::max(peak_N, point.own_force_N));
   const double top_N_per_s = std::min(
       rate_max_N_per_s_,
       ramp_at_the_top_N_per_s(point, settings_.actuator_dead_time_s + settings_.actuator_lag_s,
@@ -241,9 +246,8 @@ std::uint32_t Arming::clearance(const Now& now) noexcept {
   const double needed_s = ramp_s(point, planned_1_s) + kBeyondPeak_s;
   const double patience_s = seconds(kPatience);
   const bool slows = slowing * patience_s > (1.0 - kFurther) * now.omega_p_rad_s;
-  const bool waits = slows && now.t - held_since_ < kSettle + kWaits &&
-                     needed_s + kSpare_s < left_s &&
-                     (later_.crossing().peak_slip_max > crossing.peak_slip_max + kRoomGained ||
+  const bool waits = slows && needed_s + kSpare_s < left_s &&
+                     (later_.crossing().peak_slip_told > crossing.peak_slip_told + kRoomGained ||
                       reachable_mu(point) < point.mu_expected);
   if (waits) return inhibit_bit(Inhibit::kWait);
   if (crossing.slip_rate_1_s <= 0.0) {
@@ -321,6 +325,7 @@ void Arming::step(const Now& now) noexcept {
     looked_ = cleared_ = false;
     search_ = later_ = {};
     slip_percent_ = slip_samples_ = 0.0;
+    slip_course_.begin(ratio_since_, now.torque_Nm);
     force_count_ = 0;
     force_rests_ = false;
     block_since_ = now.t;
@@ -330,6 +335,7 @@ void Arming::step(const Now& now) noexcept {
   last_ = now.t;
   slip_samples_ = std::min(slip_samples_ + 1.0, std::max(1.0, kSlipMean / step));
   slip_percent_ += (now.slip_percent - slip_percent_) / slip_samples_;
+  slip_course_.step(now.t, now.omega_s_rad_s / now.omega_p_rad_s);
   follow_force(now);
   const Duration held = now.t - held_since_;
   settled_ = held >= kSettle;
@@ -348,7 +354,8 @@ void Arming::step(const Now& now) noexcept {
   const std::uint32_t quiet = now.watched ? 0U : inhibit_bit(Inhibit::kQuiet);
   inhibits_ = unclear_ | moving | quiet;
   cleared_ = looked_ && inhibits_ == 0;
-  settled_ = cleared_ || held >= kSettle + kPatience;
+  const bool waits = (inhibits_ & inhibit_bit(Inhibit::kWait)) != 0;
+  settled_ = cleared_ || (held >= kSettle + kPatience && !waits);
 }
 
 }  // namespace beltgrip::daemon

@@ -5,7 +5,8 @@
 // The trigger holds while no precondition is missing. It has settled when it has held for kSettle
 // without the speed ratio or the torque moving by more than kRatioDrift and kTorqueDrift; and, with
 // control "command", either the way is clear and the controller's own force at rest, or patience
-// has run out: as the vehicle slows down, what was out of reach may come into reach.
+// has run out and waiting gains nothing: as the vehicle slows down, what was out of reach may come
+// into reach.
 //
 // The way is planned to where the belt will cross its peak: as the vehicle slows down, the floor of
 // the force, the slip speed and the energy leave room for later peaks, while the shaft can run away
@@ -22,6 +23,7 @@
 #include "daemon/core/config/options/config.h"
 #include "daemon/core/experiment/reachability.h"
 #include "daemon/core/experiment/request_plan.h"
+#include "daemon/core/experiment/slip_course.h"
 #include "daemon/core/input/stop_cause.h"
 #include "estimator/method/slip_curve_estimator.h"
 
@@ -200,6 +202,7 @@ class Arming {
   double omega_p_since_ = 0.0;
   double slip_percent_ = 0.0;
   double slip_samples_ = 0.0;
+  SlipCourse slip_course_;  // for its noise
   MonoTime last_ = 0;  // sample while the trigger holds
   // Means of the own force over kForceBlock each since the trigger holds, newest at count - 1.
   static constexpr std::size_t kForceBlocks = 10;

@@ -13,8 +13,7 @@ constexpr double kPercent = 100.0;
 constexpr double kSlipAtStart = 0.01;
 // And of a late peak more: at 57 % of its friction a belt has come 28 % of the way in slip.
 constexpr double kStartShare = 0.3;
-constexpr double kNearPeak = 0.85;   // of the largest friction expected
-constexpr double kBelowPeaks = 0.8;  // of the least
+constexpr double kNearPeak = 0.85;  // of the largest friction expected
 // A slip rate that is no noise, and above what the ramp holds: 4.5 deviations of a window; at the
 // least what the quietest speeds need.
 constexpr double kRateDeviations = 4.5;

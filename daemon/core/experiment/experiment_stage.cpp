@@ -486,6 +486,11 @@ bool ExperimentStage::stopped_by_slip() const noexcept {
                               reason == StopReason::kSlipEnergy || reason == StopReason::kRoom);
 }
 
+bool ExperimentStage::stopped_at_the_top() const noexcept {
+  return running_.stop_reason == StopReason::kSlipEnergy ||
+         running_.stop_reason == StopReason::kSlipRate;
+}
+
 EndedExperiment ExperimentStage::ended() const noexcept {
   const StopReason reason = running_.stop_reason;
   EndedExperiment ended;

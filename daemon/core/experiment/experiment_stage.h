@@ -88,6 +88,8 @@ class ExperimentStage {
   StopCause obstacle() const noexcept;
   std::uint32_t inhibits() const noexcept { return by_conditions() ? arming_.inhibits() : 0U; }
   bool stopped_by_slip() const noexcept;
+  // Its own stop, for friction that no longer rises with slip.
+  bool stopped_at_the_top() const noexcept;
   EndedExperiment ended() const noexcept;
 
   void go_on_from(const ExperimentStage& before, bool keeps_results) noexcept;

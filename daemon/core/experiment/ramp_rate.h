@@ -5,6 +5,9 @@
 
 namespace beltgrip::daemon {
 
+// Chosen: of the least friction of a belt, what no peak lies below.
+inline constexpr double kBelowPeaks = 0.8;
+
 struct RampLaw {
   double rate_max_N_per_s = 0.0;
   double rate_top_N_per_s = 0.0;  // near the peak

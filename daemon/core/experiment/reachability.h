@@ -12,10 +12,13 @@
 //                                y = y1 - g (1 - exp(-t / tau)),  g = F_own / F_pk - 1 + y1
 // Friction may fall as steeply as the point says, and is then seen early; or hardly at all, and is
 // seen late: a crossing has to hold for both. Slip energy counts from the peak on: below it, slip
-// is what every such belt does all day.
+// is what every such belt does all day. On a flat top the request ends itself for that energy
+// (slip_damage), so that only what comes after its decision needs room beforehand.
 #pragma once
 
 #include <cstddef>
+
+#include "daemon/core/base/limits.h"
 
 namespace beltgrip::daemon {
 
@@ -24,6 +27,7 @@ struct SlipLimits {
   double slip_max = 0.10;  // ever
   double slip_speed_max_m_s = 0.8;
   double energy_max_J = 90.0;  // dissipated beyond the peak; 100 less what a model may be off
+  double energy_stop_J = limits::kRequestEnergy_J;  // there the request ends itself
 };
 
 // How long it takes from a fault, or the stop decision, to force.
@@ -52,6 +56,7 @@ struct RampPoint {
   // the worst single fault beside it.
   double fall = 0.0;
   double fall_at_fault = 0.0;
+  double slip_rate_noise_1_s = 0.0;  // one standard deviation, as a slip course reads it
 };
 
 // mu* at the force floor: the largest that can be reached.
@@ -66,6 +71,7 @@ struct Excursion {
   double slip = 0.0;    // the largest beyond the peak
   double time_s = 0.0;  // spent beyond the peak
   double area_s = 0.0;  // integral of the slip beyond the peak over that time
+  double late_s = 0.0;  // of that time, after the decision and the actuator's own answer
 };
 // What becomes of the slip when the belt passes its peak at this slip rate, friction falls by
 // `fall` behind it, the estimator needs detection_s after slip_to_see beyond the peak, and
@@ -77,17 +83,22 @@ Excursion excursion(const RampPoint& point, const Reaction& reaction, double sli
 struct Crossing {
   double slip_rate_1_s = 0.0;     // 0: none is safe
   double ramp_top_N_per_s = 0.0;  // near the peak
-  // What it costs at most, beyond a peak of any slip: a point in time has room for a crossing while
-  // slip + this slip, and (slip * this time + this area) T omega, are inside the limits.
+  // What it costs at most, beyond a peak of any slip: slip of all, time and area of a steep fall,
+  // late_s of a flat top. A point in time has room for a crossing while slip + this slip, (slip *
+  // this time + this area) T omega, and (slip + this slip) * this late_s T omega beyond the energy
+  // of the request's own stop, are inside the limits.
   Excursion dearest;
   double peak_slip_max = 0.0;  // the latest peak with room, at its point
+  // And the latest whose flat top can be told before the request ends itself for its energy.
+  double peak_slip_told = 0.0;
 };
 // The latest peak that this crossing has room for, where the shaft has this speed.
 double peak_slip_max(const Crossing& crossing, const SlipLimits& limits, double torque_Nm,
                      double omega_p_rad_s, double primary_radius_m) noexcept;
 
-// The slip rate with most room, both with a nominal stop and with the worst single fault: an input
-// that falls silent until it counts as lost, or our own silence until the receiver's time-out.
+// The slip rate that tells the latest peak, with room both with a nominal stop and with the worst
+// single fault: an input that falls silent until it counts as lost, or our own silence until the
+// receiver's time-out.
 class CrossingSearch {
  public:
   CrossingSearch() noexcept = default;  // done, nothing found

@@ -113,7 +113,8 @@ Duration InputStage::slowest_stale() const noexcept {
   Duration slowest = 0;
   for (std::size_t i = 0; i < kRoleCount; ++i) {
     const auto role = static_cast<Role>(i);
-    const bool idle = role == Role::kOilTemperature || role == Role::kVehicleSpeed;
+    const bool idle = role == Role::kOilTemperature || role == Role::kVehicleSpeed ||
+                      role == Role::kSecondaryPressure;
     if (idle || !monitor_.is_bound(role)) continue;
     slowest = std::max(slowest, monitor_.period(role).value_or(0));
   }

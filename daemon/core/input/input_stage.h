@@ -61,7 +61,8 @@ class InputStage {
   // Which of the signals beside the sample is not there.
   Stop missing_condition() const noexcept;
   // How long the slowest of those inputs may be silent whose silence could hide that a request must
-  // end. Oil and vehicle speed change nothing within it.
+  // end. Oil and vehicle speed change nothing within it, and slip that runs away shows in the
+  // speeds while the pressure is silent.
   Duration slowest_stale() const noexcept;
 
   void go_on_from(const InputStage& before) noexcept { buses_.go_on_from(before.buses_); }

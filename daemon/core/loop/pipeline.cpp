@@ -65,6 +65,7 @@ ExperimentStage::Now Pipeline::Parts::now(MonoTime at) noexcept {
 void Pipeline::Parts::take_action(Action action) noexcept {
   if (action == Action::kStart || action == Action::kOver) estimate.reset();
   if (action == Action::kStart || action == Action::kRefuse) evaluation.begin();
+  if (action == Action::kStop && experiment.stopped_at_the_top()) estimate.ends_at_the_top();
 }
 
 // From this sample's signals alone; 0: not known.

@@ -73,8 +73,8 @@ constexpr std::array<InhibitRow, kInhibitCount> kInhibitWords{{
       "add the role `engine_speed`; take the raw signal with its finest step; a coast-down instead "
       "of steady driving"}},
     {Inhibit::kWait,
-     {"at a lower speed there is more room to cross the peak; it begins by itself, 9 s after the "
-      "trigger at the latest",
+     {"at a lower speed there is more room to cross the peak; it begins by itself, while there "
+      "is time left for it",
       "nothing"}},
     {Inhibit::kModel,
      {"a quantity lies outside the box in which a term of the model file was learned "

@@ -137,7 +137,7 @@ constexpr double kFallWithAFault_per_percent = 4e-3;
 
 // Further coast-downs of one drive: power and lift every so often.
 constexpr double kNextCoast_s = 21.0;
-constexpr double kLastCoast_s = 28.0;  // the flattest drawn road takes so long to 50 km/h
+constexpr double kLastCoast_s = 40.0;  // the flattest drawn road takes so long to 50 km/h
 constexpr int kMostCoasts = 3;
 
 Surprise draw_surprise(const Uniform& uniform) {

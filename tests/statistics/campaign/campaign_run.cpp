@@ -170,6 +170,7 @@ CampaignVerdict run_case(const CampaignCase& given) {
                                                        [&given](const sim::RequestTruth& each) {
                                                          return promised(given, each);
                                                        });
+  verdict.fall_per_percent = given.scenario.belt.overdrive.fall_per_percent;
   verdict.requests = static_cast<int>(run.requests.size());
   verdict.has_peak = given.scenario.belt.overdrive.shape != sim::CurveShape::kSaturating;
   for (const auto& [which, how] : run.broken) verdict.violations.push_back(which + ": " + how);
@@ -195,6 +196,7 @@ std::string to_json(const CampaignVerdict& v) {
                              {"base", v.base},
                              {"faults", v.faults},
                              {"guaranteed", v.guaranteed},
+                             {"fall", v.fall_per_percent},
                              {"requests", v.requests},
                              {"slip_max_percent", rounded(v.slip_max_percent)},
                              {"slip_stop_percent", rounded(v.slip_stop_percent)},

@@ -26,6 +26,7 @@ struct CampaignVerdict {
   std::string base;
   std::vector<std::string> faults;
   bool guaranteed = true;  // promise G1 is meant for it
+  double fall_per_percent = 0.0;
   int requests = 0;
   std::vector<Experiment> experiments;
   double slip_max_percent = 0.0;  // over all requests, truth

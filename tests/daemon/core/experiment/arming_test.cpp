@@ -346,7 +346,7 @@ TEST_F(ArmingTest, WaitsWhileTheCrossingGainsRoom) {
   }
   EXPECT_TRUE(waited);
   EXPECT_TRUE(arming_.cleared());
-  EXPECT_LT(now_.omega_p_rad_s, 155.0);
+  EXPECT_LT(now_.omega_p_rad_s, 160.0);
   EXPECT_GT(now_.omega_p_rad_s, 125.0);
 }
 

@@ -89,14 +89,17 @@ struct Drive {
     return point.torque_Nm * std::cos(11.0 * std::numbers::pi / 180.0) /
            (2.0 * point.primary_radius_m * point.mu_expected);
   }
-  // 600 N/s down to twice the force of the peak, then the rate near the top.
+  // 600 N/s down to where a belt of 80 % of the least friction would peak, then the rate near the
+  // top.
   double ramp_s(const RampPoint& point, double slip_rate_1_s) const {
     const double peak = peak_N(point), answer_s = 0.135;
     double slow_N_per_s = ramp_at_the_top_N_per_s(point, answer_s, slip_rate_1_s);
     if (slow_N_per_s > 600.0) slow_N_per_s = 600.0;
+    double near = peak * point.mu_expected / (0.8 * point.mu_least);
     if (own_force_N <= peak) return 0.0;
-    if (own_force_N <= 2.0 * peak) return (own_force_N - peak) / slow_N_per_s;
-    return (own_force_N - 2.0 * peak) / 600.0 + peak / slow_N_per_s;
+    if (own_force_N <= near) near = own_force_N;
+    if (near < peak) near = peak;
+    return (own_force_N - near) / 600.0 + (near - peak) / slow_N_per_s;
   }
 };
 
@@ -153,11 +156,11 @@ Account account(const Drive& drive) {
   const double left_s = a > 0.0 ? (now_rad_s - 105.0) / a : 1e9;
   const bool safe = here.crossing.slip_rate_1_s > 0.0;
   const double needed_s = drive.ramp_s(soon, safe ? here.crossing.slip_rate_1_s : 0.025) + 1.0;
-  // Waiting is worth a tenth of a point of slip, or reach; with half a second to spare, and where
-  // the car slows by 5 % within the 8 s of patience.
-  const bool gains = later.crossing.peak_slip_max > here.crossing.peak_slip_max + 0.001 ||
+  // Waiting is worth a tenth of a point of slip, or reach; with three seconds to spare, and where
+  // the car slows by 5 % within 8 s.
+  const bool gains = later.crossing.peak_slip_told > here.crossing.peak_slip_told + 0.001 ||
                      drive.peak_N(soon) < soon.floor_N;
-  if (a * 8.0 > 0.05 * now_rad_s && needed_s + 0.5 < left_s && gains) {
+  if (a * 8.0 > 0.05 * now_rad_s && needed_s + 3.0 < left_s && gains) {
     out.found.inhibits = inhibit_bit(Inhibit::kWait);
   } else if (!safe) {
     out.found = {inhibit_bit(Inhibit::kRamp), 0.01 * soon.fall, 0.0, {}};
@@ -199,6 +202,7 @@ void compare(const Drive& drive, int* count) {
   EXPECT_NEAR(plan.crossing.dearest.slip, wanted.crossing.dearest.slip, 1e-9);
   EXPECT_NEAR(plan.crossing.dearest.time_s, wanted.crossing.dearest.time_s, 1e-9);
   EXPECT_NEAR(plan.crossing.dearest.area_s, wanted.crossing.dearest.area_s, 1e-9);
+  EXPECT_NEAR(plan.crossing.dearest.late_s, wanted.crossing.dearest.late_s, 1e-9);
   EXPECT_NEAR(plan.crossing.peak_slip_max, wanted.crossing.peak_slip_max, 1e-9);
   EXPECT_NEAR(plan.mu_expected, wanted.mu_expected, 1e-12);
   EXPECT_NEAR(plan.mu_least, wanted.mu_least, 1e-12);

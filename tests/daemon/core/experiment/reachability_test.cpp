@@ -62,6 +62,7 @@ Excursion integrated(const RampPoint& p, const Reaction& r, double slip_rate, do
     out.area_s += dt * x;
   }
   out.time_s = t;
+  out.late_s = t - seen_s - r.detection_s - r.dead_time_s - r.lag_s;
   return out;
 }
 
@@ -95,6 +96,7 @@ TEST(Reachability, ClosedFormAgainstIntegrationOverTorqueSlipRateFallAndLag) {
             EXPECT_NEAR(closed.slip, exact.slip, 0.01 * exact.slip);
             EXPECT_NEAR(closed.time_s, exact.time_s, 0.01 * exact.time_s);
             EXPECT_NEAR(closed.area_s, exact.area_s, 0.01 * exact.area_s + 1e-5);
+            EXPECT_NEAR(closed.late_s, std::max(0.0, exact.late_s), 0.01 * exact.time_s);
           }
         }
       }
@@ -157,7 +159,8 @@ TEST(Reachability, TheRampAtTheTopHoldsTheSlipRate) {
 }
 
 // 10 %, 0.8 m/s and 90 J, by the integration: at the latest peak that has room the crossing keeps
-// all of them and meets one.
+// all of them and meets one. On a flat top the request ends itself at 60 J, what the actuator's
+// answer still costs counted: then 30 J are left for the rest.
 TEST(Reachability, TheCrossingKeepsEveryLimitAtTheLatestPeakWithRoom) {
   int found = 0, refused = 0;
   for (double torque = 10.0; torque <= 70.0; torque += 10.0) {
@@ -177,7 +180,9 @@ TEST(Reachability, TheCrossingKeepsEveryLimitAtTheLatestPeakWithRoom) {
         const auto expect_kept = [&](double fall, double to_see, double reaction_s) {
           const Excursion e = integrated(p, r, crossing.slip_rate_1_s, fall, to_see, reaction_s);
           const double slip = crossing.peak_slip_max + e.slip;
-          const double energy_J = (crossing.peak_slip_max * e.time_s + e.area_s) * torque * omega;
+          const double energy_J =
+              fall > 0.05 ? (crossing.peak_slip_max * e.time_s + e.area_s) * torque * omega
+                          : 60.0 + slip * std::max(0.0, e.late_s) * torque * omega;
           for (const double share : {slip / 0.10, slip * omega * 0.0784 / 0.8, energy_J / 90.0}) {
             EXPECT_LT(share, 1.02);
             nearest = std::max(nearest, share);
@@ -202,6 +207,33 @@ TEST(Reachability, ASlowInputCostsRoom) {
             searched(point(20.0), reaction(0.1)).crossing().peak_slip_max);
 }
 
+// What the noise of the slip rate hides is seen later: 0.2 s of it, where that is more than 0.3
+// points.
+TEST(Reachability, NoiseOfTheSlipRateCostsRoom) {
+  RampPoint quiet = point(25.0), loud = quiet, louder = quiet;
+  loud.slip_rate_noise_1_s = 0.015;
+  louder.slip_rate_noise_1_s = 0.025;
+  const Reaction r = reaction(0.08);
+  const double rate = searched(quiet, r).crossing().slip_rate_1_s;
+  ASSERT_EQ(rate, 0.025);
+  EXPECT_EQ(searched(loud, r).crossing().dearest.slip, searched(quiet, r).crossing().dearest.slip);
+  ASSERT_EQ(searched(louder, r).crossing().slip_rate_1_s, rate);
+  EXPECT_EQ(searched(louder, r).crossing().dearest.slip,
+            std::max(excursion(louder, r, rate, 0.8, 0.005, 0.01).slip,
+                     excursion(louder, r, rate, 0.4, 0.005, 0.06).slip));
+}
+
+// A crossing that would run on for more than 2.5 points is none, whatever room there is.
+TEST(Reachability, ACrossingNearToNotBeingCaughtIsNone) {
+  for (double torque = 15.0; torque < 50.0; torque += 1.0) {
+    const Crossing crossing = searched(point(torque), reaction(0.12)).crossing();
+    if (crossing.slip_rate_1_s > 0.0) {
+      EXPECT_LT(crossing.dearest.slip, 0.025) << torque;
+    }
+  }
+  EXPECT_EQ(searched(point(49.0), reaction(0.12)).crossing().slip_rate_1_s, 0.0);
+}
+
 // A faster shaft slips faster at the same slip, and dissipates more.
 TEST(Reachability, ThereIsLessRoomAtAHigherSpeed) {
   const Crossing crossing = searched(point(25.0), reaction(0.08)).crossing();
@@ -210,20 +242,22 @@ TEST(Reachability, ThereIsLessRoomAtAHigherSpeed) {
             peak_slip_max(crossing, SlipLimits{}, 25.0, 130.0, 0.0784));
 }
 
-// Three slip rates, each with a steep and a flat top, with and without a silence; the excursions
-// are those held against the integration above.
+// Two slip rates, each with a steep and a flat top, with and without a silence; the excursions
+// are those held against the integration above. The energy of a steep fall counts, of a flat top
+// what comes late; that one tells the latest peak where 60 J last for 0.8 points and the answer.
 Crossing chosen(const RampPoint& p, const Reaction& r) {
   Crossing best;
-  for (const double rate : {0.03, 0.025, 0.02}) {
+  for (const double rate : {0.025, 0.02}) {
     Crossing tried;
     for (const double silence_s : {0.0, std::max(r.stale_s, r.timeout_s)}) {
       const double fall = silence_s > 0.0 ? p.fall_at_fault : p.fall;
-      for (const Excursion& each : {excursion(p, r, rate, fall, 0.003, silence_s + r.cycle_s),
-                                    excursion(p, r, rate, 0.05, 0.008, silence_s + r.cycle_s)}) {
-        tried.dearest.slip = std::max(tried.dearest.slip, each.slip);
-        tried.dearest.time_s = std::max(tried.dearest.time_s, each.time_s);
-        tried.dearest.area_s = std::max(tried.dearest.area_s, each.area_s);
-      }
+      const double reaction_s = silence_s + r.cycle_s;
+      const Excursion steep = excursion(p, r, rate, fall, 0.003, reaction_s);
+      const Excursion flat = excursion(p, r, rate, 0.05, 0.008, reaction_s);
+      tried.dearest.slip = std::max({tried.dearest.slip, steep.slip, flat.slip});
+      tried.dearest.time_s = std::max(tried.dearest.time_s, steep.time_s);
+      tried.dearest.area_s = std::max(tried.dearest.area_s, steep.area_s);
+      tried.dearest.late_s = std::max(tried.dearest.late_s, flat.late_s);
     }
     tried.slip_rate_1_s = rate;
     // Of the force that is missing at the top, w seconds' worth a second.
@@ -232,14 +266,20 @@ Crossing chosen(const RampPoint& p, const Reaction& r) {
     tried.ramp_top_N_per_s = rate / w * peak_N / (r.dead_time_s + r.lag_s);
     tried.peak_slip_max =
         peak_slip_max(tried, {}, p.torque_Nm, p.omega_p_rad_s, p.primary_radius_m);
-    if (tried.peak_slip_max > p.peak_slip && tried.peak_slip_max > best.peak_slip_max) best = tried;
+    const double lasts_s = 0.008 / rate + r.detection_s + r.dead_time_s + r.lag_s;
+    tried.peak_slip_told =
+        std::min(tried.peak_slip_max, 60.0 / (p.torque_Nm * p.omega_p_rad_s * lasts_s));
+    if (tried.dearest.slip < 0.025 && tried.peak_slip_max > p.peak_slip &&
+        tried.peak_slip_told > best.peak_slip_told) {
+      best = tried;
+    }
   }
   return best;
 }
 
-TEST(Reachability, TheSearchTakesTheRateWithMostRoom) {
+TEST(Reachability, TheSearchTakesTheRateThatTellsTheLatestPeak) {
   int found = 0, none = 0;
-  double rates[3] = {};
+  double rates[2] = {};
   for (const double torque : {8.0, 15.0, 25.0, 35.0, 45.0}) {
     for (const double omega : {100.0, 140.0, 200.0, 300.0}) {
       for (const double lag : {0.02, 0.1, 0.2}) {
@@ -251,7 +291,7 @@ TEST(Reachability, TheSearchTakesTheRateWithMostRoom) {
           CrossingSearch search(p, r, SlipLimits{});
           int steps = 1;
           while (!search.step()) ++steps;
-          EXPECT_EQ(steps, 12);
+          EXPECT_EQ(steps, 8);
           const Crossing wanted = chosen(p, r);
           for (int i = 0; i < 2; ++i) {  // once done, it stays as it is
             const Crossing& crossing = search.crossing();
@@ -259,11 +299,13 @@ TEST(Reachability, TheSearchTakesTheRateWithMostRoom) {
             EXPECT_NEAR(crossing.ramp_top_N_per_s, wanted.ramp_top_N_per_s,
                         1e-9 * wanted.ramp_top_N_per_s);
             EXPECT_DOUBLE_EQ(crossing.peak_slip_max, wanted.peak_slip_max);
+            EXPECT_DOUBLE_EQ(crossing.peak_slip_told, wanted.peak_slip_told);
             EXPECT_DOUBLE_EQ(crossing.dearest.area_s, wanted.dearest.area_s);
+            EXPECT_DOUBLE_EQ(crossing.dearest.late_s, wanted.dearest.late_s);
             EXPECT_TRUE(search.step());
           }
           ++(wanted.slip_rate_1_s > 0.0 ? found : none);
-          for (const double rate : {0.03, 0.025, 0.02}) {
+          for (const double rate : {0.025, 0.02}) {
             rates[std::lround(200.0 * rate) - 4] += wanted.slip_rate_1_s == rate ? 1.0 : 0.0;
           }
         }
@@ -272,8 +314,8 @@ TEST(Reachability, TheSearchTakesTheRateWithMostRoom) {
   }
   EXPECT_GT(found, 20);
   EXPECT_GT(none, 5);
-  EXPECT_GT(rates[0] + rates[1], 0.0);
-  EXPECT_GT(rates[2], 0.0);
+  EXPECT_GT(rates[0], 0.0);
+  EXPECT_GT(rates[1], 0.0);
 }
 
 TEST(Reachability, WhatIsNotCaughtIsTooMuchInEveryRespect) {
