@@ -165,6 +165,33 @@ TEST(ClosedLoop, LowAndColdOilAreLeftAlone) {
   }
 }
 
+// From 9 kN down to the peak within the coast-down: with the ramp that the scenario allows. With
+// the default one it is refused.
+TEST(ClosedLoop, LowCompletesOnADescentWithAFasterRamp) {
+  const sim::VehicleScenario s = scenario("coast-low-descent");
+  int completed_runs = 0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    SCOPED_TRACE(seed);
+    const LoopRun run = run_closed(s, vehicle_config(s), seed);
+    expect_unbroken(run);
+    for (const sim::RequestTruth& request : run.requests) {
+      EXPECT_LT(request.slip_max, 0.10);
+      EXPECT_LT(request.slip_speed_max_m_s, 0.8);
+      EXPECT_LT(request.macro_energy_J, 100.0);
+    }
+    const daemon::ExperimentResult* result = completed(run);
+    if (result == nullptr) continue;
+    ++completed_runs;
+    EXPECT_EQ(result->end_stop, estimator::EndStop::kLow);
+    EXPECT_LE(result->peak.ci95_low, run.requests[0].mu_max);
+    EXPECT_GE(result->peak.ci95_high, run.requests[0].mu_max);
+  }
+  EXPECT_GE(completed_runs, 4);
+  const LoopRun slow = run_closed(s, vehicle_config(s, {{"ramp_rate_max_N_per_s", "300"}}), 1);
+  EXPECT_EQ(completed(slow), nullptr);
+  EXPECT_NE(slow.inhibits & daemon::inhibit_bit(daemon::Inhibit::kTime), 0u);
+}
+
 TEST(ClosedLoop, ACurveWithoutAPeakEndsByBackup) {
   const sim::VehicleScenario s =
       scenario("coast-overdrive", {"belt.curve=saturating", "belt.peak_slip_percent=3"});

@@ -85,6 +85,11 @@ std::string vehicle_configuration(const VehicleScenario& scenario, const std::st
                 period_s > 0.0 ? "{ signal = \"TCU_Pressure.SecondaryPressure\", period_ms = %.6g }"
                                : "\"TCU_Pressure.SecondaryPressure\"",
                 1e3 * period_s);
+  char ramp[60] = "";
+  if (known.ramp_rate_max_N_per_s > 0.0) {
+    std::snprintf(ramp, sizeof ramp, "ramp_rate_max_N_per_s       = %.6g\n",
+                  known.ramp_rate_max_N_per_s);
+  }
   char text[4096];
   std::snprintf(text, sizeof text,
                 "# BeltGrip in the simulated vehicle (scenario %s).\n"
@@ -143,7 +148,8 @@ std::string vehicle_configuration(const VehicleScenario& scenario, const std::st
                 "actuator_dead_time_s        = %.6g\n"
                 "actuator_lag_s              = %.6g\n"
                 "cooldown_s                  = %.6g\n"
-                "cooldown_m                  = %.6g\n",
+                "cooldown_m                  = %.6g\n"
+                "%s",
                 scenario.name.c_str(), interface.c_str(), dbc_file.c_str(), pressure,
                 known.torque_offset_Nm, known.torque_bias_Nm, known.torque_gain,
                 known.pressure_bias_Pa, known.pressure_gain,
@@ -153,7 +159,7 @@ std::string vehicle_configuration(const VehicleScenario& scenario, const std::st
                 scenario.engine.inertia_kg_m2 + v.primary_inertia_kg_m2,
                 known.steady ? "steady" : "coast_down", scenario.hydraulics.pressure_floor_Pa,
                 1.2 * scenario.hydraulics.dead_time_s, 1.2 * scenario.hydraulics.lag_s,
-                known.cooldown_s, known.cooldown_m);
+                known.cooldown_s, known.cooldown_m, ramp);
   return text;
 }
 

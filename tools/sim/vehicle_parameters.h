@@ -91,6 +91,7 @@ struct KnownOfVehicle {
   double torque_gain = 0.0;
   double pressure_bias_Pa = 0.0;
   double pressure_gain = 0.0;
+  double ramp_rate_max_N_per_s = 0.0;  // 0: the daemon's default
   double cooldown_s = 0.0;
   double cooldown_m = 0.0;
 };

@@ -85,6 +85,7 @@ constexpr NumberKey<Known> kKnown[] = {
     {"torque_gain", &Known::torque_gain, 0.0, 0.5, kNoise},
     {"pressure_bias_Pa", &Known::pressure_bias_Pa, 0.0, 1e6, kNoise},
     {"pressure_gain", &Known::pressure_gain, 0.0, 0.5, kNoise},
+    {"ramp_rate_max_N_per_s", &Known::ramp_rate_max_N_per_s, 0.0, 10e3, "a rate"},
     {"cooldown_s", &Known::cooldown_s, 1.0, 86400.0, kDuration},
     {"cooldown_m", &Known::cooldown_m, 0.0, 1e6, "a way"},
 };

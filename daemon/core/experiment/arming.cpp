@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "daemon/core/experiment/ramp_rate.h"
 #include "estimator/physics/slip.h"
@@ -157,13 +158,13 @@ void Arming::look(const Now& now) noexcept {
   if (shown.peak_percent > 0.0 && slip_percent_ - shown.own_percent > grown_max_percent) {
     search_ = later_ = {};
     unclear_ = inhibit_bit(Inhibit::kGrip);
-    obstacle_ = {slip_percent_ - shown.own_percent, grown_max_percent};
+    obstacle_ = {.figure = slip_percent_ - shown.own_percent, .limit = grown_max_percent};
     return;
   }
   const RampPoint here = point_at(now, now.omega_p_rad_s);
   const double slowing = slowing_rad_s2(now);
   const double least_rad_s = settings_.primary_speed_min_rad_s;
-  const double ramp_rad_s = slowing * ramp_s(here, kPlanned_1_s);
+  const double ramp_rad_s = slowing * ramp_s(here, kPlanned_1_s, rate_max_N_per_s_);
   const RampPoint soon = point_at(now, std::max(least_rad_s, now.omega_p_rad_s - ramp_rad_s));
   const double spare_rad_s = slowing * (kBeyondPeak_s + kRideSpare_s);
   // What a request that began now could ride the floor to.
@@ -174,7 +175,8 @@ void Arming::look(const Now& now) noexcept {
   if (reachable_mu(latest) < latest.mu_expected) {
     search_ = later_ = {};
     unclear_ = inhibit_bit(Inhibit::kUnreachable);
-    obstacle_ = {latest.floor_N, peak_force_N(latest, latest.mu_expected)};
+    obstacle_ = {latest.floor_N, peak_force_N(latest, latest.mu_expected),
+                 reached_below_rad_s(latest, now.omega_s_rad_s / now.omega_p_rad_s)};
     return;
   }
   search_ = CrossingSearch(soon, reaction(now), SlipLimits{});
@@ -217,17 +219,37 @@ Reaction Arming::reaction(const Now& now) const noexcept {
 }
 
 // Fast to where the first peaks may lie, then at the rate near the top.
-double Arming::ramp_s(const RampPoint& point, double slip_rate_1_s) const noexcept {
+double Arming::ramp_s(const RampPoint& point, double slip_rate_1_s,
+                      double rate_N_per_s) const noexcept {
   const double peak_N = peak_force_N(point, point.mu_expected);
   const double near_N =
       std::clamp(peak_force_N(point, kBelowPeaks * point.mu_least),
                  std::min(peak_N, point.own_force_N), std::max(peak_N, point.own_force_N));
   const double top_N_per_s = std::min(
-      rate_max_N_per_s_,
+      rate_N_per_s,
       ramp_at_the_top_N_per_s(point, settings_.actuator_dead_time_s + settings_.actuator_lag_s,
                               slip_rate_1_s));
-  return std::max(0.0, point.own_force_N - near_N) / rate_max_N_per_s_ +
+  return std::max(0.0, point.own_force_N - near_N) / rate_N_per_s +
          std::max(0.0, near_N - peak_N) / top_N_per_s;
+}
+
+// The ramp that ends in that time, in steps of a fifth; no number: none to the largest that can be
+// configured.
+double Arming::rate_needed_N_per_s(const RampPoint& point, double slip_rate_1_s,
+                                   double left_s) const noexcept {
+  constexpr double kStep = 1.2, kMost_N_per_s = 10e3;
+  double rate_N_per_s = rate_max_N_per_s_;
+  while (ramp_s(point, slip_rate_1_s, rate_N_per_s) + kBeyondPeak_s > left_s) {
+    rate_N_per_s *= kStep;
+    if (rate_N_per_s > kMost_N_per_s) return std::numeric_limits<double>::quiet_NaN();
+  }
+  return rate_N_per_s;
+}
+
+// The primary's speed at which the floor comes down to the peak's force; no number: not at rest.
+double Arming::reached_below_rad_s(const RampPoint& point, double ratio) const noexcept {
+  const double turning_N = peak_force_N(point, point.mu_expected) - floor_N(0.0);
+  return std::sqrt(turning_N / variator_.secondary_centrifugal_N_s2) / ratio;
 }
 
 // Of the primary, since the trigger held.
@@ -243,7 +265,7 @@ std::uint32_t Arming::clearance(const Now& now) noexcept {
   const double left_s =
       slowing > 0.0 ? (now.omega_p_rad_s - settings_.primary_speed_min_rad_s) / slowing : 1e9;
   const double planned_1_s = crossing.slip_rate_1_s > 0.0 ? crossing.slip_rate_1_s : kPlanned_1_s;
-  const double needed_s = ramp_s(point, planned_1_s) + kBeyondPeak_s;
+  const double needed_s = ramp_s(point, planned_1_s, rate_max_N_per_s_) + kBeyondPeak_s;
   const double patience_s = seconds(kPatience);
   const bool slows = slowing * patience_s > (1.0 - kFurther) * now.omega_p_rad_s;
   const bool waits = slows && needed_s + kSpare_s < left_s &&
@@ -251,13 +273,14 @@ std::uint32_t Arming::clearance(const Now& now) noexcept {
                       reachable_mu(point) < point.mu_expected);
   if (waits) return inhibit_bit(Inhibit::kWait);
   if (crossing.slip_rate_1_s <= 0.0) {
-    obstacle_ = {point.fall / kPercent, 0.0};
+    obstacle_ = {.figure = point.fall / kPercent};
     return inhibit_bit(Inhibit::kRamp);
   }
   plan_ = {crossing, point.mu_expected, point.mu_least, point.primary_radius_m};
   const double longest_s = seconds(limits::kRequestLongest);
   if (needed_s <= std::min(left_s, longest_s)) return 0U;
-  obstacle_ = {needed_s, std::min(left_s, longest_s)};
+  const double most_s = std::min(left_s, longest_s);
+  obstacle_ = {needed_s, most_s, rate_needed_N_per_s(point, planned_1_s, most_s)};
   return inhibit_bit(Inhibit::kTime);
 }
 

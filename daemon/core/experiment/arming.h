@@ -15,6 +15,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string_view>
 
 #include "daemon/core/base/limits.h"
@@ -101,6 +102,9 @@ struct SlipShown {
 // Why the way is not clear: what was found, and what it would have to be.
 struct Obstacle {
   double figure = 0.0, limit = 0.0;
+  // What would do: the primary's speed below which the peak is in reach, rad/s; the ramp that is
+  // fast enough, N/s. No number: nothing would.
+  double needed = std::numeric_limits<double>::quiet_NaN();
 };
 
 class Arming {
@@ -174,7 +178,10 @@ class Arming {
   std::uint32_t clearance(const Now& now) noexcept;
   RampPoint point_at(const Now& now, double omega_p_rad_s) const noexcept;
   Reaction reaction(const Now& now) const noexcept;
-  double ramp_s(const RampPoint& point, double slip_rate_1_s) const noexcept;
+  double ramp_s(const RampPoint& point, double slip_rate_1_s, double rate_N_per_s) const noexcept;
+  double rate_needed_N_per_s(const RampPoint& point, double slip_rate_1_s,
+                             double left_s) const noexcept;
+  double reached_below_rad_s(const RampPoint& point, double ratio) const noexcept;
   double slowing_rad_s2(const Now& now) const noexcept;
   bool steady(const Now& now) const noexcept;
   void follow_force(const Now& now) noexcept;
@@ -203,7 +210,7 @@ class Arming {
   double slip_percent_ = 0.0;
   double slip_samples_ = 0.0;
   SlipCourse slip_course_;  // for its noise
-  MonoTime last_ = 0;  // sample while the trigger holds
+  MonoTime last_ = 0;       // sample while the trigger holds
   // Means of the own force over kForceBlock each since the trigger holds, newest at count - 1.
   static constexpr std::size_t kForceBlocks = 10;
   static constexpr Duration kForceBlock = 100 * kMillisecond;

@@ -64,7 +64,11 @@ Stop stop_of(std::uint32_t inhibits, const Obstacle& obstacle) noexcept {
         .what = what, .figure = obstacle.figure, .limit = obstacle.limit, .unit = unit};
   };
   if (has(Inhibit::kUnreachable)) {
-    return {StopReason::kForceFloor, numbered("the force floor lies above the peak's force", "N")};
+    StopCause cause = numbered("the force floor lies above the peak's force", "N");
+    cause.further = "in reach where the primary turns below";
+    cause.further_figure = obstacle.needed;
+    cause.further_unit = "rad/s";
+    return {StopReason::kForceFloor, cause};
   }
   if (has(Inhibit::kGrip)) {
     return {StopReason::kSlip,
@@ -84,7 +88,11 @@ Stop stop_of(std::uint32_t inhibits, const Obstacle& obstacle) noexcept {
              .figure = obstacle.figure,
              .unit = "per percent of slip"}};
   }
-  return {StopReason::kTime, numbered("the ramp would last for", "s")};
+  StopCause cause = numbered("the ramp would last for", "s");
+  cause.further = "in time at";
+  cause.further_figure = obstacle.needed;
+  cause.further_unit = "N/s";
+  return {StopReason::kTime, cause};
 }
 
 Stop stop_of(const estimator::CurveEstimate& curve) noexcept {

@@ -62,6 +62,10 @@ std::string cause_text(StopReason reason, const StopCause& cause) {
   const std::string unit = *cause.unit == '\0' ? "" : std::string(" ") + cause.unit;
   if (std::isfinite(cause.figure)) text += " " + rounded_text(cause.figure) + unit;
   if (std::isfinite(cause.limit)) text += ", limit " + rounded_text(cause.limit) + unit;
+  if (cause.further != nullptr && std::isfinite(cause.further_figure)) {
+    text += std::string(", ") + cause.further + " " + rounded_text(cause.further_figure) + " " +
+            cause.further_unit;
+  }
   return text;
 }
 

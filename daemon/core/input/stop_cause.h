@@ -18,6 +18,10 @@ struct StopCause {
   double limit = std::numeric_limits<double>::quiet_NaN();
   const char* unit = "";  // a literal, of both
   std::optional<Role> role = std::nullopt;
+  // A third figure, said after the limit.
+  const char* further = nullptr;
+  double further_figure = std::numeric_limits<double>::quiet_NaN();
+  const char* further_unit = "";
 };
 
 struct Stop {
