@@ -425,6 +425,9 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
   data.line_p = order_line(speed);
   data.line_s = order_line(table[Role::kSecondarySpeed]);
   add_belt_lines(table, variator, data);
+  data.torque_spectrum =
+      pooled_spectrum(table[data.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque]);
+  data.torque_s_spectrum = pooled_spectrum(table[Role::kSecondaryTorque]);
 
   const auto saturated_on = [&](Role role) {
     return saturated_samples(table[role], reached[static_cast<std::size_t>(role)], start_s, n,

@@ -10,6 +10,7 @@
 #include "estimator/physics/parameters.h"
 #include "tools/diagnose/data/order_lines.h"
 #include "tools/diagnose/data/signal_table.h"
+#include "tools/diagnose/data/spectral_lines.h"
 
 namespace beltgrip::diagnose {
 
@@ -41,6 +42,7 @@ struct ExperimentData {
   OrderLine line_p, line_s;  // once per revolution, primary and secondary speed
   BeltLines belt_p, belt_s;  // at the belt's passage, in the same
   double belt_Hz = 0.0;      // of that, mean
+  PooledSpectrum torque_spectrum, torque_s_spectrum;
   bool torque_is_engine = false;
   std::vector<int> stop;           // EndStopIndex per sample
   std::vector<bool> valid;         // may carry a conclusion

@@ -53,6 +53,20 @@ double belt_line(const Campaign& campaign, double& frequency_Hz) {
   return most;
 }
 
+// The strongest line in a torque as it was sampled; nothing where it carries little.
+SpectralLine channel_line(const Campaign& campaign) {
+  SpectralLine out;
+  for (const auto spectrum :
+       {&ExperimentData::torque_spectrum, &ExperimentData::torque_s_spectrum}) {
+    PooledSpectrum all;
+    for (const ExperimentData& run : campaign.runs) all.add(run.*spectrum);
+    const NarrowLine line = narrow_line(all);
+    if (line.share < thresholds::kLineShare || line.over_level <= out.excess) continue;
+    out = {"torque", line.frequency_Hz, line.over_level, line.share};
+  }
+  return out;
+}
+
 double decades(double p) { return -std::log10(std::max(p, 1e-300)); }
 
 }  // namespace
@@ -72,6 +86,7 @@ Criticism criticise(const Engine& engine, Steps steps) {
   out.cells = score_cells(engine);
   demote_order(out.cells);
   out.line = strongest_line(engine.campaign(), engine.state());
+  out.channel_line = channel_line(engine.campaign());
   out.base = scatter_base(engine);
   double law = 0.0, smooth = 0.0;
   for (const Cell& cell : out.cells) {
@@ -88,6 +103,7 @@ Criticism criticise(const Engine& engine, Steps steps) {
       {"law_cell", law, times * kLawCell},
       {"smooth_cell", smooth, times * kSmoothCell},
       {"line", fine ? out.line.excess : 0.0, kLine},
+      {"channel_line", out.channel_line.excess, kChannelLine},
       {"belt_passage", belt_line(engine.campaign(), out.belt_Hz), kBeltLine},
       {"whiteness", fine ? decades(least_whiteness(engine)) : 0.0, decades(kWhiteness)},
       {"scatter_friction", ratio.friction, kScatterFriction},
@@ -99,7 +115,34 @@ Criticism criticise(const Engine& engine, Steps steps) {
   return out;
 }
 
-Unexplained what_is_left(const Criticism& criticism) {
+bool may_be_scatter(const Cell& cell, const Criticism& criticism, bool has_balance) {
+  constexpr double kBetween = 0.5;  // chosen, of the span: what their means cover at least
+  const Abscissa& abscissa = cell.abscissa;
+  double least = abscissa.high, most = abscissa.low;
+  for (std::size_t e = 0; e < abscissa.x.size(); ++e) {
+    if (abscissa.x[e].size() == 0) continue;
+    least = std::min(least, abscissa.mean[e]);
+    most = std::max(most, abscissa.mean[e]);
+  }
+  if (most - least < kBetween * (abscissa.high - abscissa.low)) return false;
+  if (cell.gain() <= thresholds::kCellBesideScatter) return false;
+  const auto fails = [&](const char* name) { return !criticism.test(name).passed(); };
+  const bool any = fails("unusual_scatter");  // does not say of what
+  switch (cell.injection->injection) {
+    case Injection::kFriction:
+    case Injection::kClampForce:
+      return any || fails("scatter_friction");
+    case Injection::kTorqueGain:
+      return any || fails("scatter_torque") || (!has_balance && fails("scatter_friction"));
+    case Injection::kTorque:
+      return any || fails("scatter_torque");
+    case Injection::kRatio:
+      return any || fails("scatter_ratio");
+  }
+  return false;
+}
+
+Unexplained what_is_left(const Criticism& criticism, bool has_balance) {
   const auto fails = [&](const char* name) { return !criticism.test(name).passed(); };
   Unexplained out;
   if (fails("belt_passage")) {
@@ -107,6 +150,11 @@ Unexplained what_is_left(const Criticism& criticism) {
     out.kind = MisfitKind::kLine;
     out.frequency_Hz = criticism.belt_Hz;
     out.is_belt = true;
+    return out;
+  }
+  if (fails("channel_line")) {
+    const SpectralLine& line = criticism.channel_line;
+    out = {line.acts_on, {}, line.share, MisfitKind::kLine, line.frequency_Hz};
     return out;
   }
   const Cell* best = criticism.cells.empty() ? nullptr : &criticism.cells.front();
@@ -126,10 +174,14 @@ Unexplained what_is_left(const Criticism& criticism) {
   }
   const bool scatters = fails("scatter_friction") || fails("scatter_ratio") ||
                         fails("scatter_torque") || fails("unusual_scatter");
-  const bool follows =
-      fails("law_cell") || fails("smooth_cell") ||
-      (scatters && best != nullptr && best->gain() > thresholds::kCellBesideScatter);
-  if (follows) {
+  const bool stands_out = fails("law_cell") || fails("smooth_cell");
+  if (!stands_out) {
+    const auto found = std::find_if(
+        criticism.cells.begin(), criticism.cells.end(),
+        [&](const Cell& cell) { return may_be_scatter(cell, criticism, has_balance); });
+    best = found == criticism.cells.end() ? nullptr : &*found;
+  }
+  if (stands_out || (scatters && best != nullptr)) {
     out.acts_on = best->injection->acts_on;
     out.depends_on = {best->abscissa.variable->name};
     out.share = best->share;

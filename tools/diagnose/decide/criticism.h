@@ -22,7 +22,7 @@ struct JudgedTest {
 
 struct Criticism {
   std::vector<Cell> cells;  // the best first
-  SpectralLine line;
+  SpectralLine line, channel_line;
   double belt_Hz = 0.0;  // of the belt's passage, mean
   ScatterBase base;
   std::vector<JudgedTest> tests;
@@ -34,7 +34,11 @@ struct Criticism {
 // own: those tests are left out, and where they are coarse a function has to explain more.
 Criticism criticise(const Engine& engine, Steps steps);
 
+// Where the scatter between experiments fails: the cell may be what it is, for it acts where they
+// scatter, and what it follows differs between them rather than within.
+bool may_be_scatter(const Cell& cell, const Criticism& criticism, bool has_balance);
+
 // What is to be said of residuals that fail.
-Unexplained what_is_left(const Criticism& criticism);
+Unexplained what_is_left(const Criticism& criticism, bool has_balance);
 
 }  // namespace beltgrip::diagnose

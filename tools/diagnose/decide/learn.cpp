@@ -12,29 +12,23 @@ namespace {
 
 using thresholds::kLearnedBound;
 
-bool scatter_fails(const Criticism& criticism) {
-  return std::any_of(criticism.tests.begin(), criticism.tests.end(), [](const JudgedTest& each) {
-    return !each.passed() && each.name.find("scatter") != std::string::npos;
-  });
-}
-
-bool stands_out(const Cell& cell, const Criticism& failed) {
+bool stands_out(const Cell& cell, const Criticism& failed, bool has_balance) {
   using namespace thresholds;
   if (cell.smooth_gain > failed.test("smooth_cell").limit) return true;
   if (cell.law_gain > failed.test("law_cell").limit && cell.smooth_gain > kSmoothBeside) {
     return true;
   }
-  return scatter_fails(failed) && cell.gain() > kCellBesideScatter;
+  return may_be_scatter(cell, failed, has_balance);
 }
 
 // The cells to try, the best first. What follows something that no model file can name, far better,
 // is none of them.
-std::vector<const Cell*> candidates(const Criticism& failed, Learning& out) {
+std::vector<const Cell*> candidates(const Criticism& failed, bool has_balance, Learning& out) {
   std::vector<const Cell*> tried;
   for (const Cell& cell : failed.cells) {
     if (tried.size() >= thresholds::kTermsTried) break;
     if (cell.gain() < thresholds::kNearBest * failed.cells.front().gain()) break;
-    if (!cell.abscissa.variable->learnable || !stands_out(cell, failed)) continue;
+    if (!cell.abscissa.variable->learnable || !stands_out(cell, failed, has_balance)) continue;
     if (cell.abscissa.levels < thresholds::kLevelsMin) {
       if (tried.empty() && out.needs_levels.empty()) {
         out.needs_levels = cell.abscissa.variable->name;
@@ -169,7 +163,7 @@ const LawEvidence* named_law(const LearnedFit& fit, const std::vector<LawEvidenc
 bool is_shadowed(const Campaign& campaign, const std::vector<int>& accepted,
                  const Criticism& without, const Criticism& with) {
   if (accepted.empty() || excess_left(without, with) <= 1.0 - thresholds::kHealed) return false;
-  const std::string left = what_is_left(with).acts_on;
+  const std::string left = what_is_left(with, campaign.has_balance).acts_on;
   return std::any_of(accepted.begin(), accepted.end(), [&](int slot) {
     return acts_there(*campaign.slots[static_cast<std::size_t>(slot)].row, left, campaign);
   });
@@ -194,7 +188,7 @@ Learning learn(Engine& engine, const Criticism& failed, Steps steps,
   for (std::size_t round = 0; round < thresholds::kTermsMax && !out.left.passed(); ++round) {
     const Criticism before = out.left;
     std::optional<Trial> best;
-    for (const Cell* cell : candidates(before, out)) {
+    for (const Cell* cell : candidates(before, engine.campaign().has_balance, out)) {
       if (stop()) return out;
       std::optional<Trial> trial = tried(engine, before, *cell, steps);
       if (trial && (!best || trial->excess < best->excess)) best = std::move(trial);

@@ -23,6 +23,8 @@ inline constexpr double kLine = 5.5;
 // The line at the belt's passage, in sigmas. That of a ripple once per revolution: sums of
 // exponential variables have heavier tails than the normal.
 inline constexpr double kBeltLine = 6.5;
+// A line in a channel's own samples, power over the level about it.
+inline constexpr double kChannelLine = 10.0;
 // Of the residual's fast power: what is a line and not the trace of a function that sweeps.
 inline constexpr double kLineShare = 0.2;
 // Common p-value of the residuals' autocorrelation.

@@ -400,7 +400,7 @@ class Run {
     out().scatter_from_replicates = criticism.base.from_replicates;
     for (const JudgedTest& test : criticism.tests) out().left[test.name] = {test.value, test.limit};
     if (!criticism.passed()) {
-      out().unexplained = what_is_left(criticism);
+      out().unexplained = what_is_left(criticism, engine.campaign().has_balance);
     } else if (naming.unknown) {
       out().unexplained =
           Unexplained{naming.unknown->acts_on, {naming.unknown->depends_on}, naming.unknown->share};

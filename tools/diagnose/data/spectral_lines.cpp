@@ -1,0 +1,115 @@
+#include "tools/diagnose/data/spectral_lines.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+
+#include "estimator/statistics/order.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+constexpr double kPiece_s = 1.0 / PooledSpectrum::kStep_Hz;
+constexpr double kHighest = 0.45;  // of the sample rate: what lies above folds back
+constexpr double kMost_Hz = 40.0;
+// Below, ramps and steps have their own power.
+constexpr double kLowest_Hz = 2.0;
+// The level on either side of a line, without the line. The higher one counts: the power of a
+// course falls all the way, and its steps are no lines.
+constexpr double kAround_Hz = 2.0, kOwn_Hz = 0.75;
+constexpr int kPiecesMin = 12;           // chosen: a mean of so many is known to a third
+constexpr std::size_t kSamplesMin = 60;  // per piece
+
+std::size_t bin_of(double frequency_Hz) {
+  return static_cast<std::size_t>(std::lround(frequency_Hz / PooledSpectrum::kStep_Hz));
+}
+
+// Without its straight line, through Hann's window: of a course that goes on, little is left.
+void add_piece(const Channel& channel, std::size_t begin, std::size_t end,
+               std::vector<double>& power) {
+  const auto n = static_cast<double>(end - begin);
+  double t0 = 0.0, y0 = 0.0;
+  for (std::size_t i = begin; i < end; ++i) t0 += channel.t_s[i] / n, y0 += channel.value[i] / n;
+  double tt = 0.0, ty = 0.0;
+  for (std::size_t i = begin; i < end; ++i) {
+    tt += (channel.t_s[i] - t0) * (channel.t_s[i] - t0);
+    ty += (channel.t_s[i] - t0) * (channel.value[i] - y0);
+  }
+  const double slope = tt > 0.0 ? ty / tt : 0.0;
+  std::vector<std::complex<double>> sums(power.size());
+  for (std::size_t i = begin; i < end; ++i) {
+    const double t = channel.t_s[i] - channel.t_s[begin];
+    const double angle = 2.0 * std::numbers::pi * PooledSpectrum::kStep_Hz * t;
+    const double window = 0.5 - 0.5 * std::cos(angle);
+    const double y = window * (channel.value[i] - y0 - slope * (channel.t_s[i] - t0));
+    const std::complex<double> turn = std::polar(1.0, -angle);
+    std::complex<double> phase = 1.0;
+    for (std::complex<double>& sum : sums) {
+      sum += y * phase;
+      phase *= turn;
+    }
+  }
+  for (std::size_t i = 0; i < power.size(); ++i) power[i] += std::norm(sums[i]) / n;
+}
+
+}  // namespace
+
+void PooledSpectrum::add(const PooledSpectrum& other) {
+  power.resize(std::max(power.size(), other.power.size()), 0.0);
+  for (std::size_t i = 0; i < other.power.size(); ++i) power[i] += other.power[i];
+  pieces += other.pieces;
+}
+
+PooledSpectrum pooled_spectrum(const Channel& channel) {
+  PooledSpectrum out;
+  const double period_s = channel.empty() ? 0.0 : median_period_s(channel);
+  if (!(period_s > 0.0)) return out;
+  const double highest_Hz = std::min(kMost_Hz, kHighest / period_s);
+  if (highest_Hz < kLowest_Hz) return out;
+  out.power.assign(bin_of(highest_Hz) + 1, 0.0);
+  for (std::size_t begin = 0; begin < channel.t_s.size();) {
+    std::size_t end = begin;
+    while (end < channel.t_s.size() && channel.t_s[end] < channel.t_s[begin] + kPiece_s) ++end;
+    const bool whole = end < channel.t_s.size() &&
+                       channel.t_s[end] - channel.t_s[begin] < kPiece_s + 3.0 * period_s;
+    if (whole && end - begin >= kSamplesMin) {
+      add_piece(channel, begin, end, out.power);
+      ++out.pieces;
+    }
+    begin = end;
+  }
+  return out;
+}
+
+NarrowLine narrow_line(const PooledSpectrum& spectrum) {
+  NarrowLine out;
+  const std::vector<double>& power = spectrum.power;
+  const std::size_t lowest = bin_of(kLowest_Hz);
+  if (spectrum.pieces < kPiecesMin || power.size() < lowest + bin_of(kAround_Hz)) return out;
+  double whole = 0.0;
+  for (std::size_t i = lowest; i < power.size(); ++i) whole += power[i];
+  const std::size_t around = bin_of(kAround_Hz), own = bin_of(kOwn_Hz);
+  const auto level_from = [&](std::size_t first, std::size_t last) {
+    std::vector<double> near;
+    for (std::size_t j = first; j <= std::min(last, power.size() - 1); ++j)
+      near.push_back(power[j]);
+    return estimator::median(near);
+  };
+  for (std::size_t i = lowest; i + own + 2 < power.size(); ++i) {
+    const double level = std::max(level_from(i > around ? i - around : 1, i - own - 1),
+                                  level_from(i + own + 1, i + around));
+    const double over = power[i] / std::max(level, 1e-300);
+    if (over <= out.over_level) continue;
+    double mass = 0.0, moment = 0.0;
+    for (std::size_t j = i - 2; j <= i + 2; ++j) {
+      const double here = std::max(0.0, power[j] - level);
+      mass += here;
+      moment += here * static_cast<double>(j);
+    }
+    out = {moment / std::max(mass, 1e-300) * PooledSpectrum::kStep_Hz, over, mass / whole};
+  }
+  return out;
+}
+
+}  // namespace beltgrip::diagnose
