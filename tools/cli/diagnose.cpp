@@ -124,6 +124,7 @@ void run(const Options& options) {
     }
   }
   request.model = before;
+  request.is_model_given = !options.model.empty();
   Inputs inputs(options.logs);
   inputs.add(options.held_out);
   inputs.add(config.files);

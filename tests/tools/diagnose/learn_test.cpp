@@ -43,7 +43,7 @@ TEST(ExcessLeft, IsNoneWhereNothingFailed) {
 TEST(Learn, ANeedlessFunctionIsNotLookedFor) {
   Engine engine{Campaign{}};
   const Criticism fine = tests({{"law_cell", 3.0, 35.0}, {"smooth_cell", 3.0, 35.0}});
-  const Learning learning = learn(engine, fine, false, [] { return false; });
+  const Learning learning = learn(engine, fine, Steps::kFine, [] { return false; });
   EXPECT_TRUE(learning.terms.empty());
   EXPECT_TRUE(learning.needs_levels.empty());
 }

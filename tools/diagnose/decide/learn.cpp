@@ -163,7 +163,10 @@ const LawEvidence* named_law(const LearnedFit& fit, const std::vector<LawEvidenc
 bool is_shadowed(const Campaign& campaign, const std::vector<int>& accepted,
                  const Criticism& without, const Criticism& with) {
   if (accepted.empty() || excess_left(without, with) <= 1.0 - thresholds::kHealed) return false;
-  const std::string left = what_is_left(with, campaign.has_balance).acts_on;
+  const Unexplained still = what_is_left(with, campaign.has_balance);
+  // A line is no function's shadow, and no function takes it away.
+  if (still.kind == MisfitKind::kLine) return false;
+  const std::string& left = still.acts_on;
   return std::any_of(accepted.begin(), accepted.end(), [&](int slot) {
     return acts_there(*campaign.slots[static_cast<std::size_t>(slot)].row, left, campaign);
   });

@@ -124,11 +124,12 @@ std::string joined(const std::vector<std::string>& words) {
 }  // namespace
 
 std::string sentence(const Unexplained& left) {
+  constexpr double kToldShare = 5e-4;  // less reads as none
   const std::string share = number(100.0 * left.share) + " % of the misfit";
   switch (left.kind) {
     case MisfitKind::kFunction:
       return "something that has no name here acts on " + left.acts_on + " and follows " +
-             joined(left.depends_on) + " (" + share + ")";
+             joined(left.depends_on) + (left.share < kToldShare ? "" : " (" + share + ")");
     case MisfitKind::kLine:
       if (left.is_belt) {
         return "a line at the belt's passage (" + number(left.frequency_Hz.value_or(0.0)) +
@@ -140,7 +141,8 @@ std::string sentence(const Unexplained& left) {
       return left.acts_on +
              " differs between experiments by more than it should and follows nothing recorded";
     case MisfitKind::kSlow:
-      return left.acts_on + " departs slowly within experiments and follows nothing recorded";
+      return left.acts_on +
+             " departs within experiments for longer than noise does and follows nothing recorded";
   }
   return {};
 }

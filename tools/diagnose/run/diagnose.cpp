@@ -416,6 +416,13 @@ class Run {
     if (!out().complete) out().unexplained.reset();
   }
 
+  // Beyond doubt, and by more than two machines of one type do.
+  static bool differs(double value, double sigma, const NuisanceRow& row) {
+    constexpr double kSure = 5.0;  // chosen, sigmas: of some twenty constants none by chance
+    const double off = std::abs(value - row.nominal);
+    return off > row.tolerance && off > kSure * sigma;
+  }
+
   void fill_machine(const Engine& engine, const Naming& naming) {
     const Fit& fit = naming.hypothesis.fit;
     for (std::size_t j = 0; j < engine.active_nuisances().size(); ++j) {
@@ -434,8 +441,17 @@ class Run {
       const auto shown = [&](double v) { return ln ? std::exp(v) : v; };
       std::string name(engine.campaign().nuisances[static_cast<std::size_t>(p)].name);
       if (ln) name = name.substr(3);
-      out().machine[name] = {shown(value), shown(value - estimator::kNormal95 * sigma),
-                             shown(value + estimator::kNormal95 * sigma)};
+      const Interval fitted{shown(value), shown(value - estimator::kNormal95 * sigma),
+                            shown(value + estimator::kNormal95 * sigma)};
+      const NuisanceRow& row = engine.campaign().nuisances[static_cast<std::size_t>(p)];
+      const bool is_shape = first_knot(p) >= 0;
+      if (request_.is_model_given && !is_shape && differs(value, sigma, row)) {
+        out().notes.push_back(name + ": the model has " + text_of(shown(row.nominal)) +
+                              ", these data say " + text_of(fitted.value) + " (" +
+                              text_of(fitted.low) + " to " + text_of(fitted.high) +
+                              "), which counts as the machine's own and is no finding");
+      }
+      out().machine[name] = fitted;
     }
   }
 
@@ -479,6 +495,23 @@ class Run {
     }
   }
 
+  // Causes outside the table that do the same. Friction stands beside the clamp force in all that a
+  // ramp shows, and beside the torque where none is recorded behind the belt.
+  static void add_twins(const Campaign& campaign, Finding& finding, const EffectRow& row) {
+    if (row.stage != Stage::kFriction) return;
+    if (row.depends_on != "oil_temperature" && row.depends_on != "primary_speed") return;
+    const bool is_alone = finding.aliases.empty();
+    const std::string over = " over " + std::string(row.depends_on);
+    if (!campaign.has_balance) finding.aliases.push_back("learned torque_gain" + over);
+    finding.aliases.push_back("learned clamp_force" + over);
+    if (!is_alone) return;
+    finding.separate_by =
+        campaign.has_balance
+            ? "a reference gauge of the secondary pressure where the oil or the speed differs"
+            : "record secondary_torque: a gain of the torque shows there, friction does not; and a "
+              "reference gauge of the secondary pressure";
+  }
+
   void fill_findings(const Engine& engine, const std::vector<Accepted>& accepted,
                      const Naming& naming, const Gain& gain) {
     const Campaign& campaign = engine.campaign();
@@ -516,6 +549,7 @@ class Run {
       if (finding.effect == "torque_delay" && finding.aliases.empty()) {
         finding.aliases.emplace_back("channel_skew");  // of the torque: the same thing
       }
+      add_twins(campaign, finding, *slot.row);
       finding.gain = gain.signals;
       if (gain.mu_max) {  // relative error of the friction at the peak
         finding.gain["mu_max"] = {gain.mu_max->before, gain.mu_max->after, gain.mu_max->low,
@@ -587,7 +621,8 @@ class Run {
       out().next_experiment = recipe(campaign, state, varied_by(depends_on), why);
     };
     for (const Finding& finding : out().findings) {
-      if (finding.aliases.empty()) continue;
+      // No ramp tells what the torque behind the belt or a gauge does.
+      if (finding.aliases.empty() || finding.aliases.front().starts_with("learned ")) continue;
       next(row_of(finding.effect)->depends_on,
            "to tell " + finding.effect + " from " + finding.aliases.front());
       return;
