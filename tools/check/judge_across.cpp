@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <string>
 
@@ -64,7 +65,9 @@ class Across {
     doubtful_ = speeds();
     if (!doubtful_) lockup();
     torque_sign();
+    pedal();
     if (!doubtful_) {
+      slip_direction();
       carried();
       pressure_course();
       pressure_command();
@@ -94,6 +97,8 @@ class Across {
   bool speeds();
   void lockup();
   void torque_sign();
+  void pedal();
+  void slip_direction();
   void carried();
   void pressure_course();
   void pressure_command();
@@ -144,7 +149,7 @@ bool Across::speeds() {
   const auto inside = [&](double factor, bool inverted) {
     return share_of(ratio, [&](double r) {
       const double as_meant = factor * (inverted ? 1.0 / r : r);
-      return as_meant > low * (1.0 - kLowBand) && as_meant < overdrive * (1.0 + kStopBand);
+      return as_meant > low * (1.0 - kSlipBand) && as_meant < overdrive * (1.0 + kSlipBand);
     });
   };
   const double least = quantile(ratio, 0.01), most = quantile(ratio, 0.99);
@@ -182,8 +187,10 @@ bool Across::speeds() {
     return true;
   }
 
-  const double inside_share = inside(1.0, false);
-  if (inside_share < kInStopsLeast) {
+  const double inside_share = inside(1.0, false), usual = quantile(ratio, 0.5);
+  const bool mostly_beyond =
+      usual < low * (1.0 - kSlipBand) || usual > overdrive * (1.0 + kStopBand);
+  if (inside_share < kInStopsLeast || mostly_beyond) {
     struct Reading {
       const char* text;
       double factor;
@@ -205,8 +212,7 @@ bool Across::speeds() {
         format("speed ratio %.3g to %.3g, end stops %s: ", least, most, stops.c_str());
     if (!causes.empty()) {
       wrong(text + causes + "?");
-    } else if (quantile(ratio, 0.5) < low * (1.0 - kLowBand) ||
-               quantile(ratio, 0.5) > overdrive * (1.0 + kStopBand)) {
+    } else if (mostly_beyond) {
       wrong(text + "a scale of one speed, or the end stops are another variator's");
     } else {
       doubt(text + format("%.0f %% of the time beyond them; a scale, or another variator's stops",
@@ -362,6 +368,47 @@ void Across::torque_sign() {
   } else {
     doubt(name + ": sign? " + text);
   }
+}
+
+// A driver who comes and goes between drive and overrun moves the pedal.
+void Across::pedal() {
+  double least = std::numeric_limits<double>::infinity(), most = -least, side = 0.0;
+  int turns = 0;
+  for (const Window& window : windows_) {
+    const double pedal = window[Role::kAcceleratorPedal], torque = window[torque_role()];
+    if (!std::isfinite(pedal) || !(std::abs(torque) > kTorqueSigned_Nm)) continue;
+    least = std::min(least, pedal), most = std::max(most, pedal);
+    if (side * torque < 0.0) ++turns;
+    side = torque;
+  }
+  if (turns < kTurnsOfTorque || most > least) return;
+  doubt(
+      format("accelerator_pedal is always %.3g %% while the torque goes between drive and overrun "
+             "%d times: the right signal?",
+             100.0 * least, turns));
+}
+
+// Where the clamp is lowered the belt slips with the torque, never against it: sigma* there is
+// positive.
+void Across::slip_direction() {
+  std::vector<double> friction;
+  for (const Window& window : windows_) {
+    if (std::isfinite(window.mu_star)) friction.push_back(window.mu_star);
+  }
+  if (friction.size() < kWindowsLeast) return;
+  const double usual = quantile(friction, 0.5), high = quantile(friction, 1.0 - kCarriedShare);
+  if (high < kLoweredLeast * usual) return;  // nobody lowered it
+  std::vector<double> slip_percent;
+  for (const Window& window : windows_) {
+    if (window.mu_star >= high) slip_percent.push_back(window.slip_percent);
+  }
+  const double there_percent = quantile(slip_percent, 0.5);
+  if (there_percent > -kSlipAgainst_percent) return;
+  doubt(
+      format("where the clamp was lowered most the belt slips by %.1f %% against the torque, never "
+             "with it: sign of ",
+             -there_percent) +
+      std::string(daemon::role_name(torque_role())) + ", or the two speeds are swapped?");
 }
 
 // Friction as read where the belt does not slip.

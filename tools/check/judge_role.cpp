@@ -84,6 +84,7 @@ class Judge {
   void level();
   void speed_level();
   void course();
+  bool repeats_itself() const;
 
   const RoleCourse& course_;
   const RoleBinding& binding_;
@@ -401,24 +402,25 @@ void Judge::level() {
           ": too coarse to see slip");
   }
   if (binding_.role == Role::kSecondaryPressure && step > kPressureStepMost_Pa) {
-    doubt("moves in steps of " + number(in_unit_.difference(step)) + " " + binding_.unit + ": " +
-          grouped(step * config_.variator.secondary_piston_area_m2) + " N of clamping force");
+    note("moves in steps of " + number(in_unit_.difference(step)) + " " + binding_.unit + ": " +
+         grouped(step * config_.variator.secondary_piston_area_m2) + " N of clamping force");
   }
 }
 
 // Values that stand still.
 void Judge::course() {
   const bool flag = daemon::role_dimension(binding_.role) == can::Dimension::kNone;
+  const bool shaft = binding_.role == Role::kPrimarySpeed ||
+                     binding_.role == Role::kSecondarySpeed || binding_.role == Role::kEngineSpeed;
   const double lasted_s = course_.span_s;
+  // Oil stays warm, and cruise control needs no pedal.
   if (course_.changes == 0 && lasted_s >= kConstantFor_s) {
-    const bool shaft = binding_.role == Role::kPrimarySpeed ||
-                       binding_.role == Role::kSecondarySpeed ||
-                       binding_.role == Role::kEngineSpeed;
     const std::string stands =
         flag ? format("always %.0f", course_.value) : "always " + text(course_.value);
     if (shaft && course_.value != 0.0) {
       wrong(stands + format(", for %.0f s: a shaft that turns is never so even", lasted_s));
-    } else if (flag || binding_.role == Role::kOilTemperature) {
+    } else if (flag || binding_.role == Role::kOilTemperature ||
+               binding_.role == Role::kAcceleratorPedal) {
       note(stands + format(" in these %.0f s", lasted_s));
     } else {
       doubt(stands + format(" in these %.0f s: the right signal?", lasted_s));
@@ -431,7 +433,18 @@ void Judge::course() {
                "%.0f %%",
                text(course_.frozen_at).c_str(), course_.frozen_s, course_.frozen_from_s,
                100.0 * course_.frozen_other));
+  } else if (shaft && repeats_itself()) {
+    wrong(
+        format("repeats %s for %.2f s from %.1f s on, while else it is never twice the same: a "
+               "frozen sender or sensor",
+               text(course_.stood_at).c_str(), course_.stood_s, course_.stood_from_s));
   }
+}
+
+// A live value that is noisier than its step does not come again and again.
+bool Judge::repeats_itself() const {
+  return course_.stood_s >= kStuck_s && course_.stood_values >= kRepeats && course_.step > 0.0 &&
+         course_.live_noise() > kNoisySteps * course_.step;
 }
 
 }  // namespace

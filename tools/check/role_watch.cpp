@@ -47,11 +47,18 @@ double RoleCourse::rate_Hz() const {
   return period_s > 0.0 ? 1.0 / period_s : 0.0;
 }
 
-double RoleCourse::noise() const {
+namespace {
+
+double noise_of(const Thinned<double>& bends) {
   std::vector<double> magnitudes;
   for (const double bend : bends.values()) magnitudes.push_back(std::abs(bend));
   return magnitudes.empty() ? 0.0 : kPerMedian * quantile(std::move(magnitudes), 0.5);
 }
+
+}  // namespace
+
+double RoleCourse::noise() const { return noise_of(bends); }
+double RoleCourse::live_noise() const { return noise_of(live_bends); }
 
 RoleWatch::RoleWatch(const daemon::Config& config) : config_(config) {
   courses_.resize(config_.roles.size());
@@ -265,6 +272,37 @@ double RoleWatch::other_pulley(Role role) const {
   return other == nullptr ? 0.0 : other->value;
 }
 
+// On a bench a motor may hold the primary while the belt slips: in drive the secondary falls back
+// behind it, in overrun the primary behind the secondary. A torque that nobody sees explains
+// either.
+bool RoleWatch::slip_explains(Role role, double other_moved) const {
+  const RoleCourse* torque =
+      find(config_.estimator.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque);
+  if (torque == nullptr || torque->values == 0) return true;
+  const double ratio_moved = role == Role::kPrimarySpeed ? other_moved : -other_moved;
+  return torque->value * ratio_moved < 0.0;
+}
+
+void RoleWatch::take_stand(RoleCourse& course, const State& state, double other, double t_s) const {
+  const double stood_s = t_s - state.same_since_s, value = state.previous;
+  course.stuck_s = std::max(course.stuck_s, stood_s);
+  if (!(value > kMoving_rad_s)) return;
+  if (stood_s > course.stood_s) {
+    course.stood_s = stood_s;
+    course.stood_from_s = state.same_since_s;
+    course.stood_at = value;
+    course.stood_values = state.same_values;
+  }
+  const double moved = state.other_at_same > 0.0 ? other / state.other_at_same - 1.0 : 0.0;
+  const double enough = slip_explains(course.binding->role, moved) ? kSlipBand : kOtherMoved;
+  if (std::abs(moved) > enough && stood_s > course.frozen_s) {
+    course.frozen_s = stood_s;
+    course.frozen_from_s = state.same_since_s;
+    course.frozen_at = value;
+    course.frozen_other = std::abs(moved);
+  }
+}
+
 void RoleWatch::take_value(RoleCourse& course, State& state, double value, double t_s) {
   const bool first = course.spread.seen() == 0;
   course.least = first ? value : std::min(course.least, value);
@@ -275,24 +313,21 @@ void RoleWatch::take_value(RoleCourse& course, State& state, double value, doubl
   if (state.known > 0 && value == state.previous) {
     if (!state.same) {
       state.same = true;
+      state.same_values = 0;
       state.other_at_same = other;
     }
-    const double stood_s = t_s - state.same_since_s;
-    const double moved =
-        state.other_at_same > 0.0 ? std::abs(other / state.other_at_same - 1.0) : 0.0;
-    course.stuck_s = std::max(course.stuck_s, stood_s);
-    if (moved > kOtherMoved && value > kMoving_rad_s && stood_s > course.frozen_s) {
-      course.frozen_s = stood_s;
-      course.frozen_from_s = state.same_since_s;
-      course.frozen_at = value;
-      course.frozen_other = moved;
-    }
+    ++state.same_values;
+    take_stand(course, state, other, t_s);
   } else {
     state.same = false;
     state.same_since_s = t_s;
     if (state.known > 0) ++course.changes;
   }
-  if (state.known > 1) course.bends.add(value - 2.0 * state.previous + state.before);
+  if (state.known > 1) {
+    const double bend = value - 2.0 * state.previous + state.before;
+    course.bends.add(bend);
+    if (!state.same || state.previous != state.before) course.live_bends.add(bend);
+  }
   state.before = state.previous;
   state.previous = value;
   state.known = std::min(state.known + 1, 2);

@@ -41,6 +41,9 @@ struct RoleCourse {
   double first_s = 0.0, last_s = 0.0;
   double value = 0.0, least = 0.0, largest = 0.0;
   double stuck_s = 0.0;  // longest stretch of equal values
+  // A shaft's longest stretch of equal values while it turns.
+  double stood_s = 0.0, stood_from_s = 0.0, stood_at = 0.0;
+  std::uint64_t stood_values = 0;
   // A pulley's longest stretch at a speed while the other's moved, by this share.
   double frozen_s = 0.0, frozen_from_s = 0.0, frozen_at = 0.0, frozen_other = 0.0;
   std::uint64_t changes = 0;
@@ -57,10 +60,12 @@ struct RoleCourse {
   Thinned<double> asked_every_s;
   Thinned<double> answers_s;
   Thinned<double> bends;               // second differences
+  Thinned<double> live_bends;          // of those, where its values do not repeat
   std::vector<can::CanFrame> refused;  // the first whose CRC is wrong
 
   double rate_Hz() const;
-  double noise() const;  // standard deviation of white noise on it
+  double noise() const;       // standard deviation of white noise on it
+  double live_noise() const;  // where its values do not repeat
 };
 
 struct Heard {
@@ -96,6 +101,7 @@ class RoleWatch {
     double previous = 0.0, before = 0.0;
     bool same = false;  // as the last value
     double same_since_s = 0.0;
+    std::uint64_t same_values = 0;
     double other_at_same = 0.0;
     std::optional<std::uint64_t> raw;
     MonoTime diagnostics = 0;
@@ -109,6 +115,8 @@ class RoleWatch {
   void take_time(RoleCourse& course, State& state, MonoTime t);
   void take_value(RoleCourse& course, State& state, double value, double t_s);
   double other_pulley(Role role) const;
+  void take_stand(RoleCourse& course, const State& state, double other, double t_s) const;
+  bool slip_explains(Role role, double other_moved) const;
 
   daemon::Config config_;
   std::vector<RoleCourse> courses_;

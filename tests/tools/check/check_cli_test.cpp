@@ -2,6 +2,8 @@
 // other. What is wrong is known, for the test did it.
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -409,6 +411,79 @@ TEST_F(Check, AFrozenSpeed) {
   const json& role = found["roles"]["primary_speed"];
   EXPECT_NEAR(role["stuck_s"], 6.0, 0.05);
   EXPECT_EQ(count(role["findings"], "wrong: stood at"), 1) << role["findings"];
+}
+
+// The whole message comes again and again, as a gateway sends the last that it heard. Nothing is
+// configured that would protect it.
+TEST_F(Check, AMessageThatRepeatsItself) {
+  Drive wrong = drive("coast-overdrive");
+  wrong.toml = wrong.toml.substr(0, wrong.toml.find("[protection]")) +
+               wrong.toml.substr(wrong.toml.find("[sensors]"));
+  std::vector<std::uint8_t> last;
+  wrong.log = changed_log(wrong.log, [&last](LogFrame& frame) {
+    if (frame.id != 0x120) return true;
+    if (frame.t_s < 6.0 || frame.t_s > 8.0) {
+      last = frame.data;
+    } else {
+      frame.data = last;
+    }
+    return true;
+  });
+  const json found = check(wrong);
+  for (const char* role : {"primary_speed", "secondary_speed"}) {
+    EXPECT_EQ(count(found["roles"][role]["findings"], "wrong: repeats"), 1) << found["roles"][role];
+  }
+}
+
+constexpr const char* kBenchDbc = R"(VERSION ""
+BO_ 256 Bench: 8 X
+ SG_ Primary : 0|16@1+ (1,0) [0|65535] "rpm" X
+ SG_ Secondary : 16|16@1+ (1,0) [0|65535] "rpm" X
+ SG_ Pressure : 32|16@1+ (1,0) [0|65535] "kPa" X
+ SG_ Torque : 48|16@1- (1,0) [-1000|1000] "Nm" X
+)";
+constexpr const char* kBenchToml = R"([bus]
+interface = "can0"
+dbc       = ["vehicle.dbc"]
+[signals]
+primary_speed      = "Bench.Primary"
+secondary_speed    = "Bench.Secondary"
+secondary_pressure = "Bench.Pressure"
+primary_torque     = "Bench.Torque"
+[experiment]
+trigger = "always"
+)";
+
+// A motor holds the primary at 1000 rpm to within its step; after 15 s the secondary, at overdrive,
+// falls back by 6 %.
+std::string bench_log(int torque_Nm) {
+  std::string log;
+  for (int i = 0; i < 2000; ++i) {
+    const int primary = i < 20 ? 999 + i % 3 : 1000;
+    const int secondary = 2250 - (i < 1500 ? i % 3 : (i - 1500) * 135 / 500);
+    const auto word = [](int value) {
+      return std::array<unsigned, 2>{static_cast<unsigned>(value) & 0xFFU,
+                                     (static_cast<unsigned>(value) >> 8) & 0xFFU};
+    };
+    const auto p = word(primary), s = word(secondary), q = word(1000 + i % 2), t = word(torque_Nm);
+    char line[80];
+    std::snprintf(line, sizeof line, "(%.6f) can0 100#%02X%02X%02X%02X%02X%02X%02X%02X\n", 0.01 * i,
+                  p[0], p[1], s[0], s[1], q[0], q[1], t[0], t[1]);
+    log += line;
+  }
+  return log;
+}
+
+// What slips with the torque is no frozen sensor; against it nothing slips.
+TEST_F(Check, AMotorMayHoldAPulleyWhileTheBeltSlips) {
+  Drive bench{bench_log(60), kBenchToml, kBenchDbc};
+  json found = check(bench);
+  EXPECT_EQ(count(found["roles"]["primary_speed"]["findings"], "wrong: "), 0)
+      << found["roles"]["primary_speed"];
+  bench.log = bench_log(-60);
+  found = check(bench);
+  EXPECT_EQ(count(found["roles"]["primary_speed"]["findings"], "wrong: stood at"), 1)
+      << found["roles"]["primary_speed"];
 }
 
 TEST_F(Check, TheConfigurationAlone) {

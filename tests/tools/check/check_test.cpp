@@ -1,6 +1,11 @@
 // The small parts of a check, on cases computed by hand.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
 #include "tools/check/judge_across.h"
 #include "tools/check/judge_constants.h"
 #include "tools/check/text.h"
@@ -58,6 +63,67 @@ TEST(Across, TheWheelsTellWhichPulleyIsWhich) {
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].weight, Weight::kWrong);
   EXPECT_NE(found[0].text.find("swapped"), std::string::npos) << found[0].text;
+}
+
+// A coast-down at the overdrive stop of the default variator (2.25): the clamp is lowered, mu*
+// rises from 0.05 to 0.10, and the belt slips by 9 %.
+std::vector<Window> coast_that_slips(double torque_Nm) {
+  std::vector<Window> windows;
+  for (int i = 0; i < 60; ++i) {
+    const double lowered = std::max(0.0, (i - 30) / 29.0), slip = 0.09 * lowered * lowered;
+    Window window;
+    window.mean.fill(std::numeric_limits<double>::quiet_NaN());
+    window.change.fill(0.0);
+    const auto set = [&](Role role, double value) {
+      window.mean[static_cast<std::size_t>(role)] = value;
+    };
+    const double primary = 200.0 - i;
+    set(Role::kPrimarySpeed, primary);
+    set(Role::kSecondarySpeed, 2.25 / (1.0 - slip) * primary);
+    set(Role::kPrimaryTorque, torque_Nm);
+    set(Role::kAcceleratorPedal, 0.0);
+    window.mu_star = 0.05 + 0.05 * lowered;
+    window.slip_percent = (torque_Nm < 0.0 ? 100.0 : -100.0) * slip;
+    windows.push_back(window);
+  }
+  return windows;
+}
+
+std::string all_of(const Findings& found) {
+  std::string text;
+  for (const Finding& each : found) text += each.text + "\n";
+  return text;
+}
+
+TEST(Across, SlipInOverrunLiftsTheRatioAboveItsStop) {
+  daemon::Config config;
+  config.estimator.torque_is_engine = false;
+  const Findings found = judge_across(coast_that_slips(-30.0), config);
+  EXPECT_TRUE(found.empty()) << all_of(found);
+}
+
+TEST(Across, NothingSlipsAgainstTheTorque) {
+  daemon::Config config;
+  config.estimator.torque_is_engine = false;
+  const Findings found = judge_across(coast_that_slips(30.0), config);
+  EXPECT_NE(all_of(found).find("against the torque, never with it: sign of primary_torque"),
+            std::string::npos)
+      << all_of(found);
+}
+
+TEST(Across, APedalThatNeverMovesThoughTheTorqueTurns) {
+  daemon::Config config;
+  config.estimator.torque_is_engine = false;
+  std::vector<Window> windows = coast_that_slips(-30.0);
+  const auto torque = [&](std::size_t i) -> double& {
+    return windows[i].mean[static_cast<std::size_t>(Role::kPrimaryTorque)];
+  };
+  for (std::size_t i = 0; i < 10; ++i) torque(i) = 30.0;  // cruise control, and then a coast-down
+  EXPECT_EQ(all_of(judge_across(windows, config)).find("accelerator_pedal"), std::string::npos);
+  for (std::size_t i = 0; i < 30; ++i) torque(i) = i / 5 % 2 == 0 ? 30.0 : -30.0;
+  EXPECT_NE(all_of(judge_across(windows, config)).find("accelerator_pedal is always 0 %"),
+            std::string::npos)
+      << all_of(judge_across(windows, config));
 }
 
 daemon::Config with_engine_speed(bool bound) {
