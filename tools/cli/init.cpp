@@ -165,6 +165,17 @@ std::string flag_line(const Proposal& proposal, const std::string& name, daemon:
          " }   # guessed, " + seen + "\n";
 }
 
+// Never a line that only lacks its "#": its name leaves open what it is.
+void append_in_part(Proposal& proposal, daemon::Role role) {
+  std::vector<RoleCandidate> candidates = guess_in_part(role, proposal.databases);
+  if (proposal.evidence != nullptr) order_by(*proposal.evidence, role, candidates);
+  for (std::size_t i = 0; i < candidates.size() && i <= kAlternativesShown; ++i) {
+    const RoleCandidate& each = candidates[i];
+    proposal.text += "#   perhaps " + signal_text(each) + ", " + unit_remark(each) +
+                     evidence_text(proposal, role, each) + "\n";
+  }
+}
+
 void append_role(Proposal& proposal, daemon::Role role, bool required) {
   std::string name(daemon::role_name(role));
   name.resize(std::max<std::size_t>(name.size(), 18), ' ');
@@ -177,6 +188,7 @@ void append_role(Proposal& proposal, daemon::Role role, bool required) {
       text += "# " + name + " = \"Message.Signal\"   # NOT FOUND" +
               (required ? "" : ", control = \"command\" needs it") +
               ": enter it by hand\n#   found: " + where_of(role) + "\n";
+      append_in_part(proposal, role);
     }
     if (required) proposal.missing += (proposal.missing.empty() ? "" : ", ") + trimmed(name);
     return;
@@ -257,6 +269,8 @@ void run(const Options& options) {
   for (std::size_t i = 0; i < daemon::kRoleCount; ++i) {
     const auto each = guess_role(static_cast<daemon::Role>(i), databases);
     candidates.insert(candidates.end(), each.begin(), each.end());
+    const auto in_part = guess_in_part(static_cast<daemon::Role>(i), databases);
+    candidates.insert(candidates.end(), in_part.begin(), in_part.end());
   }
   EvidenceOf evidence;
   Proposal proposal{.databases = databases, .evidence = nullptr, .text = "", .missing = ""};

@@ -35,7 +35,9 @@ bool is_excluded(const RoleWords& row, const std::vector<std::string>& words) {
   return points(row.excluded, words) > 0 || points(never_words(), words) > 0;
 }
 
-int score(const RoleWords& row, const can::MessageDef& message, const can::SignalDef& signal) {
+// With `lacking` words of its name missing.
+int score(const RoleWords& row, const can::MessageDef& message, const can::SignalDef& signal,
+          int lacking = 0) {
   const std::vector<std::string> own = all_words_of(signal.name);
   const std::vector<std::string> said = comment_words(signal.comment);
   const std::vector<std::string> about = all_words_of(message.name);
@@ -55,7 +57,7 @@ int score(const RoleWords& row, const can::MessageDef& message, const can::Signa
       if (gained > 0) its_own = by_comment = true;
     }
     if (gained == 0) gained = points(group, about);
-    if (gained == 0) return 0;
+    if (gained == 0 && lacking-- == 0) return 0;
     sum += gained;
   }
   return !its_own || (by_comment && is_excluded(row, said)) ? 0 : sum;
@@ -89,6 +91,19 @@ int label_points(const std::string& label) {
   const int best = points(kTrue, words);
   return best == 0 ? 0
                    : best * kPerWord - static_cast<int>(std::min<std::size_t>(words.size(), 99));
+}
+
+bool is_claimed(const can::MessageDef& message, const can::SignalDef& signal) {
+  for (std::size_t i = 0; i < daemon::kRoleCount; ++i) {
+    if (score(words_for(static_cast<daemon::Role>(i)), message, signal) > 0) return true;
+  }
+  return false;
+}
+
+void put_best_first(std::vector<RoleCandidate>& candidates) {
+  std::stable_sort(
+      candidates.begin(), candidates.end(),
+      [](const RoleCandidate& a, const RoleCandidate& b) { return a.score > b.score; });
 }
 
 }  // namespace
@@ -136,9 +151,27 @@ std::vector<RoleCandidate> guess_role(daemon::Role role,
       }
     }
   }
-  std::stable_sort(
-      candidates.begin(), candidates.end(),
-      [](const RoleCandidate& a, const RoleCandidate& b) { return a.score > b.score; });
+  put_best_first(candidates);
+  return candidates;
+}
+
+std::vector<RoleCandidate> guess_in_part(daemon::Role role,
+                                         const std::vector<can::Database>& databases) {
+  const can::Dimension dimension = daemon::role_dimension(role);
+  std::vector<RoleCandidate> candidates;
+  if (dimension == can::Dimension::kNone) return candidates;  // nothing speaks for a bit but words
+  for (const can::Database& database : databases) {
+    for (const can::MessageDef& message : database.messages) {
+      for (const can::SignalDef& signal : message.signals) {
+        const auto unit = can::parse_unit(signal.unit);
+        if (!fits(signal, dimension) || !unit || unit->dimension != dimension) continue;
+        const int gained = score(words_for(role), message, signal, 1);
+        if (gained == 0 || is_claimed(message, signal)) continue;
+        candidates.push_back({&message, &signal, true, gained});
+      }
+    }
+  }
+  put_best_first(candidates);
   return candidates;
 }
 

@@ -20,6 +20,10 @@ struct RoleCandidate {
 // Best first. Pointers into the databases.
 std::vector<RoleCandidate> guess_role(daemon::Role role,
                                       const std::vector<can::Database>& databases);
+// Signals of the role's quantity that lack one word of its name, and that no other role claims by
+// all of its words: for a person who knows the car. Best first.
+std::vector<RoleCandidate> guess_in_part(daemon::Role role,
+                                         const std::vector<can::Database>& databases);
 
 // At which values a flag is 1.
 struct TrueWhen {

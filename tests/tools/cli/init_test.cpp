@@ -130,6 +130,31 @@ TEST(Roles, AreFoundInFourLanguagesAndByAbbreviations) {
   }
 }
 
+// "AccPedal" may be the adaptive cruise's, "OilTemp" the engine's, "TorqueActual" anything's: never
+// a role's line, but beside the empty one. What another role claims is not offered.
+TEST(Roles, ThatLackAWordAreOfferedToAPerson) {
+  const std::vector<can::Database> databases = {can::parse_dbc(R"(VERSION ""
+BO_ 256 ECU_Torque: 8 ECU
+ SG_ TorqueActual : 0|16@1- (0.1,0) [-500|500] "Nm" X
+ SG_ TorqueCounter : 16|8@1+ (1,0) [0|255] "Nm" X
+ SG_ EngineSpeed : 32|16@1+ (0.25,0) [0|16000] "rpm" X
+BO_ 257 Status: 8 TCU
+ SG_ OilTemp : 0|8@1+ (1,-40) [-40|215] "degC" X
+ SG_ AccPedal : 8|8@1+ (0.4,0) [0|100] "%" X
+)")
+                                                    .database};
+  const auto offered = [&](daemon::Role role) {
+    EXPECT_TRUE(cli::guess_role(role, databases).empty());
+    std::string names;
+    for (const auto& each : cli::guess_in_part(role, databases)) names += each.signal->name + " ";
+    return names;
+  };
+  EXPECT_EQ(offered(daemon::Role::kEngineTorque), "TorqueActual ");
+  EXPECT_EQ(offered(daemon::Role::kOilTemperature), "OilTemp ");
+  EXPECT_EQ(offered(daemon::Role::kAcceleratorPedal), "AccPedal ");
+  EXPECT_EQ(offered(daemon::Role::kPrimarySpeed), "");
+}
+
 TEST(Roles, AreFoundByTheCommentWhereTheNameIsANumber) {
   using daemon::Role;
   EXPECT_TRUE(is_candidate(Role::kPrimarySpeed, "S1", "rpm", "Primary pulley speed"));
