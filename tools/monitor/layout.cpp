@@ -152,14 +152,25 @@ void add_reasons(const char* label, const std::vector<Reason>& reasons, const st
     lines.push_back(labelled(label, none));
     return;
   }
-  for (std::size_t i = 0; i < reasons.size() && i < rows_most; ++i) {
+  const std::size_t shown = std::min(reasons.size(), rows_most);
+  std::size_t spare = rows_most - shown;  // rows for what a long one says beyond its first
+  for (std::size_t i = 0; i < shown; ++i) {
     std::string text = reason_text(reasons[i]);
-    const bool last = i + 1 == rows_most;
-    const std::size_t more = reasons.size() - i - 1;
-    const std::string tail = last && more > 0 ? format(" +%zu", more) : "";
-    const std::size_t room = static_cast<std::size_t>(std::max(0, columns - kLabel)) - tail.size();
+    const std::size_t more = i + 1 == rows_most ? reasons.size() - rows_most : 0;
+    const std::string tail = more > 0 ? format(" +%zu", more) : "";
+    const std::size_t room =
+        static_cast<std::size_t>(std::max(1, columns - kLabel - static_cast<int>(tail.size())));
+    const char* name = i == 0 ? label : "";
+    while (text.size() > room && spare > 0) {
+      const std::size_t space = text.rfind(' ', room);
+      const std::size_t end = space == std::string::npos || space == 0 ? room : space;
+      lines.push_back(labelled(name, text.substr(0, end), tone));
+      text.erase(0, end + (end == space ? 1 : 0));
+      name = "";
+      --spare;
+    }
     if (text.size() > room) text.resize(room);
-    lines.push_back(labelled(i == 0 ? label : "", text + tail, tone));
+    lines.push_back(labelled(name, text + tail, tone));
   }
 }
 

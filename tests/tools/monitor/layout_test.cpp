@@ -132,6 +132,13 @@ TEST(Layout, SaysWhyNothingBegins) {
                       "outside its window\n"),
             std::string::npos)
       << shown(view, 120, 24);
+  // Rows that no other reason takes hold the rest of a long one.
+  view.inhibits[0].figure = "3.2 Nm, needs 10 to 100 Nm in overrun, coasting";
+  EXPECT_NE(shown(view, 80, 24)
+                .find("in overrun, coasting): the torque on\n"
+                      "         the belt lies outside its window\n"),
+            std::string::npos)
+      << shown(view, 80, 24);
 }
 
 TEST(Layout, SaysThatNobodySpeaks) {
