@@ -2,6 +2,7 @@
 // JSON.
 #include "tools/cli/monitor.h"
 
+#include <cctype>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -21,10 +22,13 @@ struct Options {
   double speed = 1.0, from_s = 0.0, duration_s = 0.0;
 };
 
-// A file by that name, or a path, is a log; else it is an interface.
+// A file by that name, a path, or a name that ends as those of files do ("drive.log", unlike the
+// "can0.100" of an interface), is a log; else it is an interface.
 bool is_log(const std::string& source) {
   std::error_code none;
+  const std::string ending = std::filesystem::path(source).extension().string();
   return source == "-" || source.find('/') != std::string::npos ||
+         (ending.size() > 1 && std::isalpha(static_cast<unsigned char>(ending[1])) != 0) ||
          std::filesystem::exists(source, none);
 }
 

@@ -153,6 +153,7 @@ TEST_F(Monitor, BadInputIsOneLineAndItsExitCode) {
   place_->write("empty.log", "");
   const std::vector<std::pair<std::vector<std::string>, int>> cases{
       {{place_->path("empty.log"), "--plain"}, 65},
+      {{"missing.log", "--plain"}, 66},  // not the interface "missing.log"
       {{place_->path("missing.log"), "--plain"}, 66},
       {{log(), "--config", place_->path("none.toml"), "--plain"}, 66},
       {{log(), "--plain", "--once"}, 64},
