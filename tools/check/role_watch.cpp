@@ -71,6 +71,7 @@ void RoleWatch::begin_log() {
   span_s_ += last_span_s_;
   last_span_s_ = 0.0;
   first_.reset();
+  newest_.reset();
   const bool asks =
       std::any_of(config_.roles.begin(), config_.roles.end(),
                   [](const daemon::RoleBinding& role) { return role.uds.has_value(); });
@@ -106,6 +107,7 @@ void RoleWatch::on_frame(const daemon::RxFrame& frame) {
   if (frame.frame.error) return;
   ++frames_;
   if (!first_) first_ = frame.t;
+  take_pause(frame.t);
   last_span_s_ = std::max(last_span_s_, daemon::seconds(frame.t - first_.value_or(frame.t)));
   const std::pair key{frame.bus, frame.frame.id};
   if (census_.size() < kIdentifiersMost || census_.contains(key)) {
@@ -117,6 +119,22 @@ void RoleWatch::on_frame(const daemon::RxFrame& frame) {
   }
   if (diagnostics_) diagnostics_->on_frame(frame, faults_);
   for (std::size_t i = 0; i < courses_.size(); ++i) take_frame(courses_[i], states_[i], frame);
+}
+
+// A car that was parked, or a recorder that was stopped, is no gap of each of its messages.
+void RoleWatch::take_pause(MonoTime t) {
+  const double silent_s = daemon::seconds(t - newest_.value_or(t));
+  if (silent_s > kSilentLeast_s) {
+    ++pauses_;
+    longest_pause_s_ = std::max(longest_pause_s_, silent_s);
+    for (State& state : states_) {
+      state.heard_at += t - *newest_;
+      state.counter.reset();
+      state.known = 0;
+      state.same = false;
+    }
+  }
+  newest_ = t;
 }
 
 void RoleWatch::take_frame(RoleCourse& course, State& state, const daemon::RxFrame& frame) {

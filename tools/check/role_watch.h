@@ -89,6 +89,9 @@ class RoleWatch {
   const Census& census() const { return census_; }
   std::uint64_t frames() const { return frames_; }
   double span_s() const { return span_s_ + last_span_s_; }
+  // In which no frame at all came.
+  std::uint64_t pauses() const { return pauses_; }
+  double longest_pause_s() const { return longest_pause_s_; }
 
  private:
   // What goes on from frame to frame within one log.
@@ -108,6 +111,7 @@ class RoleWatch {
     std::optional<MonoTime> asked_at;  // last
     bool waits = false;                // for its answer
   };
+  void take_pause(MonoTime t);
   void take_frame(RoleCourse& course, State& state, const daemon::RxFrame& frame);
   void take_diagnostics(RoleCourse& course, State& state, const daemon::UdsSource& source,
                         const daemon::RxFrame& frame);
@@ -126,7 +130,9 @@ class RoleWatch {
   Census census_;
   std::uint64_t frames_ = 0;
   double span_s_ = 0.0, last_span_s_ = 0.0;
-  std::optional<MonoTime> first_;
+  std::optional<MonoTime> first_, newest_;
+  std::uint64_t pauses_ = 0;
+  double longest_pause_s_ = 0.0;
 };
 
 }  // namespace beltgrip::check

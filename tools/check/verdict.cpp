@@ -79,6 +79,14 @@ Verdict judge(const RoleWatch& watch, const std::vector<Window>& windows,
     if (course.frames > 0) none_seen = false;
   }
   verdict.across = judge_across(windows, config);
+  if (watch.pauses() > 0) {
+    verdict.across.push_back(
+        {Weight::kNote,
+         format("no frame at all came %llu time%s, for %s s at the longest: the car slept, or the "
+                "recorder was stopped",
+                static_cast<unsigned long long>(watch.pauses()), watch.pauses() == 1 ? "" : "s",
+                grouped(watch.longest_pause_s()).c_str())});
+  }
   // Of a log the configuration demands them; a table has the columns that it has.
   for (std::size_t i = 0; i < daemon::kRoleCount; ++i) {
     const auto role = static_cast<Role>(i);

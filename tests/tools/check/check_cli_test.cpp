@@ -370,6 +370,20 @@ TEST_F(Check, AGapEveryMinute) {
   EXPECT_EQ(count(found["roles"]["primary_speed"]["findings"], "gap"), 0);
 }
 
+// A recorder that was stopped for ten seconds of the drive: no message's gap, no lost count.
+TEST_F(Check, APauseOfTheWholeBus) {
+  Drive paused = drive("coast-overdrive");
+  paused.log =
+      changed_log(paused.log, [](LogFrame& frame) { return frame.t_s < 5.0 || frame.t_s > 15.0; });
+  const json found = check(paused);
+  for (const auto& [role, of] : found["roles"].items()) {
+    EXPECT_EQ(count(of["findings"], "gap") + count(of["findings"], "counter"), 0)
+        << role << of["findings"];
+  }
+  EXPECT_EQ(count(found["across"], "note: no frame at all came 1 time, for 10 s"), 1)
+      << found["across"];
+}
+
 TEST_F(Check, AMessageThatEndsBeforeTheLog) {
   Drive wrong = drive("coast-overdrive");
   wrong.log =
