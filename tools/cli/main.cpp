@@ -46,8 +46,9 @@ std::string unknown_subcommand(const command_line::Program& app, int argc, char*
 std::vector<char*> without_help_word(int argc, char** argv) {
   static char help[] = "--help";
   std::vector<char*> words(argv, argv + argc);
-  if (argc > 1 && std::string_view(argv[1]) == "help") {
-    words.erase(words.begin() + 1);
+  const auto is_help = [](const char* word) { return std::string_view(word) == "help"; };
+  if (argc > 1 && is_help(argv[1])) {
+    while (words.size() > 1 && is_help(words[1])) words.erase(words.begin() + 1);  // "help help"
     words.push_back(help);
   }
   return words;

@@ -68,6 +68,7 @@ TEST(Help, EveryValueHasANameAndEveryCommandAnExample) {
 }
 
 TEST(Help, IsASubcommandToo) {
+  EXPECT_EQ(beltgrip({"help", "help"}).out, beltgrip({"--help"}).out);
   EXPECT_EQ(beltgrip({"help"}).out, beltgrip({"--help"}).out);
   EXPECT_EQ(beltgrip({"help", "dbc", "show"}).out, beltgrip({"dbc", "show", "--help"}).out);
   const RunResult unknown = beltgrip({"help", "reply"});
