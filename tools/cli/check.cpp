@@ -27,6 +27,7 @@
 #include "tools/cli/log_table.h"
 #include "tools/cli/log_trouble.h"
 #include "tools/cli/output_file.h"
+#include "tools/cli/progress.h"
 #include "tools/cli/replay_run.h"
 #include "tools/cli/role_guess.h"
 #include "tools/cli/stop_signals.h"
@@ -127,28 +128,45 @@ struct Seen {
   check::Prospects prospects;
 };
 
+// The view, and how far it has come.
+class ToldView final : public daemon::SampleSink {
+ public:
+  ToldView(daemon::SampleSink& view, RunProgress* progress) : view_(view), progress_(progress) {}
+  void on_report(const daemon::SampleReport& report) noexcept override {
+    view_.on_report(report);
+    if (progress_ != nullptr) progress_->at(report.t);
+  }
+
+ private:
+  daemon::SampleSink& view_;
+  RunProgress* progress_;
+};
+
 void look(daemon::Port& port, const daemon::Config& config, check::RoleWatch& watch,
-          std::optional<daemon::Duration> length, Seen& seen) {
+          std::optional<daemon::Duration> length, RunProgress* progress, Seen& seen) {
   watch.begin_log();
   check::ListeningPort listening_port(port, watch, length);
   const daemon::Config quiet = listening(config);
   daemon::Pipeline pipeline(quiet);
   check::BusView view(config, watch, pipeline, seen.windows, seen.prospects);
+  ToldView told(view, progress);
   daemon::run_loop(listening_port, pipeline, quiet.estimator.sample_rate_hz,
-                   estimator::StopReason::kTraceEnd, &view);
+                   estimator::StopReason::kTraceEnd, &told);
   watch.end_log();
 }
 
 void look_at_log(const std::string& path, const daemon::Config& config, check::RoleWatch& watch,
-                 Seen& seen) {
+                 Progress& progress, RunProgress& run_progress, Seen& seen) {
   const auto timeline = open_timeline({path}, "", config);
   ports::ReplayPort port(*timeline, {});
   if (port.empty()) {
     throw Failure{kBadInput, no_frame_text(path, timeline->stats())};
   }
-  look(port, config, watch, {}, seen);
+  run_progress.reads(*timeline);
+  look(port, config, watch, {}, &run_progress, seen);
   const can::LogStats stats = timeline->stats();
   if (stats.lines_bad > 0) {
+    progress.clear();
     text::warn(path + ": " + unreadable_with_first(stats));
   }
 }
@@ -195,15 +213,18 @@ void run(const Options& options) {
   std::string what;
   if (live) {
     const auto port = open_buses_whole(config, stop_descriptor());
-    look(*port, config, watch, static_cast<daemon::Duration>(options.live_s * 1e9), seen);
+    look(*port, config, watch, static_cast<daemon::Duration>(options.live_s * 1e9), nullptr, seen);
     char seconds[32];
     std::snprintf(seconds, sizeof seconds, "%.4g", options.live_s);
     what = config.interface + " for " + seconds + " s";
   }
+  Progress progress;
+  RunProgress run_progress(progress, options.logs.size());
   for (const std::string& log : options.logs) {
-    look_at_log(log, config, watch, seen);
+    look_at_log(log, config, watch, progress, run_progress, seen);
     what += (what.empty() ? "" : ", ") + log;
   }
+  progress.clear();
   const std::vector<can::Database> databases = databases_of(config);
   check::Verdict verdict = check::judge(watch, seen.windows.values(), seen.prospects, config,
                                         dbc_units(config, databases), !what.empty());

@@ -36,14 +36,22 @@ void Progress::clear() {
 
 void RunProgress::reads(const ports::LogTimeline& timeline) {
   timeline_ = &timeline;
+  ++logs_begun_;
+  done_s_ += log_s_;
+  log_s_ = 0.0;
   first_.reset();
 }
 
 void RunProgress::at(daemon::MonoTime t) {
   if (!first_) first_ = t;
   if (!progress_.steps()) return;
-  const double share = timeline_ != nullptr ? timeline_->share_read() : 0.0;
-  progress_.tell(static_cast<double>(t - *first_) * 1e-9, "s of the log", "times real time", share);
+  log_s_ = daemon::seconds(t - *first_);
+  // The logs that are left take as long as the ones that were read.
+  const double read = timeline_ != nullptr ? timeline_->share_read() : 0.0;
+  const double share =
+      read > 0.0 ? (static_cast<double>(logs_begun_ - 1) + read) / static_cast<double>(logs_) : 0.0;
+  progress_.tell(done_s_ + log_s_, logs_ > 1 ? "s of the logs" : "s of the log", "times real time",
+                 share);
 }
 
 }  // namespace beltgrip::cli

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -40,13 +41,16 @@ class Progress {
 // Of the pipeline over one log after another.
 class RunProgress {
  public:
-  explicit RunProgress(Progress& progress) : progress_(progress) {}
+  explicit RunProgress(Progress& progress, std::size_t logs = 1)
+      : progress_(progress), logs_(logs) {}
   void reads(const ports::LogTimeline& timeline);
   void at(daemon::MonoTime t);  // every sample
 
  private:
   Progress& progress_;
   const ports::LogTimeline* timeline_ = nullptr;
+  std::size_t logs_, logs_begun_ = 0;
+  double done_s_ = 0.0, log_s_ = 0.0;  // of the logs before, of this one
   std::optional<daemon::MonoTime> first_;
 };
 
