@@ -82,7 +82,6 @@ class Run {
     progress(0.1, "fit");
     Engine engine(make_campaign(std::move(runs), request_.model), request_.jobs);
     Naming naming = name_effects(engine, stop());
-    name_until_settled(engine, naming);
     progress(0.6, "tests");
     const Learning learning = criticise_and_learn(engine, naming);
     progress(0.8, "gain");
@@ -156,14 +155,16 @@ class Run {
                       [](const ExperimentData& run) { return run.valid_count > 0; }));
   }
 
-  // Beside what was accepted, the whole naming anew: the first pass weighs a second effect against
-  // the first one's evidence, which is in the machine now.
-  void name_until_settled(Engine& engine, Naming& naming) {
-    for (int round = 0; round < kRoundsMax && !naming.unknown && !stop()(); ++round) {
+  // Where names leave something, the whole naming anew beside them: the first pass weighs a second
+  // effect against the first one's evidence, which is in the machine now. Not where the tests pass:
+  // there a second name is what the first one's equation has wrong.
+  void name_until_settled(Engine& engine, Naming& naming, Criticism& left) {
+    for (int round = 0; round < kRoundsMax && !left.passed() && !stop()(); ++round) {
       const std::vector<int> before = engine.accepted();
       if (before.empty()) return;
       name_anew(engine, naming, stop());
       if (engine.accepted() == before) return;
+      left = criticise(engine, steps_);
     }
   }
 
@@ -173,6 +174,7 @@ class Run {
     Learning out;
     if (stop()()) return out;
     out.left = criticise(engine, steps_);
+    name_until_settled(engine, naming, out.left);
     if (out.left.passed()) return out;
     if (engine.accepted().empty()) {
       learn_in_turn(engine, naming, out);
