@@ -223,12 +223,12 @@ TEST(Reachability, NoiseOfTheSlipRateCostsRoom) {
                      excursion(louder, r, rate, 0.4, 0.005, 0.06).slip));
 }
 
-// A crossing that would run on for more than 2.5 points is none, whatever room there is.
+// A crossing that would run on for more than 1.8 points is none, whatever room there is.
 TEST(Reachability, ACrossingNearToNotBeingCaughtIsNone) {
   for (double torque = 15.0; torque < 50.0; torque += 1.0) {
     const Crossing crossing = searched(point(torque), reaction(0.12)).crossing();
     if (crossing.slip_rate_1_s > 0.0) {
-      EXPECT_LT(crossing.dearest.slip, 0.025) << torque;
+      EXPECT_LT(crossing.dearest.slip, 0.018) << torque;
     }
   }
   EXPECT_EQ(searched(point(49.0), reaction(0.12)).crossing().slip_rate_1_s, 0.0);
@@ -269,7 +269,7 @@ Crossing chosen(const RampPoint& p, const Reaction& r) {
     const double lasts_s = 0.008 / rate + r.detection_s + r.dead_time_s + r.lag_s;
     tried.peak_slip_told =
         std::min(tried.peak_slip_max, 60.0 / (p.torque_Nm * p.omega_p_rad_s * lasts_s));
-    if (tried.dearest.slip < 0.025 && tried.peak_slip_max > p.peak_slip &&
+    if (tried.dearest.slip < 0.018 && tried.peak_slip_max > p.peak_slip &&
         tried.peak_slip_told > best.peak_slip_told) {
       best = tried;
     }
