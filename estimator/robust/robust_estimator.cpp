@@ -369,8 +369,10 @@ class RobustEstimator final : public SlipCurveEstimator {
     const PeakFitResult& fit = fit_.result();
     peak_ = {};
     // Torque that fades is no friction that falls.
-    const bool seen = out_.stop == StopReason::kSlope || out_.stop == StopReason::kSlip ||
-                      out_.stop == StopReason::kSlipRate || (at_the_top_ && fit.passed) ||
+    const bool slips_on = out_.stop == StopReason::kSlip || out_.stop == StopReason::kSlipRate ||
+                          (at_the_top_ && fit.passed);
+    const bool seen = out_.stop == StopReason::kSlope ||
+                      (slips_on && first_mu_ < kRisenFrom * fit.mu) ||
                       (out_.stop != StopReason::kTorque && fit.inside >= kInsideWithoutStop &&
                        fit.passed && fit.fall > kFallDeviations * std::sqrt(fit.fall_variance));
     peak_.samples = std::lround(fit.duration_s * sample_rate_hz_);
