@@ -200,7 +200,7 @@ const std::vector<GuardCase>& guard_cases() {
        {"vehicle.final_drive=6.6"},
        slips_fast,
        Layer::kMonitor},
-      {"BelievesSilence", {.fall_N_per_s = 0.0}, {}, believes_silence, Layer::kMonitor, 14.0},
+      {"BelievesSilence", {.fall_N_per_s = 0.0}, {}, believes_silence, Layer::kMonitor, 18.0},
   };
   return cases;
 }

@@ -80,6 +80,12 @@ class ReplayAsRecorded : public testing::Test {
     place_ = nullptr;
   }
   static std::string path(const std::string& name) { return place_->path(name); }
+  // As the simulated controller saw it: the frame that follows the sample of the decision.
+  static double begin_s(std::size_t request) {
+    const auto truth = nlohmann::json::parse(place_->read("twice/truth.json"));
+    return truth.at("requests").at(request).at("begin_s");
+  }
+  static constexpr double kSampleAndFrame_s = 0.0105;
   static RunResult replay(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), "replay");
     return beltgrip(arguments);
@@ -158,7 +164,7 @@ TEST_F(ReplayAsRecorded, ARequestThatTheLogCutsOffEndsWithTheLog) {
   ASSERT_EQ(found.experiments.size(), 1u) << run.out;
   EXPECT_EQ(found.experiments[0].at("stop_reason"), "trace_end");
   EXPECT_NE(found.experiments[0].at("outcome"), "completed");
-  EXPECT_NEAR(found.experiments[0].at("start_s").get<double>(), 13.285, 0.0061);
+  EXPECT_NEAR(found.experiments[0].at("start_s").get<double>(), begin_s(0), kSampleAndFrame_s);
 }
 
 TEST_F(ReplayAsRecorded, ARequestWithoutItsBeginningIsNoExperiment) {
@@ -166,7 +172,7 @@ TEST_F(ReplayAsRecorded, ARequestWithoutItsBeginningIsNoExperiment) {
   const Told found = told(run.out);
   EXPECT_EQ(found.summary.at("requests_followed"), 1);
   ASSERT_EQ(found.experiments.size(), 1u) << run.out;
-  EXPECT_NEAR(found.experiments[0].at("start_s").get<double>(), 50.075, 0.0061);
+  EXPECT_NEAR(found.experiments[0].at("start_s").get<double>(), begin_s(1), kSampleAndFrame_s);
   EXPECT_NE(run.err.find("1 more lack their beginning"), std::string::npos) << run.err;
 }
 
@@ -176,7 +182,7 @@ TEST_F(ReplayAsRecorded, ALogThatBeginsJustBeforeARequestHasItsExperiment) {
   const Told found = told(replay_log(log).out);
   ASSERT_EQ(found.experiments.size(), 1u);
   EXPECT_EQ(found.experiments[0].at("outcome"), "completed");
-  EXPECT_NEAR(found.experiments[0].at("start_s").get<double>(), 50.075, 0.0061);
+  EXPECT_NEAR(found.experiments[0].at("start_s").get<double>(), begin_s(1), kSampleAndFrame_s);
 }
 
 // Nobody obeys a request for 50 ms after its last frame: there it ends, whatever comes later.

@@ -85,7 +85,14 @@ TEST_F(Monitor, ALogIsReplayedAsReplayDoes) {
   }
   EXPECT_NEAR(view.at("inputs").at("primary_speed").at("rate_Hz").get<double>(), 100.0, 10.0);
   EXPECT_EQ(view.at("inputs").at("primary_speed").at("trust"), "valid");
-  EXPECT_FALSE(view.at("inhibits").empty());
+}
+
+TEST_F(Monitor, SaysWhatKeepsARequestAway) {
+  const std::string drive = place_->path("withheld");
+  ASSERT_EQ(beltgrip({"simulate", "--scenario", "coast-overdrive", "--out-dir", drive}).status, 0);
+  const json view = once({drive + "/trace.log", "--config", drive + "/beltgrip.toml"});
+  ASSERT_FALSE(view.at("inhibits").empty());
+  EXPECT_NE(view.at("inhibits")[0].at("means"), "");
 }
 
 TEST_F(Monitor, RecordedFramesAreShownAsTheyWere) {
