@@ -38,7 +38,7 @@ constexpr double kCounts = 25.0;
 constexpr double kForgotten = 40.0;
 // Work, in instructions as callgrind counts them in a release build over the ramp of
 // tests/instructions: that of one second, and of one curve.
-constexpr double kWork_per_s = 0.85e6;
+constexpr double kWork_per_s = 0.82e6;
 constexpr int kWorkLook = 30, kWorkAdd = 140, kWorkFit = 350, kWorkSum = 380;
 
 constexpr double kNone = -1e300;  // of a logarithm

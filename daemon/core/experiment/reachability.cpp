@@ -126,9 +126,10 @@ double peak_slip_max(const Crossing& crossing, const SlipLimits& limits, double 
       std::min(limits.slip_max, limits.slip_speed_max_m_s / (omega_p_rad_s * primary_radius_m));
   const double turn_W = std::max(1.0, torque_Nm * omega_p_rad_s);  // of a whole turn of slip
   const Excursion& cost = crossing.dearest;
-  return std::min(
-      {slip - cost.slip, (limits.energy_max_J / turn_W - cost.area_s) / cost.time_s,
-       (limits.energy_max_J - limits.energy_stop_J) / (turn_W * cost.late_s) - cost.slip});
+  const double by_fall = (limits.energy_max_J / turn_W - cost.area_s) / cost.time_s;
+  const double by_stop =
+      (limits.energy_max_J - limits.energy_stop_J) / (turn_W * cost.late_s) - cost.slip;
+  return std::min(slip - cost.slip, std::min(by_fall, by_stop));
 }
 
 CrossingSearch::CrossingSearch(const RampPoint& point, const Reaction& reaction,
