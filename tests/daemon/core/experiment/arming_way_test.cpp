@@ -91,15 +91,15 @@ struct Drive {
   }
   // 600 N/s down to where a belt of 80 % of the least friction would peak, then the rate near the
   // top.
-  double ramp_s(const RampPoint& point, double slip_rate_1_s) const {
+  double ramp_s(const RampPoint& point, double slip_rate_1_s, double fast_N_per_s = 600.0) const {
     const double peak = peak_N(point), answer_s = 0.135;
     double slow_N_per_s = ramp_at_the_top_N_per_s(point, answer_s, slip_rate_1_s);
-    if (slow_N_per_s > 600.0) slow_N_per_s = 600.0;
+    if (slow_N_per_s > fast_N_per_s) slow_N_per_s = fast_N_per_s;
     double near = peak * point.mu_expected / (0.8 * point.mu_least);
     if (own_force_N <= peak) return 0.0;
     if (own_force_N <= near) near = own_force_N;
     if (near < peak) near = peak;
-    return (own_force_N - near) / 600.0 + (near - peak) / slow_N_per_s;
+    return (own_force_N - near) / fast_N_per_s + (near - peak) / slow_N_per_s;
   }
 };
 
@@ -107,6 +107,7 @@ struct Found {
   std::uint32_t inhibits = 0;
   double figure = 0.0, limit = 0.0;  // where it is forbidden
   RequestPlan plan;                  // where it is not
+  RampPoint point;                   // that decided
 };
 
 struct Searched {
@@ -143,7 +144,8 @@ Account account(const Drive& drive) {
   if (latest_rad_s > soon.omega_p_rad_s) latest_rad_s = soon.omega_p_rad_s;
   const RampPoint latest = drive.point(latest_rad_s);
   if (drive.peak_N(latest) < latest.floor_N) {
-    out.found = {inhibit_bit(Inhibit::kUnreachable), latest.floor_N, drive.peak_N(latest), {}};
+    out.found = {
+        inhibit_bit(Inhibit::kUnreachable), latest.floor_N, drive.peak_N(latest), {}, latest};
     return out;
   }
   const double later_rad_s = 0.95 * soon.omega_p_rad_s;
@@ -163,9 +165,10 @@ Account account(const Drive& drive) {
   if (a * 8.0 > 0.05 * now_rad_s && needed_s + 3.0 < left_s && gains) {
     out.found.inhibits = inhibit_bit(Inhibit::kWait);
   } else if (!safe) {
-    out.found = {inhibit_bit(Inhibit::kRamp), 0.01 * soon.fall, 0.0, {}};
+    out.found = {inhibit_bit(Inhibit::kRamp), 0.01 * soon.fall, 0.0, {}, soon};
   } else {
     out.found.plan = {here.crossing, soon.mu_expected, soon.mu_least, soon.primary_radius_m};
+    out.found.point = soon;
     const double most_s = left_s < 15.0 ? left_s : 15.0;
     if (needed_s > most_s) {
       out.found.inhibits = inhibit_bit(Inhibit::kTime);
@@ -174,6 +177,28 @@ Account account(const Drive& drive) {
     }
   }
   return out;
+}
+
+// What would do. Out of reach: at that speed the floor is the force of the peak, where it ever is.
+// Too slow: that ramp ends in time and one that is a fifth slower does not; none beyond 10 kN/s,
+// and in steps of a fifth from 600 N/s the fifteenth, 9244 N/s, is the last before.
+void expect_would_do(const Drive& drive, const Found& found, double needed) {
+  if (found.inhibits == inhibit_bit(Inhibit::kUnreachable)) {
+    const bool ever = drive.floor_N(0.0) < drive.peak_N(found.point);
+    ASSERT_EQ(std::isfinite(needed), ever);
+    if (!ever) return;
+    EXPECT_NEAR(drive.floor_N(needed), drive.peak_N(found.point), 1e-6);
+  }
+  if (found.inhibits == inhibit_bit(Inhibit::kTime)) {
+    const auto ends = [&](double rate_N_per_s) {
+      const double slip_rate_1_s = found.plan.crossing.slip_rate_1_s;
+      return drive.ramp_s(found.point, slip_rate_1_s, rate_N_per_s) + 1.0 <= found.limit;
+    };
+    ASSERT_EQ(std::isfinite(needed), ends(600.0 * std::pow(1.2, 15) * (1.0 + 1e-9)));
+    if (!std::isfinite(needed)) return;
+    EXPECT_TRUE(ends(needed * (1.0 + 1e-9))) << needed;
+    EXPECT_FALSE(ends(needed / 1.2 * (1.0 - 1e-9))) << needed;
+  }
 }
 
 // What arming has found at the sample at which the account decides, and that it had not before.
@@ -194,6 +219,7 @@ void compare(const Drive& drive, int* count) {
   if ((inhibits & Arming::kForbids) != 0) {
     EXPECT_NEAR(arming.obstacle().figure, expected.found.figure, 1e-6);
     EXPECT_NEAR(arming.obstacle().limit, expected.found.limit, 1e-6);
+    expect_would_do(drive, expected.found, arming.obstacle().needed);
   }
   if (inhibits != 0) return;
   const RequestPlan &plan = arming.plan(), &wanted = expected.found.plan;
@@ -238,6 +264,54 @@ TEST(TheWay, IsWhatAnotherAccountSays) {
     EXPECT_GT(counted(count, each), 30) << static_cast<int>(each);
   }
   EXPECT_GT(count[31], 100);
+}
+
+// The last seconds of a coast-down, from where a ramp that is a little faster would do to where
+// none does.
+TEST(TheWay, SaysWhichRampWouldBeFastEnough) {
+  int count[32] = {};
+  Drive drive;
+  drive.slows_rad_s2 = 4.0;
+  drive.own_force_N = 9000.0;
+  for (double left_s = 2.0; left_s < 12.0; left_s += 0.01) {
+    drive.begins_rad_s = 105.0 + 4.0 * (1.58 + left_s);
+    SCOPED_TRACE(left_s);
+    compare(drive, count);
+  }
+  EXPECT_GT(counted(count, Inhibit::kTime), 500);
+}
+
+// A sine of two windows, of 130 ms: from one to the next its slope turns round, so that the noise
+// is the steepest slope of a line through thirteen of its points. With 2 %/s a steep fall is seen
+// after 0.4 points of slip instead of 0.3, some 25 ms later.
+TEST(TheWay, ReckonsWithTheNoiseOfTheSpeeds) {
+  const auto wave = [](double sample) { return std::sin(std::numbers::pi * sample / 13.0); };
+  double moment = 0.0, square_s = 0.0;
+  for (int i = -6; i <= 6; ++i) {
+    moment += 0.005 * i * wave(i);
+    square_s += 0.005 * i * 0.005 * i;
+  }
+  for (const bool low : {false, true}) {
+    Drive drive;
+    drive.low = low;
+    drive.torque_Nm = low ? 20.0 : 30.0;
+    drive.own_force_N = 2.5 * drive.peak_N(drive.point(130.0));
+    RampPoint shaken = drive.point(130.0);
+    shaken.slip_rate_noise_1_s = 0.02;
+    const Crossing wanted = search(shaken, drive.stale).crossing;
+    ASSERT_GT(wanted.slip_rate_1_s, 0.0);
+    const Crossing quiet = search(drive.point(130.0), drive.stale).crossing;
+    ASSERT_GT(wanted.dearest.time_s, quiet.dearest.time_s + 0.02);
+    Arming arming(drive.car);
+    for (int i = 0; i < 400; ++i) {
+      Arming::Now now = drive.now(i * kSample);
+      now.omega_s_rad_s *= 1.0 + 0.02 * square_s / moment * wave(i);
+      arming.step(now);
+    }
+    ASSERT_TRUE(arming.cleared()) << low;
+    EXPECT_EQ(arming.plan().crossing.slip_rate_1_s, wanted.slip_rate_1_s);
+    EXPECT_NEAR(arming.plan().crossing.dearest.time_s, wanted.dearest.time_s, 0.002);
+  }
 }
 
 }  // namespace

@@ -242,6 +242,20 @@ TEST(Reachability, ThereIsLessRoomAtAHigherSpeed) {
             peak_slip_max(crossing, SlipLimits{}, 25.0, 130.0, 0.0784));
 }
 
+// At 30 Nm and 140 rad/s a whole turn of slip is 4200 W, and 0.8 m/s are 7.29 %. With a point of
+// slip on its way: that limit leaves 6.29 %; 90 J in 0.4 s, with 0.2 % s on its way, 4.86 %; the
+// 30 J beyond the request's own stop in 0.2 s 2.57 %.
+TEST(Reachability, TheNearestLimitDecides) {
+  const auto room = [](const Excursion& dearest) {
+    Crossing crossing;
+    crossing.dearest = dearest;
+    return peak_slip_max(crossing, SlipLimits{}, 30.0, 140.0, 0.0784);
+  };
+  EXPECT_NEAR(room({0.01, 0.1, 0.002, 0.01}), 0.0629, 1e-4);
+  EXPECT_NEAR(room({0.01, 0.4, 0.002, 0.01}), 0.0486, 1e-4);
+  EXPECT_NEAR(room({0.01, 0.1, 0.002, 0.2}), 0.0257, 1e-4);
+}
+
 // Two slip rates, each with a steep and a flat top, with and without a silence; the excursions
 // are those held against the integration above. The energy of a steep fall counts, of a flat top
 // what comes late; that one tells the latest peak where 60 J last for 0.8 points and the answer.
