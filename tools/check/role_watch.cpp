@@ -123,12 +123,13 @@ void RoleWatch::on_frame(const daemon::RxFrame& frame) {
 
 // A car that was parked, or a recorder that was stopped, is no gap of each of its messages.
 void RoleWatch::take_pause(MonoTime t) {
-  const double silent_s = daemon::seconds(t - newest_.value_or(t));
+  const MonoTime before = newest_.value_or(t);
+  const double silent_s = daemon::seconds(t - before);
   if (silent_s > kSilentLeast_s) {
     ++pauses_;
     longest_pause_s_ = std::max(longest_pause_s_, silent_s);
     for (State& state : states_) {
-      state.heard_at += t - *newest_;
+      state.heard_at += t - before;
       state.counter.reset();
       state.known = 0;
       state.same = false;

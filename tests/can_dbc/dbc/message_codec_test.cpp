@@ -196,9 +196,10 @@ TEST(MessageCodec, DecodesManyOverlappingRangesWithoutATableOfThemAll) {
   MessageDef message;
   message.signals.push_back(byte_signal("mux", 0));
   message.signals[0].length = 16;
+  std::vector<std::string> names;  // a definition only points to its texts
+  for (std::uint64_t k = 0; k < 400; ++k) names.push_back("s" + std::to_string(k));
   for (std::uint64_t k = 0; k < 400; ++k) {
-    const std::string name = "s" + std::to_string(k);
-    message.signals.push_back(selected(name.c_str(), 2, "mux", {{k * 50, 30000 + k * 50}}));
+    message.signals.push_back(selected(names[k].c_str(), 2, "mux", {{k * 50, 30000 + k * 50}}));
   }
   const MessageCodec codec(message);
   DecodedMessage values(message.signals.size());
