@@ -144,8 +144,9 @@ class DatabaseWriter {
   template <typename Number>
   bool write_as(can::Text text) {
     Number number{};
-    const char* const end = text.data() + text.size();
-    const auto [rest, status] = std::from_chars(text.data(), end, number);
+    const char* const begin = text.data();
+    const char* const end = begin + text.size();
+    const auto [rest, status] = std::from_chars(begin, end, number);
     if (status != std::errc{} || rest != end || !std::isfinite(static_cast<double>(number))) {
       return false;
     }
