@@ -36,6 +36,7 @@ struct Options {
   std::string out;
   double rate_Hz = 0.0;
   bool force = false;
+  bool quiet = false;
 };
 
 std::string format(const char* pattern, auto... values) {
@@ -223,7 +224,7 @@ void run(const Options& options) {
   if (!options.json.empty()) json.emplace(options.json, inputs);
   if (!options.out.empty()) out.emplace(options.out, inputs, unless_forced(options.force));
   std::vector<diagnose::SignalTable> logs;
-  Progress progress;
+  Progress progress(!options.quiet);
   double read_s = 0.0, newest_s = 0.0;
   for (const std::string& path : options.logs) {
     if (!logs.empty() && stop_asked()) break;
@@ -268,6 +269,7 @@ void add_calibrate(command_line::Command app) {
   command.add_option("--out", options->out, "The keys as TOML, '-': standard output")
       .type_name("FILE");
   command.add_flag("--force", options->force, "Replace the file of --out where it exists");
+  command.add_flag("--quiet", options->quiet, kNoProgress);
   command.example(
       "beltgrip calibrate drive/trace.log --config drive/beltgrip.toml --out found.toml");
   command.callback([options] { run(*options); });

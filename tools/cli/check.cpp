@@ -44,6 +44,7 @@ struct Options {
   std::string json;
   double live_s = 0.0;
   double rate_Hz = 0.0;
+  bool quiet = false;
 };
 
 std::vector<can::Database> databases_of(const daemon::Config& config) {
@@ -218,7 +219,7 @@ void run(const Options& options) {
     std::snprintf(seconds, sizeof seconds, "%.4g", options.live_s);
     what = config.interface + " for " + seconds + " s";
   }
-  Progress progress;
+  Progress progress(!options.quiet);
   RunProgress run_progress(progress, options.logs.size());
   for (const std::string& log : options.logs) {
     look_at_log(log, config, watch, progress, run_progress, seen);
@@ -262,6 +263,7 @@ void add_check(command_line::Command app) {
       .range(0.1, 86400.0);
   add_rate_option(command, options->rate_Hz);
   command.add_option("--json", options->json, "As JSON, '-': standard output").type_name("FILE");
+  command.add_flag("--quiet", options->quiet, kNoProgress);
   command.example("beltgrip check drive/trace.log --config drive/beltgrip.toml");
   command.example("beltgrip check --live 60 --config mycar.toml");
   command.callback([options] { run(*options); });

@@ -13,6 +13,9 @@
 
 namespace beltgrip::cli {
 
+// Of an option --quiet.
+inline constexpr const char* kNoProgress = "No progress on standard error";
+
 class Progress {
  public:
   explicit Progress(bool shown = true);

@@ -30,6 +30,7 @@ struct Options {
   std::string config, method, interface, history;
   double rate_Hz = 0.0;
   std::string out = "report.html";
+  bool quiet = false;
 };
 
 std::string number(const char* pattern, auto... values) {
@@ -93,7 +94,7 @@ void report_logs(const Options& options) {
   report::HtmlPage page("BeltGrip: drives and experiments");
   for (const std::string& log : options.logs) {
     if (stop_asked() && !drives.empty()) break;
-    Progress progress;
+    Progress progress(!options.quiet);
     RunProgress run_progress(progress);
     ReportCourses courses(short_name(log, options.logs), config, run_progress);
     ReplayOutputs outputs;
@@ -165,6 +166,7 @@ void add_report(command_line::Command app) {
   command.add_option("--interface", options->interface, "Frames of this interface only")
       .type_name("INTERFACE");
   add_rate_option(command, options->rate_Hz);
+  command.add_flag("--quiet", options->quiet, kNoProgress);
   command.add_option("--out", options->out, "The HTML file")
       .type_name("FILE")
       .capture_default_str();

@@ -41,6 +41,7 @@ struct Options {
   int experiment = 0;
   double speed = 1.0;
   bool force = false;
+  bool quiet = false;
 
   // The machine that runs: the scenario with the model on it.
   template <typename Scenario>
@@ -71,8 +72,8 @@ bool next_frame(sim::RigSource& source, can::StampedFrame& frame) {
 // The rig's frames as a log, written into a file as they are read.
 class RigLog final : public can::LogReader {
  public:
-  RigLog(sim::RigSource& source, double duration_s, std::FILE* copy)
-      : source_(source), duration_s_(duration_s) {
+  RigLog(sim::RigSource& source, double duration_s, bool shows_progress, std::FILE* copy)
+      : source_(source), duration_s_(duration_s), progress_(shows_progress) {
     if (copy != nullptr) copy_.emplace(copy);
   }
   bool next(can::LogRecord& record) override {
@@ -109,7 +110,8 @@ Run run_rig(const Options& options, std::FILE* log, bool results) {
   run.configuration = sim::rig_configuration(scenario, kInterface, "vehicle.dbc");
   run.dbc = sim::shipped("paper-rig.dbc");
   const double end_s = std::min(machine.duration_s * machine.cycles, options.scenario.end_s());
-  auto reader = std::make_unique<RigLog>(source, end_s - options.scenario.start_s, log);
+  auto reader =
+      std::make_unique<RigLog>(source, end_s - options.scenario.start_s, !options.quiet, log);
   const RigLog& frames = *reader;
   if (results) {
     std::vector<std::unique_ptr<can::LogReader>> logs;
@@ -135,7 +137,8 @@ Run run_rig(const Options& options, std::FILE* log, bool results) {
 Run run_vehicle(const Options& options, std::FILE* log) {
   const sim::VehicleScenario scenario = options.scenario.load_vehicle();
   const sim::VehicleScenario machine = options.machine(scenario);
-  DriveResult drive = drive_with_daemon(scenario, machine, options.scenario.seed, log);
+  DriveResult drive =
+      drive_with_daemon(scenario, machine, options.scenario.seed, !options.quiet, log);
   Run run;
   run.configuration = sim::vehicle_configuration(scenario, kInterface, "vehicle.dbc");
   run.dbc = sim::shipped("vehicle.dbc");
@@ -225,6 +228,7 @@ void add_simulate(command_line::Command app) {
                   "Write trace.log, vehicle.dbc, beltgrip.toml and truth.json there")
       .type_name("FOLDER");
   command.add_flag("--force", options->force, "Replace files of --out-dir that exist");
+  command.add_flag("--quiet", options->quiet, kNoProgress);
   command.add_option("--log-out", options->log_out, "Write the log alone, '-': standard output")
       .type_name("FILE");
   command

@@ -112,7 +112,7 @@ std::string truth_text(const sim::VehicleSimulation& vehicle) {
 
 DriveResult drive_with_daemon(const sim::VehicleScenario& believed,
                               const sim::VehicleScenario& machine, std::uint64_t seed,
-                              std::FILE* log) {
+                              bool shows_progress, std::FILE* log) {
   const daemon::Config config =
       load_configuration_text(sim::vehicle_configuration(believed, kInterface, "vehicle.dbc"),
                               sim::shipped("vehicle.dbc"), "");
@@ -121,7 +121,7 @@ DriveResult drive_with_daemon(const sim::VehicleScenario& believed,
   std::optional<can::CandumpWriter> writer;
   if (log != nullptr) writer.emplace(log);
   sim::VehiclePort::Observers observers;
-  Progress progress;
+  Progress progress(shows_progress);
   observers.on_received = [&](const daemon::RxFrame& frame) {
     if (progress.steps()) {
       const double t_s = static_cast<double>(frame.t) * 1e-9;

@@ -32,7 +32,7 @@ struct DriveResult {
 // included.
 DriveResult drive_with_daemon(const sim::VehicleScenario& believed,
                               const sim::VehicleScenario& machine, std::uint64_t seed,
-                              std::FILE* log);
+                              bool shows_progress, std::FILE* log);
 
 // The vehicle as a node of a bus in real time, for play_node: sends its frames, obeys
 // BeltGripClamp.
