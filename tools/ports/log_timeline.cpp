@@ -11,7 +11,7 @@ constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::int64_t kDisorder_ns = kSecond_ns;
 // A pause between two drives of one recording lasts days at most; a clock that is set after a start
 // comes from years before (chosen). Time then goes on after what stands for a pause.
-constexpr std::int64_t kClockSet_ns = 7 * 86'400 * kSecond_ns;
+constexpr std::int64_t kClockSet_ns = 604'800 * kSecond_ns;
 constexpr std::int64_t kPause_ns = 600 * kSecond_ns;
 }  // namespace
 
