@@ -233,7 +233,7 @@ void BusModel::take_status(MonoTime t, const OwnFrameView& frame) {
   said_.faults.clear();
   for (std::size_t i = 0; i < daemon::kFaultCount; ++i) {
     const std::string name(daemon::kFaults[i].name);
-    if (frame.value(("Fault" + name).c_str()) < 0.5) continue;
+    if (frame.value("Fault" + name) < 0.5) continue;
     said_.faults.push_back(daemon::reason_of(static_cast<daemon::Fault>(i), ""));
   }
 }
