@@ -24,9 +24,9 @@ namespace beltgrip::can {
 class Text : public std::string_view {
  public:
   constexpr Text() = default;
-  constexpr Text(const char* literal) : std::string_view(literal) {}  // NOLINT(google-explicit-*)
+  constexpr Text(const char* literal) : std::string_view(literal) {}
   constexpr explicit Text(std::string_view kept) : std::string_view(kept) {}
-  operator std::string() const { return {data(), size()}; }  // NOLINT(google-explicit-*)
+  operator std::string() const { return {data(), size()}; }
 
   friend std::string operator+(std::string left, Text right) { return left.append(right); }
   friend std::string operator+(Text left, std::string_view right) {

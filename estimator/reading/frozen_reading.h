@@ -47,6 +47,7 @@ class FrozenReading {
   static constexpr long kFewest = 20, kTimesLongest = 5;
   // Of neighbouring steps. Derived: more than one apart, less than two.
   static constexpr double kNeighbours = 1.5;
+  // Chosen: where a signal that moves has rested so often, it has left two steps.
   static constexpr std::size_t kRests = 10;
 
   // A value that came twice or more is one of the signal's steps; others may lie between two.

@@ -17,7 +17,8 @@ constexpr std::size_t kShortest = 4, kLongest = 128;  // cells on either side
 constexpr double kDeviations = 4.5;
 constexpr double kStudent = 2.0 * (kDeviations * kDeviations + 1.0) / 4.0;
 constexpr double kFewestSquares = 6.0;
-constexpr double kWhite_s = 0.2;             // longer means scatter by the slow error too
+// Chosen: well below the time constant of the slow error, by which longer means scatter too.
+constexpr double kWhite_s = 0.2;
 constexpr double kShare = 0.03;              // of the value
 constexpr double kQuietSlip_percent = 0.15;  // slip that moves by less carries no other torque,
 constexpr double kFaster = 3.0;  // unless it grows faster by so many deviations: some inertia is
