@@ -44,18 +44,16 @@ bool SignalHistory::value_at(MonoTime t, Duration reach, double& value) const no
   if (count < 2) return false;
   const double span = static_cast<double>(last.t - at(count - 1).t);
   // Stamps relative to the newest, in units of the time they span.
-  double mean_x = 0.0, mean_y = 0.0;
+  double mean_x = 0.0;
   for (std::size_t age = 0; age < count; ++age) {
     mean_x += static_cast<double>(at(age).t - last.t) / span;
-    mean_y += at(age).value;
   }
   mean_x /= static_cast<double>(count);
-  mean_y /= static_cast<double>(count);
   double xx = 0.0, xy = 0.0;
   for (std::size_t age = 0; age < count; ++age) {
     const double x = static_cast<double>(at(age).t - last.t) / span - mean_x;
     xx += x * x;
-    xy += x * (at(age).value - mean_y);
+    xy += x * (at(age).value - last.value);  // any constant: the x add up to nothing
   }
   const double ahead = static_cast<double>(std::min(t - last.t, reach)) / span;
   value = last.value + xy / xx * std::min(ahead, kAheadMaximum);

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "naive_codec.h"
+#include "tests/support/guarded_bytes.h"
 
 namespace beltgrip::can {
 namespace {
@@ -88,6 +89,21 @@ TEST(SignalCodec, NeverFitsWithoutBitsOrWithMoreThan64) {
   }
   EXPECT_FALSE(SignalCodec(make_signal(4'294'967'295U, 1, ByteOrder::kLittle)).fits(64));
   EXPECT_FALSE(SignalCodec().fits(64));
+  // The last place that is taken at all, and the first that is not: 2 MiB.
+  EXPECT_TRUE(SignalCodec(make_signal((1U << 24) - 8, 8, ByteOrder::kLittle)).fits(1U << 21));
+  EXPECT_FALSE(SignalCodec(make_signal(1U << 24, 8, ByteOrder::kLittle)).fits(1U << 22));
+}
+
+TEST(SignalCodec, ReadsAndWritesNothingBehindThePayload) {
+  const beltgrip::testing::GuardedBytes guarded;
+  for (const std::size_t bytes : {1U, 2U, 4U, 5U, 7U, 8U, 9U, 12U, 64U}) {
+    const std::span<std::uint8_t> payload = guarded.last(bytes);
+    for (std::uint32_t first = 0; first < bytes; ++first) {
+      const SignalCodec codec(make_signal(8 * first, 8, ByteOrder::kLittle));
+      codec.insert(payload, 0xA0U + first);
+      EXPECT_EQ(codec.raw(payload), 0xA0U + first) << bytes;
+    }
+  }
 }
 
 TEST(SignalCodec, IsExactAtTheEndsOf64Bits) {
@@ -97,6 +113,8 @@ TEST(SignalCodec, IsExactAtTheEndsOf64Bits) {
   EXPECT_EQ(plain.raw_text(plain.raw(ones)), "18446744073709551615");
   EXPECT_EQ(negative.raw_text(negative.raw(ones)), "-1");
   EXPECT_EQ(negative.decode(ones), -1.0);
+  EXPECT_EQ(plain.decode(ones), std::ldexp(1.0, 64));
+  EXPECT_EQ(negative.raw_from_physical(std::ldexp(1.0, 63)), 0x7FFF'FFFF'FFFF'FFFFU);
   EXPECT_EQ(plain.raw_from_physical(1e300), ~std::uint64_t{0});
   EXPECT_EQ(plain.raw_from_physical(-1.0), 0U);
   EXPECT_EQ(negative.raw_from_physical(1e300), 0x7FFF'FFFF'FFFF'FFFFU);
@@ -116,6 +134,10 @@ TEST(SignalCodec, SaturatesAtWhatTheBitsHold) {
   const SignalCodec nibble(make_signal(0, 4, ByteOrder::kLittle, ValueType::kSigned));
   EXPECT_EQ(static_cast<std::int64_t>(nibble.raw_from_physical(-9.0)), -8);
   EXPECT_EQ(static_cast<std::int64_t>(nibble.raw_from_physical(9.0)), 7);
+  // 0.25 lies between 2 and 3; as a double 3 * 0.1 is a little more than 0.3, so 2 is nearer.
+  const SignalCodec tenths(make_signal(0, 8, ByteOrder::kLittle, ValueType::kSigned, 0.1));
+  EXPECT_EQ(tenths.raw_from_physical(0.25), 2U);
+  EXPECT_EQ(static_cast<std::int64_t>(tenths.raw_from_physical(-0.25)), -2);
   const SignalCodec falling(make_signal(0, 8, ByteOrder::kLittle, ValueType::kUnsigned, -2.0, 3.0));
   EXPECT_EQ(falling.raw_from_physical(1.0), 1U);
   EXPECT_EQ(falling.raw_from_physical(100.0), 0U);
@@ -172,6 +194,7 @@ TEST(SignalCodec, ReadsFloats) {
   EXPECT_TRUE(std::isnan(single.physical(0x7FC00000)));
   const SignalCodec twice(make_signal(7, 64, ByteOrder::kBig, ValueType::kFloat64, 2.0, 1.0));
   EXPECT_EQ(twice.decode(std::array<std::uint8_t, 8>{0x3F, 0xF8}), 4.0);
+  EXPECT_EQ(twice.raw_from_physical(4.0), 0x3FF8'0000'0000'0000U);
   // Marked as a float by the file, 64 bits wide: a double whatever the mark says.
   const SignalCodec wide(make_signal(0, 64, ByteOrder::kLittle, ValueType::kFloat32));
   EXPECT_EQ(wide.physical(std::bit_cast<std::uint64_t>(0.1)), 0.1);

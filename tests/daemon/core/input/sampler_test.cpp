@@ -104,7 +104,7 @@ Errors sample_all(const std::vector<Channel>& channels, bool periods_known = tru
     ++errors.samples;
     if (!sample.usable) continue;
     EXPECT_GT(sample.t_ns, last);
-    if (errors.usable != 0) {
+    if (errors.usable != 0 && !lost) {
       EXPECT_EQ(sample.t_ns - last, 5 * kMillisecond);
     }
     last = sample.t_ns;
@@ -160,6 +160,9 @@ TEST(Sampler, TheDelayIsThatOfTheSlowerSpeedAndASlowPressureAddsNone) {
   EXPECT_EQ(sample_all(channels(10, 100, 100)).delay, 10 * kMillisecond);
   EXPECT_EQ(sample_all(channels(40, 100, 100)).delay, 40 * kMillisecond);
   EXPECT_EQ(sample_all(channels(100, 100, 100)).delay, 50 * kMillisecond);
+  // The slowest pressure that is waited for, and the first that is not.
+  EXPECT_EQ(sample_all(channels(10, 25, 10)).delay, 25 * kMillisecond);
+  EXPECT_EQ(sample_all(channels(10, 26, 10)).delay, 10 * kMillisecond);
 }
 
 TEST(Sampler, LearnedPeriodsGiveTheSame) {
@@ -214,6 +217,85 @@ TEST(Sampler, ALostFrameIsBridged) {
   EXPECT_GT(errors.usable, 550U);
 }
 
+// Two frames of a slow pressure are lost. Its slope is followed for two periods, then it stays
+// level; half a period later the input is stale. A sample tells of the instant 10 ms before.
+TEST(Sampler, ASlopeIsFollowedForTwoPeriods) {
+  const auto lost = [](std::uint32_t id, int i) { return id == 0x12 && (i == 30 || i == 31); };
+  const Errors errors = sample_all(channels(10, 50, 10), true, 0.0, 3.0, lost);
+  constexpr double kSlope = 300.0 / 0.0113;  // Pa/s
+  EXPECT_NEAR(errors.pressure, kSlope * 0.015, kSlope * 0.005);
+}
+
+// The inputs of one car at rest with itself, all told every 10 ms until they end.
+struct Steady {
+  explicit Steady(bool periods_known) : config(config_of(channels(10, 10, 10), periods_known)) {}
+  void run_to(MonoTime end) {
+    for (; t <= end; t += 10 * kMillisecond) {
+      for (const RoleBinding& each : config.roles) {
+        RxFrame frame{.t = t, .frame = {}};
+        frame.frame.id = each.id;
+        frame.frame.length = 8;
+        each.codec.insert({frame.frame.data.data(), 8},
+                          std::bit_cast<std::uint64_t>(value(each.role)));
+        inputs.on_frame(frame, faults);
+      }
+      inputs.update(t, faults);
+    }
+  }
+  double value(Role role) const {
+    const double small = 1e-3 * std::sin(static_cast<double>(t));  // nothing real is quite still
+    switch (role) {
+      case Role::kPrimarySpeed:
+        return 100.0 + small;
+      case Role::kSecondarySpeed:
+        return 225.0 + small;
+      case Role::kSecondaryPressure:
+        return 4e5 + small;
+      default:
+        return -30.0 + small;
+    }
+  }
+
+  Config config;
+  InputMonitor inputs{config};
+  Sampler sampler{inputs, true};
+  FaultSet faults;
+  MonoTime t = kMillisecond;
+};
+
+TEST(Sampler, TheDelayStaysWhileItMayNotChange) {
+  Steady car(true);
+  car.run_to(kSecond);
+  ASSERT_TRUE(car.inputs.all_valid());
+  EXPECT_FALSE(car.sampler.sample(kSecond, false).usable);
+  EXPECT_FALSE(car.sampler.delay());
+  EXPECT_TRUE(car.sampler.sample(kSecond, true).usable);
+  EXPECT_EQ(car.sampler.delay(), 10 * kMillisecond);
+}
+
+TEST(Sampler, OneInstantIsOneSampleAndWhatIsUnusableChangesNoValue) {
+  Steady car(true);
+  car.run_to(kSecond);
+  ASSERT_TRUE(car.sampler.sample(kSecond, true).usable);
+  const double omega_p_rad_s = car.sampler.newest().omega_p_rad_s;
+  EXPECT_FALSE(car.sampler.sample(kSecond, true).usable);
+  EXPECT_FALSE(car.sampler.sample(kSecond - 50 * kMillisecond, true).usable);
+  EXPECT_EQ(car.sampler.newest().omega_p_rad_s, omega_p_rad_s);
+  EXPECT_EQ(car.sampler.newest().t_ns, kSecond - 10 * kMillisecond);
+  EXPECT_TRUE(car.sampler.sample(kSecond + 5 * kMillisecond, true).usable);
+}
+
+TEST(Sampler, NoSampleOfInputsThatEnded) {
+  Steady car(true);
+  car.run_to(kSecond);
+  ASSERT_TRUE(car.sampler.sample(kSecond, true).usable);
+  const MonoTime later = 2 * kSecond;
+  car.inputs.update(later, car.faults);
+  ASSERT_FALSE(car.inputs.all_valid());
+  EXPECT_FALSE(car.sampler.sample(later, true).usable);
+  EXPECT_FALSE(car.sampler.newest().usable);
+}
+
 TEST(Sampler, WithoutAPrimarySpeedThereIsNoSample) {
   auto standing = channels(10, 10, 10);
   standing[0].truth = [](double) { return 0.0; };
@@ -257,9 +339,27 @@ TEST(SignalHistory, KeepsItsOrder) {
   EXPECT_TRUE(history.value_at(5000, 100, value));
   EXPECT_EQ(value, 7.0);  // no further than it may reach
   for (int i = 0; i < 1000; ++i) history.add(300 + i, i);
-  EXPECT_TRUE(history.value_at(1299 - 60, kSecond, value));
-  EXPECT_EQ(value, 939.0);
-  EXPECT_FALSE(history.value_at(1299 - 130, kSecond, value));
+  // 128 values are kept: the oldest, and what lies before it.
+  EXPECT_TRUE(history.value_at(1299 - 127, kSecond, value));
+  EXPECT_EQ(value, 872.0);
+  EXPECT_FALSE(history.value_at(1299 - 128, kSecond, value));
+}
+
+// By hand: the line through the last four of five values has the slope 1.4 a unit of time, and is
+// followed for twice the time they span.
+TEST(SignalHistory, FollowsTheLineOfTheLastFourForTwiceTheirSpan) {
+  SignalHistory history;
+  for (const auto& [t, value] : {std::pair{0, 50.0}, {1, 0.0}, {2, 2.0}, {3, 1.0}, {4, 5.0}}) {
+    history.add(t, value);
+  }
+  constexpr double kSlope = (-1.5 * 0.0 - 0.5 * 2.0 + 0.5 * 1.0 + 1.5 * 5.0) / 5.0;
+  double value = 0.0;
+  EXPECT_TRUE(history.value_at(6, 1000, value));
+  EXPECT_NEAR(value, 5.0 + 2 * kSlope, 1e-12);
+  EXPECT_TRUE(history.value_at(10, 1000, value));
+  EXPECT_NEAR(value, 5.0 + 6 * kSlope, 1e-12);
+  EXPECT_TRUE(history.value_at(11, 1000, value));
+  EXPECT_NEAR(value, 5.0 + 6 * kSlope, 1e-12);
 }
 
 }  // namespace
