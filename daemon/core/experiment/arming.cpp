@@ -35,9 +35,6 @@ constexpr double kRideSpare_s = 0.5;  // chosen: the same, where a request rides
 constexpr double kPlanned_1_s = 0.025;
 constexpr double kRoomGained = 0.001;  // chosen: of slip, a tenth of a point is worth waiting for
 constexpr double kFurther = 0.95;      // chosen: of the speed; is there more room a little later?
-// A fall that was seen once may be steeper the next time.
-constexpr double kFallMargin = 1.5;
-constexpr double kFallLeast = 0.4;  // per unit of slip
 // Chosen: of the steepest fall, what an unknown belt has when a fault comes at the worst instant of
 // its crossing. With the whole of it 34 of 60 drawn cars were not asked.
 constexpr double kFaultShare = 0.5;
@@ -52,6 +49,11 @@ constexpr std::size_t kForceLookMost = 5;  // blocks, of the longest line that i
 // Of white noise: a second difference of means has root 6 of their deviation, the median of its
 // magnitude is 0.6745 of its own.
 constexpr double kPerMedian = 1.0 / (0.6745 * 2.449489742783178);
+
+// What is assumed of an unknown belt, as far as its own experiments leave it open.
+double within(const FallRange& shown, double assumed) noexcept {
+  return shown.most > 0.0 ? std::clamp(assumed, shown.least, shown.most) : assumed;
+}
 
 }  // namespace
 
@@ -201,9 +203,9 @@ RampPoint Arming::point_at(const Now& now, double omega_p_rad_s) const noexcept 
   point.mu_least = known ? kKnownLeast * now.mu_max_known
                          : std::min(kLeastFriction, settings_.friction_expected);
   point.peak_slip = low ? kPeakSlipLow : kPeakSlipOverdrive;
-  point.fall = now.shown.fall > 0.0 ? std::max(kFallLeast, kFallMargin * now.shown.fall)
-                                    : kPercent * settings_.fall_max_per_percent;
-  point.fall_at_fault = now.shown.fall > 0.0 ? point.fall : kFaultShare * point.fall;
+  const double fall_max = kPercent * settings_.fall_max_per_percent;
+  point.fall = within(now.shown.fall, fall_max);
+  point.fall_at_fault = within(now.shown.fall, kFaultShare * fall_max);
   const double noise_1_s = slip_course_.rate_deviation_1_s();
   point.slip_rate_noise_1_s = std::isfinite(noise_1_s) ? noise_1_s : 0.0;  // nothing has moved yet
   return point;

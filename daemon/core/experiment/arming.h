@@ -22,6 +22,7 @@
 #include "daemon/core/base/mono_time.h"
 #include "daemon/core/base/named.h"
 #include "daemon/core/config/options/config.h"
+#include "daemon/core/experiment/fall_shown.h"
 #include "daemon/core/experiment/reachability.h"
 #include "daemon/core/experiment/request_plan.h"
 #include "daemon/core/experiment/slip_course.h"
@@ -96,7 +97,7 @@ struct Conditions {
 struct SlipShown {
   double own_percent = 0.0;
   double peak_percent = 0.0;  // 0: there was none
-  double fall = 0.0;          // of mu behind that peak, per unit of slip; 0: not shown
+  FallRange fall{};           // of mu behind the peaks of all of them
 };
 
 // Why the way is not clear: what was found, and what it would have to be.

@@ -16,10 +16,9 @@ using estimator::VariatorSample;
 
 namespace {
 
-constexpr double kAnswerLags = 3.0;        // of the actuator: then its pressure has answered
-constexpr double kSlipped_percent = 1.5;   // more than deformation and a drift of the ratio explain
-constexpr double kFallSeen_percent = 0.4;  // of slip past the peak: noise is less of mu's fall
-constexpr double kSlipOfAPeak = 0.007;     // since the start: less of it has passed no peak
+constexpr double kAnswerLags = 3.0;       // of the actuator: then its pressure has answered
+constexpr double kSlipped_percent = 1.5;  // more than deformation and a drift of the ratio explain
+constexpr double kSlipOfAPeak = 0.007;    // since the start: less of it has passed no peak
 
 bool in_experiment(State state) noexcept {
   return state == State::kRamping || state == State::kEvaluating || state == State::kReleasing;
@@ -53,6 +52,12 @@ bool ExperimentStage::runs() const noexcept { return in_experiment(state_); }
 SlipShown& ExperimentStage::shown(estimator::Direction direction,
                                   estimator::EndStop end_stop) noexcept {
   return slip_shown_[direction == estimator::Direction::kDrive ? 0 : 1]
+                    [end_stop == estimator::EndStop::kOverdrive ? 0 : 1];
+}
+
+FallShown& ExperimentStage::fall_shown(estimator::Direction direction,
+                                       estimator::EndStop end_stop) noexcept {
+  return fall_shown_[direction == estimator::Direction::kDrive ? 0 : 1]
                     [end_stop == estimator::EndStop::kOverdrive ? 0 : 1];
 }
 
@@ -212,7 +217,9 @@ void ExperimentStage::count(const Now& now) noexcept {
   ++running_.samples;
   if (now.estimate.is_beyond()) running_.beyond.take(now.estimate.beyond());
   const estimator::CurveEstimate& curve = now.estimate.curve();
-  if (curve.usable) mu_star_most_ = std::max(mu_star_most_, std::abs(curve.mu_star));
+  if (!curve.usable) return;
+  mu_star_most_ = std::max(mu_star_most_, std::abs(curve.mu_star));
+  last_points_.add(std::abs(curve.sigma_star_percent), std::abs(curve.mu_star));
 }
 
 RoleSet ExperimentStage::step_request(const Now& now) noexcept {
@@ -437,6 +444,7 @@ void ExperimentStage::start(const Now& now) noexcept {
   own_force_N_ = now.estimate.measured_force_N();
   omega_s_start_rad_s_ = sample.omega_s_rad_s;
   mu_star_most_ = 0.0;
+  last_points_.clear();
   sigma_first_percent_ = std::abs(now.estimate.curve().sigma_star_percent);
   running_ = {};
   running_.start = now.t;
@@ -452,7 +460,6 @@ void ExperimentStage::stop(MonoTime t, const Stop& why, const Now& now) noexcept
   running_.stop_reason = why.reason;
   running_.cause = why.cause;
   running_.sigma_stop_percent = std::abs(curve.sigma_star_percent);
-  mu_star_stop_ = std::abs(curve.mu_star);
   running_.direction = curve.direction;
   running_.end_stop = curve.end_stop;
   running_.omega_p_rad_s = sample.omega_p_rad_s;
@@ -515,13 +522,6 @@ void ExperimentStage::keep_result(Outcome outcome) noexcept {
   new_result_ = true;
 }
 
-// Of mu behind the peak, per unit of slip; 0: too little of it was seen.
-double ExperimentStage::fall_seen(const estimator::PeakEstimate& peak) const noexcept {
-  const double beyond_percent = running_.sigma_stop_percent - peak.sigma_peak_percent;
-  if (running_.stop_reason != StopReason::kSlope || beyond_percent < kFallSeen_percent) return 0.0;
-  return std::max(0.0, peak.mu_max - mu_star_stop_) / beyond_percent * 100.0;
-}
-
 void ExperimentStage::conclude(const estimator::PeakEstimate& peak, double sensor_std,
                                bool slipped) noexcept {
   running_.peak = peak;
@@ -535,7 +535,11 @@ void ExperimentStage::conclude(const estimator::PeakEstimate& peak, double senso
   const bool first_seen =
       shown_here.peak_percent <= 0.0 && stopped_by_slip() && peak.kind != PeakKind::kNone;
   if (is_value || first_seen) {
-    shown_here = {slip_own_percent_, peak.sigma_peak_percent, fall_seen(peak)};
+    if (running_.stop_reason == StopReason::kSlope) {
+      last_points_.show(peak.sigma_peak_percent, fall_shown(running_.direction, running_.end_stop));
+    }
+    shown_here = {slip_own_percent_, peak.sigma_peak_percent,
+                  fall_shown(running_.direction, running_.end_stop).range()};
   }
 }
 
@@ -557,6 +561,7 @@ void ExperimentStage::go_on_from(const ExperimentStage& before, bool keeps_resul
   if (!keeps_results) return;
   result_ = before.result_;
   slip_shown_ = before.slip_shown_;
+  fall_shown_ = before.fall_shown_;
 }
 
 }  // namespace beltgrip::daemon

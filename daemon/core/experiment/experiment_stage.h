@@ -15,6 +15,7 @@
 #include "daemon/core/experiment/arming.h"
 #include "daemon/core/experiment/clamp_request.h"
 #include "daemon/core/experiment/experiment.h"
+#include "daemon/core/experiment/fall_shown.h"
 #include "daemon/core/experiment/recorded_requests.h"
 #include "daemon/core/guard/safety_monitor.h"
 #include "daemon/core/input/input_stage.h"
@@ -118,8 +119,8 @@ class ExperimentStage {
   void stop(MonoTime t, const Stop& why, const Now& now) noexcept;
   Stop abort_of(estimator::StopReason reason, const Now& now) const noexcept;
   void keep_result(Outcome outcome) noexcept;
-  double fall_seen(const estimator::PeakEstimate& peak) const noexcept;
   SlipShown& shown(estimator::Direction direction, estimator::EndStop end_stop) noexcept;
+  FallShown& fall_shown(estimator::Direction direction, estimator::EndStop end_stop) noexcept;
 
   const Config& config_;
   Arming arming_;
@@ -142,12 +143,13 @@ class ExperimentStage {
   ExperimentResult result_;   // the last that came to its outcome
   double sigma_first_percent_ = 0.0;
   double mu_star_most_ = 0.0;  // in the experiment under way
-  double mu_star_stop_ = 0.0;  // when it stopped
+  LastPoints last_points_;     // of it
   double omega_s_start_rad_s_ = 0.0;
   double own_force_N_ = 0.0;       // before the experiment under way
   double slip_own_percent_ = 0.0;  // of the experiment under way, before it began
   // By direction and end stop.
   std::array<std::array<SlipShown, 2>, 2> slip_shown_{};
+  std::array<std::array<FallShown, 2>, 2> fall_shown_{};
 };
 
 }  // namespace beltgrip::daemon

@@ -170,13 +170,13 @@ std::string belt_text(Drawer& draw, Surprise surprise) {
   return text;
 }
 
-std::string coasts_text(Drawer& draw, int coasts) {
+std::string coasts_text(Drawer& draw, int coasts, double next_s) {
   std::string text = "\n[driver]\nstart_speed_km_h = 83.0\n";
   const auto step = [&text](double at_s, const char* key, double value) {
     text += "\n[[driver.step]]\n" + row("at_s", at_s) + row(key, value);
   };
   for (int i = 0; i < coasts; ++i) {
-    const double begin_s = kNextCoast_s * i;
+    const double begin_s = next_s * i;
     if (i > 0) step(begin_s - 8.0, "accelerator_percent", draw.between(40.0, 55.0));
     step(begin_s, "hold_speed_km_h", draw.between(76.0, 82.0));
     step(begin_s + 3.0, "accelerator_percent", 0.0);
@@ -225,13 +225,26 @@ std::string vehicle_text(Drawer& draw, const std::string& base, Surprise surpris
   if (draw.chance(0.25)) {
     text += row("pressure_period_s", draw.one_of<double>({0.02, 0.04, 0.06, 0.1}));
   }
-  if (coasts > 1) text += coasts_text(draw, coasts);
+  if (coasts > 1) text += coasts_text(draw, coasts, kNextCoast_s);
   return text;
 }
 
-std::string fault_text(Drawer& draw, const FaultRow& row) {
+std::string fault_head(Drawer& draw, const FaultRow& row) {
   std::string text = "\n[[fault]]\nkind = \"" + std::string(kind_name(row.kind)) + "\"\n";
   if (!row.channels.empty()) text += "channel = \"" + draw.one_of(row.channels) + "\"\n";
+  return text;
+}
+
+std::string fault_size(Drawer& draw, const FaultRow& row) {
+  if (row.sizes.empty()) return {};
+  return "size = " +
+         number(row.sizes.size() == 2 ? draw.between(row.sizes[0], row.sizes[1])
+                                      : draw.one_of(row.sizes)) +
+         "\n";
+}
+
+std::string fault_text(Drawer& draw, const FaultRow& row) {
+  std::string text = fault_head(draw, row);
   // Most of them while a request stands, and of those most near the peak.
   double for_s = draw.between(row.for_low_s, row.for_high_s);
   if (draw.chance(0.85)) {
@@ -244,12 +257,7 @@ std::string fault_text(Drawer& draw, const FaultRow& row) {
     text += "at_s = " + number(draw.between(0.0, 20.0)) + "\n";
   }
   text += "for_s = " + number(for_s) + "\n";
-  if (row.sizes.size() == 2) {
-    text += "size = " + number(draw.between(row.sizes[0], row.sizes[1])) + "\n";
-  } else if (!row.sizes.empty()) {
-    text += "size = " + number(draw.one_of(row.sizes)) + "\n";
-  }
-  return text;
+  return text + fault_size(draw, row);
 }
 
 void complete(CampaignCase& out) {
@@ -306,6 +314,28 @@ CampaignCase draw_case(std::uint64_t seed, const Uniform& uniform,
   const int faults = how_many < 0.2 ? 0 : how_many < 0.8 ? 1 : how_many < 0.95 ? 2 : 3;
   for (int i = 0; i < faults; ++i) out.toml += fault_text(draw, draw.one_of(fault_rows()));
   complete(out);
+  return out;
+}
+
+CampaignCase draw_soak(double hours, std::uint64_t seed) {
+  constexpr double kCycle_s = 34.0;  // a coast-down to 50 km/h and back to speed
+  sim::Random random(seed, "soak");
+  const Uniform uniform = [&] { return random.uniform(); };
+  Drawer draw(uniform);
+  CampaignCase out;
+  out.seed = seed;
+  out.base = "coast-overdrive";
+  const int coasts = static_cast<int>(hours * 3600.0 / kCycle_s);
+  out.toml = "[run]\n" + row("duration_s", kCycle_s * coasts) + coasts_text(draw, coasts, kCycle_s);
+  for (int i = 0; i < coasts - coasts / 10; ++i) {
+    const FaultRow& drawn = draw.one_of(fault_rows());
+    if (drawn.kind == FaultKind::kTcuLatches || drawn.kind == FaultKind::kDaemonDies) continue;
+    out.toml += fault_head(draw, drawn) + row("at_s", kCycle_s * i + draw.between(3.0, 15.0)) +
+                row("for_s", std::min(draw.between(drawn.for_low_s, drawn.for_high_s), 5.0)) +
+                fault_size(draw, drawn);
+  }
+  complete(out);
+  out.guaranteed = true;  // one at a time
   return out;
 }
 

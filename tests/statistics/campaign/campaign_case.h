@@ -27,6 +27,9 @@ CampaignCase draw_case(std::uint64_t seed);
 using Uniform = std::function<double()>;
 CampaignCase draw_case(std::uint64_t seed, const Uniform& uniform,
                        const Uniform& uniform_of_surprise);
+// A long drive: one car that coasts down every 34 s for so many hours, and in each coast-down, but
+// for the last tenth, a fault; none that leaves the controller or the daemon beyond help.
+CampaignCase draw_soak(double hours, std::uint64_t seed);
 // A kept case: file text whose first line is "# base NAME seed N".
 CampaignCase read_case(const std::string& text, const std::string& name);
 

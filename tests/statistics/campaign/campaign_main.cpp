@@ -1,11 +1,13 @@
 // campaign --seeds N [--from S] [--out FILE] [--jobs N] [--worst FOLDER] [--nothing-wrong]
-// campaign --case FILE... | --show SEED | --silence
+// campaign --case FILE... | --show SEED | --silence | --soak HOURS [--from SEED]
 //
 // The first runs seeded cases, one line of JSON each into FILE; a second call goes on where the
 // first ended. The summary goes to standard output; exit status 1 when a promise was broken.
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <iostream>
@@ -33,6 +35,7 @@ struct Options {
   std::uint64_t show = 0;
   std::string worst;
   bool silence = false;
+  double soak_h = 0.0;
   bool nothing_wrong = false;
 };
 
@@ -84,6 +87,36 @@ int run_silence() {
   return broken > 0 ? 1 : 0;
 }
 
+// One drive over many hours with a fault in every coast-down: what was promised holds to its end,
+// and after the last fault values come as at the beginning.
+int run_soak(double hours, std::uint64_t seed) {
+  const CampaignCase given = draw_soak(hours, seed);
+  const CampaignVerdict verdict = run_case(given);
+  const double quiet_from_s = 0.9 * given.scenario.duration_s;
+  int values = 0, quiet = 0, quiet_values = 0;
+  double worst_percent = 0.0;
+  for (const CampaignVerdict::Experiment& each : verdict.experiments) {
+    const bool late = each.begin_s > quiet_from_s;
+    quiet += late ? 1 : 0;
+    if (!each.mu_error_percent) continue;
+    ++values;
+    quiet_values += late ? 1 : 0;
+    worst_percent = std::max(worst_percent, std::abs(*each.mu_error_percent));
+  }
+  for (const std::string& each : verdict.violations) std::printf("broken: %s\n", each.c_str());
+  std::printf(
+      "%.1f h of driving, %zu faults one after the other, %d requests, %d values, largest error "
+      "%.1f %%; largest slip %.1f %%, %.2f m/s, %.0f J beyond the peak; after the last fault %d "
+      "values of %d experiments; %zu promises broken\n",
+      given.scenario.duration_s / 3600.0, given.faults.size(), verdict.requests, values,
+      worst_percent, verdict.slip_max_percent, verdict.slip_speed_max_m_s, verdict.energy_J,
+      quiet_values, quiet, verdict.violations.size());
+  constexpr double kQuietLeast = 0.8;  // of the experiments of this belt, with nothing wrong
+  const bool lives = quiet > 0 && quiet_values >= kQuietLeast * quiet;
+  if (!lives) std::printf("broken: it does not come back to values\n");
+  return verdict.violations.empty() && lives ? 0 : 1;
+}
+
 // Runs what is still open, by several threads.
 void run_open(const Options& options, std::ostream& out, CampaignResults& results) {
   std::vector<std::uint64_t> open;
@@ -125,6 +158,7 @@ int run(const Options& options) {
   }
   if (!options.files.empty()) return run_files(options.files);
   if (options.silence) return run_silence();
+  if (options.soak_h > 0.0) return run_soak(options.soak_h, options.from);
   CampaignResults results;
   std::ofstream out;
   if (!options.out.empty()) {
@@ -162,6 +196,7 @@ int main(int argc, char** argv) {
   app.add_option("--show", options.show, "Print the case of a seed as a file");
   app.add_option("--worst", options.worst, "Folder for the ten worst cases, as files");
   app.add_flag("--nothing-wrong", options.nothing_wrong, "Leave out cases with a fault");
+  app.add_option("--soak", options.soak_h, "Hours of one drive, a fault in every coast-down");
   app.add_flag("--silence", options.silence, "Silence at every 5 ms of a ramp");
   switch (app.parse(argc, argv)) {
     case beltgrip::command_line::Parsed::kGoOn:

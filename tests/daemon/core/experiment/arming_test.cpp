@@ -361,12 +361,28 @@ TEST_F(ArmingTest, TheFirstRequestSurvivesTheSteepestFallAndLaterOnesTheOneThatW
   }
   EXPECT_EQ(arming.inhibits(), inhibit_bit(Inhibit::kRamp));
   EXPECT_NEAR(arming.obstacle().figure, 20e-3, 1e-12);
-  now_.shown = {0.6, 2.0, 0.1};  // 1e-3 per percent
+  now_.shown = {0.6, 2.0, {0.0, 0.4}};  // 4e-3 per percent at most
   for (int i = 0; i < 400; ++i) {
     now_.t += kSample;
     arming.step(now_);
   }
   EXPECT_TRUE(arming.cleared());
+}
+
+// What leaves a gentle fall open is no reason against a request that was right before it.
+TEST_F(ArmingTest, AFallThatMayBeGentleForbidsNothing) {
+  const auto asks = [&](FallRange shown) {
+    Arming arming(config());
+    now_.shown = {0.6, 2.0, shown};
+    for (int i = 0; i < 400; ++i) {
+      now_.t += kSample;
+      arming.step(now_);
+    }
+    return arming.cleared();
+  };
+  EXPECT_TRUE(asks({}));
+  EXPECT_TRUE(asks({0.1, 3.0}));
+  EXPECT_FALSE(asks({2.5, 3.0}));  // 25e-3 per percent
 }
 
 TEST_F(ArmingTest, SteadyTakesDriveTorqueWithThePedalDown) {

@@ -33,7 +33,8 @@ struct Drive {
   Config car = config();
   bool low = false;
   double begins_rad_s = 130.0, slows_rad_s2 = 0.0, torque_Nm = 32.0, own_force_N = 4000.0;
-  double known = 0.0, shown_fall = 0.0;
+  double known = 0.0;
+  FallRange shown_fall;  // most 0: none
   Duration stale = 50 * kMillisecond;
 
   double at_rad_s(double held_s) const { return begins_rad_s - slows_rad_s2 * held_s; }
@@ -58,9 +59,9 @@ struct Drive {
            9.5e-3 * omega_s_rad_s * omega_s_rad_s;
   }
   // A belt of which nothing is known may have 0.085 to what is expected; one that is known 5 % less
-  // or more. Its peak lies at 2 % of slip at the latest, in low at 3.5 %. Friction that fell behind
-  // it may fall half as much again, by 0.4 at the least; of an unknown belt by what is configured,
-  // half of that where a fault comes as well.
+  // or more. Its peak lies at 2 % of slip at the latest, in low at 3.5 %. Friction falls
+  // behind it by what is configured, by half of that where a fault comes as well, as far as its own
+  // experiments leave that open.
   RampPoint point(double omega_p_rad_s) const {
     RampPoint point;
     point.torque_Nm = torque_Nm;
@@ -79,9 +80,9 @@ struct Drive {
     point.peak_slip = low ? 0.035 : 0.02;
     point.fall = 100.0 * car.experiment.fall_max_per_percent;
     point.fall_at_fault = 0.5 * point.fall;
-    if (shown_fall > 0.0) {
-      point.fall = shown_fall * 1.5 > 0.4 ? shown_fall * 1.5 : 0.4;
-      point.fall_at_fault = point.fall;
+    for (double* const each : {&point.fall, &point.fall_at_fault}) {
+      if (shown_fall.most > 0.0 && *each > shown_fall.most) *each = shown_fall.most;
+      if (shown_fall.most > 0.0 && *each < shown_fall.least) *each = shown_fall.least;
     }
     return point;
   }
@@ -251,7 +252,10 @@ TEST(TheWay, IsWhatAnotherAccountSays) {
     drive.torque_Nm = draw(12.0, i % 5 == 0 ? 70.0 : 40.0);
     drive.own_force_N = draw(0.8, 3.5) * drive.peak_N(drive.point(120.0));
     drive.known = i % 4 == 0 ? draw(0.08, 0.12) : 0.0;
-    drive.shown_fall = i % 4 == 1 ? draw(0.1, 0.6) : 0.0;
+    if (i % 4 == 1) {
+      drive.shown_fall.least = draw(0.0, 0.8);
+      drive.shown_fall.most = drive.shown_fall.least + draw(0.1, 1.0);
+    }
     drive.car.experiment.friction_expected = i % 7 == 0 ? draw(0.075, 0.095) : 0.11;
     drive.car.experiment.secondary_pressure_floor_Pa = draw(5e3, 6e4);
     drive.stale = (50 + 40 * (i % 4)) * kMillisecond;
