@@ -233,7 +233,9 @@ void Invariants::check_estimate(const can::CanFrame& frame, const daemon::Sample
 void Invariants::follow_friction(const daemon::SampleReport& now) {
   const daemon::ExperimentResult& result = now.result;
   if (now.state == State::kRamping && before_.state != State::kRamping) carried_ = 0.0;
-  if (now.state == State::kRamping && now.sample.usable && now.curve.usable) {
+  // Also with the sample that ends it.
+  const bool asked = now.state == State::kRamping || before_.state == State::kRamping;
+  if (asked && now.sample.usable && now.curve.usable) {
     carried_ = std::max(carried_, std::abs(now.curve.mu_star));
   }
   if (!now.new_result) return;

@@ -62,7 +62,9 @@ const std::vector<FaultKindRow>& fault_kinds() {
 }
 
 FaultScript::FaultScript(std::vector<FaultStep> steps) : steps_(std::move(steps)) {
-  for (const FaultStep& step : steps_) has_[static_cast<std::size_t>(step.kind)] = true;
+  for (std::size_t i = 0; i < steps_.size(); ++i) {
+    of_kind_[static_cast<std::size_t>(steps_[i].kind)].push_back(i);
+  }
 }
 
 void FaultScript::request_began(double t_s) {
@@ -74,9 +76,11 @@ double FaultScript::start_s(const FaultStep& step) const {
   return request_s_ < 0.0 ? std::numeric_limits<double>::infinity() : request_s_ + step.at_s;
 }
 
-const FaultStep* FaultScript::find(FaultKind kind, double t_s, std::string_view channel) const {
-  for (const FaultStep& step : steps_) {
-    if (step.kind != kind || (!step.channel.empty() && step.channel != channel)) continue;
+const FaultStep* FaultScript::find(const std::vector<std::size_t>& steps, double t_s,
+                                   std::string_view channel) const {
+  for (const std::size_t i : steps) {
+    const FaultStep& step = steps_[i];
+    if (!step.channel.empty() && step.channel != channel) continue;
     const double since_s = t_s - start_s(step);
     if (since_s >= 0.0 && since_s < step.for_s) return &step;
   }

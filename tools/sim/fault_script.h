@@ -97,7 +97,8 @@ class FaultScript {
   // The step of that kind (and channel) acting at t_s, or null.
   const FaultStep* active(FaultKind kind, double t_s, std::string_view channel = {}) const {
     // Asked dozens of times a step, of kinds that hardly any script has.
-    return has_[static_cast<std::size_t>(kind)] ? find(kind, t_s, channel) : nullptr;
+    const std::vector<std::size_t>& steps = of_kind_[static_cast<std::size_t>(kind)];
+    return steps.empty() ? nullptr : find(steps, t_s, channel);
   }
   // Time since that step began.
   double since_s(const FaultStep& step, double t_s) const { return t_s - start_s(step); }
@@ -105,9 +106,12 @@ class FaultScript {
 
  private:
   double start_s(const FaultStep& step) const;
-  const FaultStep* find(FaultKind kind, double t_s, std::string_view channel) const;
+  const FaultStep* find(const std::vector<std::size_t>& steps, double t_s,
+                        std::string_view channel) const;
   std::vector<FaultStep> steps_;
-  std::array<bool, 1 + static_cast<std::size_t>(FaultKind::kDaemonDies)> has_{};
+  // Their places, in the script's order.
+  std::array<std::vector<std::size_t>, 1 + static_cast<std::size_t>(FaultKind::kDaemonDies)>
+      of_kind_;
   double request_s_ = -1.0;
 };
 

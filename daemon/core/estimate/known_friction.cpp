@@ -16,6 +16,7 @@ namespace {
 // A stop may come before the very top: mu* is then this much short of it at the most (chosen: the
 // width that a value may have).
 constexpr double kShortOfTheTop = 0.05;
+constexpr unsigned kSlipsBelieved = 2;   // chosen: in a row
 constexpr double kFrictionLeast = 0.01;  // that MinClampForce rests on, however little is known
 
 std::size_t group_of(const estimator::CurveEstimate& curve) noexcept {
@@ -42,6 +43,7 @@ KnownFriction::Taken KnownFriction::take(const estimator::PeakEstimate& peak,
     const double noise = (peak.noise_high - peak.noise_low) / (2.0 * estimator::kNormal95);
     memory_.take_value(group, peak.mu_max, peak.ci95_low, noise / peak.mu_max, as_read, 0.0);
     remembers_ = true;
+    slips_in_a_row_[group] = 0;
   }
   // Neither does a bound below what is known: coast-downs without a ramp come all the time.
   const bool weaker =
@@ -67,13 +69,16 @@ void KnownFriction::keep_slipped(std::size_t group, const EndedExperiment& ended
   if (!(most > 0.0) || most >= (1.0 - kShortOfTheTop) * known) return;
   memory_.take_slip(group, most / traction_1_m(group));
   remembers_ = taken.slipped = true;
+  ++slips_in_a_row_[group];
 }
 
 double KnownFriction::peak_as_read(const estimator::CurveEstimate& curve,
                                    double as_read) const noexcept {
   const std::size_t group = group_of(curve);
   const estimator::BeltMemory::Slip& slip = memory_.slips[group];
-  if (slip.known()) return slip.carried_Nm_per_N * traction_1_m(group);
+  if (slip.known() && slips_in_a_row_[group] >= kSlipsBelieved) {
+    return slip.carried_Nm_per_N * traction_1_m(group);
+  }
   return newest_.kind == PeakKind::kValue ? as_read : 0.0;
 }
 
@@ -166,6 +171,7 @@ void KnownFriction::go_on_from(const KnownFriction& before, bool keeps_results) 
   newest_ = before.newest_;
   learned_ = before.learned_;
   memory_ = before.memory_;
+  slips_in_a_row_ = before.slips_in_a_row_;
   remembers_ = before.remembers_;
   contradictory_ = before.contradictory_;
 }

@@ -2,6 +2,7 @@
 // all experiments says. Says what a clamp force may rest on. Real-time thread.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -39,7 +40,9 @@ class KnownFriction {
 
   const Newest& newest() const noexcept { return newest_; }
   // mu* at which the belt is known to let go, as it is read there; 0: not known. as_read: of the
-  // newest value.
+  // newest value. What one experiment without a value says against it is asked once more: a sensor
+  // that errs for a moment reads like a belt that slips, and a belt that is taken for half its
+  // friction is never asked again. The second such answer in a row is believed.
   double peak_as_read(const estimator::CurveEstimate& curve, double as_read) const noexcept;
   // What MinClampForce may rest on at this direction and end stop; 0: not known. What the belt has
   // shown since a value was measured, there or elsewhere, lowers it.
@@ -64,6 +67,7 @@ class KnownFriction {
   // The newest results of the belt; those from before the start come with `learned`, which may be
   // long after it.
   estimator::BeltMemory memory_;
+  std::array<unsigned, estimator::kBeltGroups> slips_in_a_row_{};  // of this run
   bool remembers_ = false;      // a result of its own: `memory` is newer than what is learned
   bool contradictory_ = false;  // the last result, in itself; until a measured one settles it
 };
