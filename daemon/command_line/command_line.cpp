@@ -30,6 +30,8 @@ Option Option::allow_extra_args(bool allowed) const {
   return Option(option_->allow_extra_args(allowed));
 }
 
+Option Option::delimiter(char between) const { return Option(option_->delimiter(between)); }
+
 Option Option::envname(const std::string& name) const { return Option(option_->envname(name)); }
 
 template <typename T>

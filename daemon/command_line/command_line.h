@@ -24,6 +24,8 @@ class Option {
   Option capture_default_str() const;
   // False: each value wants the option's name before it.
   Option allow_extra_args(bool allowed) const;
+  // One word may hold several values with this between them.
+  Option delimiter(char between) const;
   // The environment variable that is read where the option is not given.
   Option envname(const std::string& name) const;
   // T: int, unsigned or double, which help names.

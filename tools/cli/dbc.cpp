@@ -154,14 +154,17 @@ void add_decode(command_line::Command dbc) {
       .type_name("FILE");
   command.add_flag("--raw", options->raw, "add the raw values; in CSV: instead of the physical");
   command
-      .add_option("--messages", options->messages, "only the message of this name; may be repeated")
-      .type_name("NAME")
-      .allow_extra_args(false);
+      .add_option("--messages", options->messages,
+                  "only messages of these names: a,b; may be repeated")
+      .type_name("NAMES")
+      .allow_extra_args(false)
+      .delimiter(',');
   command
       .add_option("--signals", options->signals,
-                  "only this signal, Name or Message.Name; may be repeated")
-      .type_name("NAME")
-      .allow_extra_args(false);
+                  "only these signals, each Name or Message.Name: a,b; may be repeated")
+      .type_name("NAMES")
+      .allow_extra_args(false)
+      .delimiter(',');
   command.add_option("--from", options->from_s, "begin so many seconds after the first frame")
       .type_name("SECONDS");
   command.add_option("--to", options->to_s, "end so many seconds after the first frame")

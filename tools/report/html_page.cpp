@@ -8,14 +8,14 @@ namespace beltgrip::report {
 HtmlPage::HtmlPage(std::string title) : title_(std::move(title)) {}
 
 void HtmlPage::heading(std::string_view text) { body_ += "<h2>" + escaped(text) + "</h2>\n"; }
-void HtmlPage::paragraph(std::string_view text) { body_ += "<p>" + escaped(text) + "</p>\n"; }
+void HtmlPage::paragraph(std::string_view text) { body_ += "<p>" + marked_up(text) + "</p>\n"; }
 
 void HtmlPage::table(const std::vector<std::string>& header,
                      const std::vector<std::vector<std::string>>& rows) {
   const auto row = [&](const char* cell, const std::vector<std::string>& cells) {
     body_ += "<tr>";
     for (const std::string& each : cells) {
-      body_ += "<" + std::string(cell) + ">" + escaped(each) + "</" + cell + ">";
+      body_ += "<" + std::string(cell) + ">" + marked_up(each) + "</" + cell + ">";
     }
     body_ += "</tr>\n";
   };

@@ -29,6 +29,18 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
+std::string marked_up(std::string_view text) {
+  std::string out;
+  while (true) {
+    const std::size_t open = text.find('`');
+    const std::size_t close = open == text.npos ? open : text.find('`', open + 1);
+    if (close == text.npos) return out + escaped(text);
+    out += escaped(text.substr(0, open)) + "<code>" +
+           escaped(text.substr(open + 1, close - open - 1)) + "</code>";
+    text.remove_prefix(close + 1);
+  }
+}
+
 std::string quoted(std::string_view text) {
   constexpr std::string_view kHex = "0123456789abcdef";
   std::string out = "\"";

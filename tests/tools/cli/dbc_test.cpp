@@ -275,7 +275,7 @@ TEST_F(Dbc, DecodeIsATableForPrograms) {
                "(4.0) can0 124#020007\n");
   const RunResult result =
       beltgrip({"dbc", "decode", "--dbc", path("a.dbc"), path("a.log"), "--csv", "-", "--signals",
-                "Speed", "--signals", "Muxed.Second", "--signals", "Float"});
+                "Speed", "--signals", "Muxed.Second,Float"});
   EXPECT_EQ(result.status, 0) << result.err;
   EXPECT_EQ(result.out,
             "t_s,iface,Engine.Speed,Muxed.Second,Muxed.Float\n"
@@ -303,6 +303,7 @@ TEST_F(Dbc, DecodeTakesWhatIsAskedFor) {
   EXPECT_EQ(times({}), "10.0 10.5 11.0 12.0 ");
   EXPECT_EQ(times({"--messages", "Muxed"}), "10.5 11.0 ");
   EXPECT_EQ(times({"--messages", "Muxed", "--messages", "Engine"}), "10.0 10.5 11.0 12.0 ");
+  EXPECT_EQ(times({"--messages", "Muxed,Engine"}), "10.0 10.5 11.0 12.0 ");
   EXPECT_EQ(times({"--signals", "Speed"}), "10.0 12.0 ");
   // Both ends of the time count, from the first frame of the log.
   EXPECT_EQ(times({"--from", "0.5"}), "10.5 11.0 12.0 ");
@@ -318,6 +319,7 @@ TEST_F(Dbc, DecodeSaysWhatItCannotGive) {
   for (const auto& [more, text] : std::vector<std::pair<std::vector<std::string>, std::string>>{
            {{"--signals", "Spede"}, "--signals Spede: no signal of that name"},
            {{"--signals", "Muxed.Speed"}, "--signals Muxed.Speed: no signal of that name"},
+           {{"--signals", "Speed,Spede"}, "--signals Spede: no signal of that name"},
            {{"--messages", "Motor"}, "--messages Motor: no message of that name"},
            {{"--csv", "-"}, "expected one of --text, --csv, --json"}}) {
     const RunResult result = decode(log, more);
