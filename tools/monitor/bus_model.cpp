@@ -18,6 +18,9 @@ constexpr double kSecond_ns = 1e9;
 constexpr std::size_t kPointsMost =
     600;  // of a curve, more than cells to show them: then every other goes
 constexpr std::size_t kExperimentsKept = 50;
+// A silence behind which counters begin anew: the interface was gone, or the daemon starts. Two
+// senders are never silent. Chosen: five periods of the message that comes most often.
+constexpr daemon::Duration kBeginsAnew = 500 * daemon::kMillisecond;
 // Frames that say one result together come within this.
 constexpr daemon::Duration kTogether = 50 * daemon::kMillisecond;
 
@@ -144,6 +147,7 @@ void BusModel::distrust(const can::CanFrame& frame, std::uint64_t Distrust::*cou
 void BusModel::on_own_frame(MonoTime t, const can::CanFrame& frame) {
   if (!begun_) begun_ = t;
   if (!heard_first_) heard_first_ = t;
+  if (heard_ && t - *heard_ > kBeginsAnew) decoder_.begin_anew();
   heard_ = t;
   const std::optional<OwnFrameView> view = decoder_.decode(frame);
   if (!view) {

@@ -122,12 +122,15 @@ std::string distrust_text(const Distrust& distrust) {
   return text.empty() ? text : text + "; last " + distrust.last;
 }
 
+bool has_interface(const View& view) { return view.link < daemon::BusState::kDown; }
+
 // Who speaks, or that nobody does; and what cannot be believed.
 Line daemon_line(const View& view) {
   const std::string distrust = distrust_text(view.distrust);
-  if (is_silent(view)) {
+  if (is_silent(view) || !has_interface(view)) {
     const double seconds = view.silence_s.value_or(view.listening_s);
-    std::string text = format("no frames for %.0f s: is beltgripd running?", seconds);
+    std::string text = format("no frames for %.0f s", seconds);
+    if (has_interface(view)) text += ": is beltgripd running?";
     if (view.playing) text = format("no frames of BeltGrip for %.0f s", seconds);
     return labelled("daemon", text + (distrust.empty() ? "" : "; " + distrust), Tone::kAlarm);
   }
@@ -143,6 +146,13 @@ Line state_line(const View& view) {
     line.push_back({"; last: " + view.outcome + " (" + view.reason + ")"});
   }
   return line;
+}
+
+std::string shortened(std::string text, std::size_t room) {
+  constexpr std::string_view kMore = "...";
+  text.resize(room);
+  if (room > kMore.size()) text.replace(room - kMore.size(), kMore.size(), kMore);
+  return text;
 }
 
 // Reasons one after the other, as many rows as there are.
@@ -169,7 +179,7 @@ void add_reasons(const char* label, const std::vector<Reason>& reasons, const st
       name = "";
       --spare;
     }
-    if (text.size() > room) text.resize(room);
+    if (text.size() > room) text = shortened(std::move(text), room);
     lines.push_back(labelled(name, text + tail, tone));
   }
 }
@@ -307,7 +317,21 @@ std::string friction_text(const Friction& friction) {
   return "-";
 }
 
-std::vector<Line> layout(const View& view, Size size) {
+namespace {
+
+// What was said of an instant is not shown as if it were now.
+View without_what_was(View view) {
+  if (view.silence_s) view.state += format(" %.0f s ago", *view.silence_s);
+  view.stop = false;
+  view.faults.clear();
+  view.mu_star.reset();
+  view.sigma_star_percent.reset();
+  view.friction_slope.reset();
+  view.force_asked_N.reset();
+  return view;
+}
+
+std::vector<Line> layout_of(const View& view, Size size) {
   const int columns = std::max(1, size.columns);
   const std::size_t why_rows = size.rows >= kTall ? kWhyRowsTall : kWhyRows;
   std::vector<Line> lines;
@@ -343,6 +367,12 @@ std::vector<Line> layout(const View& view, Size size) {
     lines.resize(static_cast<std::size_t>(std::max(0, size.rows)));
   }
   return lines;
+}
+
+}  // namespace
+
+std::vector<Line> layout(const View& view, Size size) {
+  return layout_of(is_silent(view) ? without_what_was(view) : view, size);
 }
 
 std::string text_of(const std::vector<Line>& lines) {

@@ -92,6 +92,10 @@ std::optional<OwnFrameView> OwnFrameDecoder::decode(const can::CanFrame& frame) 
   return view;
 }
 
+void OwnFrameDecoder::begin_anew() {
+  for (auto& [identifier, message] : messages_) message.checker.reset();
+}
+
 std::string json_line(std::int64_t t_ns, const OwnFrameView& view) {
   text::JsonWriter json;
   json.begin_object()

@@ -36,6 +36,8 @@ class OwnFrameDecoder {
   explicit OwnFrameDecoder(const daemon::FrameIdentifiers& identifiers);
   // Nothing for frames that are not BeltGrip's.
   std::optional<OwnFrameView> decode(const can::CanFrame& frame);
+  // The next frame of each message may have any counter.
+  void begin_anew();
 
  private:
   struct Message {

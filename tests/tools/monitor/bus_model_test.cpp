@@ -158,6 +158,17 @@ TEST_F(Model, WhatCannotBeBelievedIsShownAndNotTaken) {
   EXPECT_NE(view(6).distrust.last.find("12 bytes of CAN FD, not 8"), std::string::npos);
 }
 
+// The interface was gone, or another daemon begins: no two senders.
+TEST_F(Model, BehindASilenceCountersBeginAnew) {
+  slip(0, 1.0, 0.1);
+  model_.on_frame(400 * kMillisecond, frames_.pack(daemon::SlipValues{}, 9));
+  EXPECT_EQ(view(kSecond).distrust.wrong_sequence, 1U) << "so soon it is another sender";
+  model_.on_frame(kSecond, frames_.pack(daemon::SlipValues{}, 3));
+  EXPECT_EQ(view(kSecond).distrust.wrong_sequence, 1U);
+  model_.on_frame(kSecond + 100 * kMillisecond, frames_.pack(daemon::SlipValues{}, 4));
+  EXPECT_EQ(view(2 * kSecond).distrust.wrong_sequence, 1U);
+}
+
 // A later version may have one state and one fault more.
 TEST_F(Model, ALaterVersionsValuesAreNumbers) {
   can::CanFrame frame = frames_.pack(daemon::StatusValues{}, 0);

@@ -150,10 +150,37 @@ TEST(Layout, SaysThatNobodySpeaks) {
             std::string::npos);
   view.link = daemon::BusState::kAbsent;
   EXPECT_NE(shown(view, 80, 24).find("interface is gone"), std::string::npos);
+  EXPECT_EQ(shown(view, 80, 24).find("is beltgripd running?"), std::string::npos);
   const std::string bad = shown(troubled(), 120, 24);
   EXPECT_NE(bad.find("12 wrong CRC, 3 wrong counter, 4 of another version; last 0x6A1"),
             std::string::npos)
       << bad;
+}
+
+TEST(Layout, WhatWasSaidLongAgoIsNotShownAsNow) {
+  View view = busy();
+  view.faults.push_back({"InputStale", "it came and has stopped", "", ""});
+  view.silence_s = 2.9;
+  view.link = daemon::BusState::kDown;
+  EXPECT_NE(shown(view, 80, 24).find("no frames for 3 s\n"), std::string::npos)
+      << shown(view, 80, 24);
+  EXPECT_NE(shown(view, 80, 24).find("mu* 0.0980"), std::string::npos);
+  view.silence_s = 3.0;
+  const std::string text = shown(view, 80, 24);
+  EXPECT_NE(text.find("state    ramping 3 s ago"), std::string::npos) << text;
+  EXPECT_NE(text.find("now      mu* -\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("clamp    asked -, given 2101 N"), std::string::npos) << text;
+  EXPECT_NE(text.find("mu_max   0.1068"), std::string::npos) << "a result stays";
+  for (const char* gone : {"STOP", "InputStale"}) {
+    EXPECT_EQ(text.find(gone), std::string::npos) << gone << "\n" << text;
+  }
+}
+
+TEST(Layout, ATextThatIsCutSaysSo) {
+  View view = busy();
+  view.in_experiment = false;
+  view.inhibits = {{"inputs", std::string(300, 'x'), "", ""}};
+  EXPECT_NE(shown(view, 80, 24).find("xxx...\n"), std::string::npos) << shown(view, 80, 24);
 }
 
 // 20 columns are 13 cells of slip up to 1.05 * 2 %, 9 rows are 8 of mu* up to 1.05 * 0.1.
