@@ -11,6 +11,7 @@
 #include "daemon/core/publish/names.h"
 #include "estimator/physics/least_loss.h"
 #include "tools/cli/command.h"
+#include "tools/cli/dbc_file.h"
 #include "tools/cli/history_page.h"
 #include "tools/cli/log_configuration.h"
 #include "tools/cli/output_file.h"
@@ -130,13 +131,13 @@ void report_logs(const Options& options) {
   report::add_experiments(page, experiments, phases, thresholds);
   if (last_value) add_least_loss(page, config, *last_value);
   write_file(options.out, inputs, page.text());
-  text::print(stdout, std::to_string(experiments.size()) + " experiments: " + options.out + "\n");
+  text::print(stdout, counted(experiments.size(), "experiment") + ": " + options.out + "\n");
 }
 
 void report_history(const Options& options) {
   const History history = read_history(options.history, options.config);
   write_file(options.out, {options.config, history.path}, history_page(history));
-  text::print(stdout, std::to_string(history.rows.size()) + " experiments: " + options.out + "\n");
+  text::print(stdout, counted(history.rows.size(), "experiment") + ": " + options.out + "\n");
 }
 
 void run(const Options& options) {

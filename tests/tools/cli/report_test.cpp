@@ -71,7 +71,7 @@ TEST_F(Report, ShowsATable) {
                                        place_.path("drive/beltgrip.toml"), "--json", "-"});
   const long experiments = count(replayed.out, "\"type\":\"experiment\"");
   EXPECT_GT(experiments, 0);
-  EXPECT_TRUE(run.out.starts_with(std::to_string(experiments) + " experiments: ")) << run.out;
+  EXPECT_TRUE(run.out.starts_with(std::to_string(experiments) + " experiment")) << run.out;
 }
 
 TEST_F(Report, SaysWhyThereIsNoExperiment) {
