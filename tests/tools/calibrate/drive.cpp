@@ -111,11 +111,16 @@ diagnose::SignalTable drive(const DriveTruth& truth, const DriveKind& kind, std:
     clamp_factor +=
         (1.0 - clamp_factor) * kStep_s / 5.0 + 0.1 * std::sqrt(kStep_s) * normal(random);
     const double radius = primary_radius_m(ratio);
-    const double force_N = std::clamp(clamp_factor, 0.8, 1.6) * (std::abs(filtered) + 45.0) *
-                           kCosWedge / (2.0 * radius * 0.09);
+    const double load_force_N = std::clamp(clamp_factor, 0.8, 1.6) * (std::abs(filtered) + 45.0) *
+                                kCosWedge / (2.0 * radius * 0.09);
+    const double force_N = kind.one_force ? 7e3 + 1e3 * std::sin(0.1 * t) : load_force_N;
     const double traction = filtered * kCosWedge / (2.0 * radius * force_N);
+    const double grown =
+        truth.mu_max > 0.0
+            ? truth.mu_max * std::atanh(std::clamp(traction / truth.mu_max, -0.99, 0.99))
+            : traction;
     const double slipping =
-        (1.0 - truth.deformation_per_kN * force_N * 1e-3) * (1.0 - truth.creep * traction);
+        (1.0 - truth.deformation_per_kN * force_N * 1e-3) * (1.0 - truth.creep * grown);
     const double measured = ratio * slipping;  // omega_s / omega_p
 
     // T = J omega_p' + r (M omega_s' + load), omega_p = omega_s / measured

@@ -12,7 +12,8 @@ namespace beltgrip::test {
 struct DriveTruth {
   double ratio_low = 0.405, ratio_overdrive = 2.25;  // at zero clamping force
   double deformation_per_kN = 0.001;
-  double creep = 0.2;                // slip per mu*
+  double creep = 0.2;                // slip per mu*, at little of it
+  double mu_max = 0.0;               // toward which creep grows; 0: it does not
   double inertia_kg_m2 = 0.18;       // engine to belt
   double vehicle_kg_m2 = 4.0;        // at the secondary shaft
   double pressure_zero_Pa = 30e3;    // what the sensor reads at none
@@ -26,7 +27,8 @@ struct DriveKind {
   bool pressure_clipped = false;  // the sensor reads nothing below 0
   bool lifts = true;              // the foot leaves the pedal every few seconds
   bool reaches_overdrive = true;
-  bool rests_at_stops = true;                                  // else the ratio wanders near them
+  bool one_force = false;      // the clamp stays within a seventh of 7 kN
+  bool rests_at_stops = true;  // else the ratio wanders near them
   double speed_noise_rad_s = 0.05, speed_step_rad_s = 0.1047;  // 1 rpm
   double torque_step_Nm = 0.5, pressure_step_Pa = 1e3;
   double engine_lag_s = 0.03;
