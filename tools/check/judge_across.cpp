@@ -67,6 +67,7 @@ class Across {
     torque_sign();
     pedal();
     if (!doubtful_) {
+      mass();
       slip_direction();
       carried();
       pressure_course();
@@ -100,6 +101,7 @@ class Across {
   void pedal();
   void slip_direction();
   void carried();
+  void mass();
   void pressure_course();
   void pressure_command();
 
@@ -438,6 +440,36 @@ void Across::carried() {
                "clamp force would be %.0f times what it needs: unit of pressure (MPa for bar?) "
                "or torque, piston area",
                high, estimator::kBeltLeast / high));
+  }
+}
+
+// The force at the wheels, T omega_p / v, over what the car gains of speed. Noise of either makes
+// one of the two lines flatter and the other steeper: the mass lies between them.
+void Across::mass() {
+  std::vector<double> force_N, gain_m_s2;
+  for (const Window& window : windows_) {
+    const double speed_m_s = window[Role::kVehicleSpeed], secondary = window[Role::kSecondarySpeed];
+    const double torque_Nm = window[torque_role()], primary = window[Role::kPrimarySpeed];
+    if (!(speed_m_s > 0.0) || !(secondary > kMoving_rad_s) || !(primary > kMoving_rad_s)) continue;
+    if (!std::isfinite(torque_Nm)) continue;
+    const bool braked = window[Role::kBrakePressed] > 0.0 ||
+                        (!is_bound(Role::kBrakePressed) && torque_Nm < kTorqueSigned_Nm);
+    if (braked || window[Role::kLockupClosed] < 1.0) continue;
+    force_N.push_back(torque_Nm * primary / speed_m_s);
+    gain_m_s2.push_back(speed_m_s / secondary * window.rate(Role::kSecondarySpeed));
+  }
+  if (force_N.size() < kMassWindows || deviation(gain_m_s2) < kAccelerationSpread_m_s2) return;
+  const double together = correlation(gain_m_s2, force_N);
+  if (together < kCorrelationSure) return;
+  const double steep_kg = deviation(force_N) / deviation(gain_m_s2) / together;
+  const double flat_kg = steep_kg * together * together;
+  const std::string name(daemon::role_name(torque_role()));
+  if (steep_kg < kMassLeast_kg) {
+    doubt(name + format(" would move a car of %.0f to %.0f kg as this one moves: percent of a "
+                        "reference torque, or scale?",
+                        flat_kg, steep_kg));
+  } else if (flat_kg > kMassMost_kg) {
+    doubt(name + format(" would move %.0f kg and more as this car moves: unit or scale?", flat_kg));
   }
 }
 

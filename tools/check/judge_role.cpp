@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <bit>
+#include <cctype>
 #include <cmath>
+#include <iterator>
 #include <vector>
 
 #include "can_dbc/frame/e2e.h"
@@ -83,6 +85,7 @@ class Judge {
   void answers();
   void level();
   void speed_level();
+  void torque_in_percent();
   void course();
   bool repeats_itself() const;
 
@@ -331,6 +334,30 @@ void Judge::speed_level() {
   }
 }
 
+// Percent of a reference torque, by what the DBC says of the signal.
+void Judge::torque_in_percent() {
+  if (binding_.uds || binding_.scale != 1.0) return;
+  std::string name = binding_.signal_name;
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const char* const words[] = {"percent", "pct", "prct", "prozent", "pourcent"};
+  const bool by_name = std::any_of(std::begin(words), std::end(words), [&](const char* word) {
+    return name.find(word) != std::string::npos;
+  });
+  const auto is_in = [](const auto& ends, double end) {
+    return std::find(std::begin(ends), std::end(ends), end) != std::end(ends);
+  };
+  const bool by_range = binding_.role == Role::kEngineTorque &&
+                        is_in(kPercentTops, binding_.maximum) &&
+                        is_in(kPercentBottoms, binding_.minimum);
+  if (!by_name && !by_range) return;
+  const std::string evidence =
+      by_name ? "its name is " + binding_.signal_name
+              : format("its range in the DBC is %.4g to %.4g", binding_.minimum, binding_.maximum);
+  doubt(evidence + ": percent of a reference torque, read as " + binding_.unit +
+        "? Then scale is missing");
+}
+
 void Judge::level() {
   switch (binding_.role) {
     case Role::kPrimarySpeed:
@@ -361,17 +388,7 @@ void Judge::level() {
         wrong("from " + text(at(0.01)) + " to " + text(at(0.99)) +
               ": more than any belt carries; unit or scale?");
       }
-      if (binding_.role == Role::kEngineTorque && !binding_.uds) {
-        const double top = binding_.maximum, bottom = binding_.minimum;
-        const bool percent =
-            (top == 100.0 || top == 125.0) && (bottom == 0.0 || bottom == -top || bottom == -25.0);
-        if (percent && binding_.scale == 1.0) {
-          doubt(
-              format("its range in the DBC is %.4g to %.4g: percent of a reference torque, "
-                     "read as %s? Then scale is missing",
-                     bottom, top, binding_.unit.c_str()));
-        }
-      }
+      torque_in_percent();
       break;
     case Role::kOilTemperature:
       if (at(0.5) < kOilLeast_degC || at(0.5) > kOilMost_degC) {
@@ -427,24 +444,37 @@ void Judge::course() {
     }
     return;
   }
+  const double usual_move = std::max(quantile(course_.moves.values(), kUsualMoves), course_.step);
   if (course_.frozen_s >= kStuck_s) {
-    wrong(
-        format("stood at %s for %.2f s from %.1f s on while the other pulley's speed moved by "
-               "%.0f %%",
-               text(course_.frozen_at).c_str(), course_.frozen_s, course_.frozen_from_s,
-               100.0 * course_.frozen_other));
+    const std::string what = format(
+        "stood at %s for %.2f s from %.1f s on while the other pulley's speed moved by %.0f %%",
+        text(course_.frozen_at).c_str(), course_.frozen_s, course_.frozen_from_s,
+        100.0 * course_.frozen_other);
+    // With another sign of the torque, or the speeds the other way round, the belt slips there.
+    course_.frozen_against
+        ? doubt(what +
+                ": frozen, or it slips, and sign of the torque or the two speeds are swapped")
+        : wrong(what);
   } else if (shaft && repeats_itself()) {
     wrong(
-        format("repeats %s for %.2f s from %.1f s on, while else it is never twice the same: a "
-               "frozen sender or sensor",
+        format("repeats %s for %.2f s from %.1f s on, while else its noise moves it: a frozen "
+               "sender or sensor",
                text(course_.stood_at).c_str(), course_.stood_s, course_.stood_from_s));
+  } else if (shaft && course_.leap > kLeap * usual_move) {
+    wrong(
+        format("stood at %s for %.2f s from %.1f s on, then moved by %s in one frame, where %s is "
+               "much: a frozen sender or sensor",
+               text(course_.leap_at).c_str(), course_.leap_stood_s, course_.leap_from_s,
+               number(in_unit_.difference(course_.leap)).c_str(),
+               number(in_unit_.difference(usual_move)).c_str()));
   }
 }
 
 // A live value that is noisier than its step does not come again and again.
 bool Judge::repeats_itself() const {
+  const bool usual = course_.live_bends.seen() >= course_.stood_values;
   return course_.stood_s >= kStuck_s && course_.stood_values >= kRepeats && course_.step > 0.0 &&
-         course_.live_noise() > kNoisySteps * course_.step;
+         course_.live_noise() > (usual ? kNoisySteps : kNoisyStepsSeldom) * course_.step;
 }
 
 }  // namespace

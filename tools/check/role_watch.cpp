@@ -274,8 +274,9 @@ void RoleWatch::take_time(RoleCourse& course, State& state, MonoTime t) {
     const double usual_s = course.binding->period_ms
                                ? 1e-3 * *course.binding->period_ms
                                : course.span_s / static_cast<double>(course.intervals_s.seen());
-    if (interval_s > std::max(kGapLeast_s, kGapPeriods * usual_s) &&
-        course.intervals_s.seen() > 8) {
+    state.behind_gap =
+        interval_s > std::max(kGapLeast_s, kGapPeriods * usual_s) && course.intervals_s.seen() > 8;
+    if (state.behind_gap) {
       ++course.gap_count;
       if (course.gaps.size() < kGapsKept) course.gaps.push_back({t_s - interval_s, interval_s});
     }
@@ -313,12 +314,28 @@ void RoleWatch::take_stand(RoleCourse& course, const State& state, double other,
     course.stood_values = state.same_values;
   }
   const double moved = state.other_at_same > 0.0 ? other / state.other_at_same - 1.0 : 0.0;
-  const double enough = slip_explains(course.binding->role, moved) ? kSlipBand : kOtherMoved;
+  const bool explained = slip_explains(course.binding->role, moved);
+  const double enough = explained ? kSlipBand : kOtherMoved;
   if (std::abs(moved) > enough && stood_s > course.frozen_s) {
     course.frozen_s = stood_s;
     course.frozen_from_s = state.same_since_s;
     course.frozen_at = value;
     course.frozen_other = std::abs(moved);
+    course.frozen_against = !explained && std::abs(moved) <= kSlipBand;
+  }
+}
+
+// Behind a frozen stretch a shaft goes on where it has come to meanwhile.
+void RoleWatch::take_move(RoleCourse& course, const State& state, double value, double t_s) const {
+  const double move = std::abs(value - state.previous), stood_s = t_s - state.same_since_s;
+  if (!state.same || state.same_values < kRepeats || stood_s < kStuck_s) {
+    course.moves.add(move);
+  } else if (!state.behind_gap && std::min(value, state.previous) > kMoving_rad_s &&
+             move > course.leap) {
+    course.leap = move;
+    course.leap_stood_s = stood_s;
+    course.leap_from_s = state.same_since_s;
+    course.leap_at = state.previous;
   }
 }
 
@@ -338,9 +355,12 @@ void RoleWatch::take_value(RoleCourse& course, State& state, double value, doubl
     ++state.same_values;
     take_stand(course, state, other, t_s);
   } else {
+    if (state.known > 0) {
+      take_move(course, state, value, t_s);
+      ++course.changes;
+    }
     state.same = false;
     state.same_since_s = t_s;
-    if (state.known > 0) ++course.changes;
   }
   if (state.known > 1) {
     const double bend = value - 2.0 * state.previous + state.before;

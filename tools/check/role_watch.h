@@ -44,8 +44,12 @@ struct RoleCourse {
   // A shaft's longest stretch of equal values while it turns.
   double stood_s = 0.0, stood_from_s = 0.0, stood_at = 0.0;
   std::uint64_t stood_values = 0;
+  // Of stretches of equal values of a shaft the one behind which it moved most in one frame.
+  double leap = 0.0, leap_stood_s = 0.0, leap_from_s = 0.0, leap_at = 0.0;
+  Thinned<double> moves;  // from one value to the next, where they differ and none stood before
   // A pulley's longest stretch at a speed while the other's moved, by this share.
   double frozen_s = 0.0, frozen_from_s = 0.0, frozen_at = 0.0, frozen_other = 0.0;
+  bool frozen_against = false;  // the other went the way that slip does not go
   std::uint64_t changes = 0;
   double step = 0.0;  // greatest common step of its raw values; 0: it never moved
   double longest_gap_s = 0.0;
@@ -99,6 +103,7 @@ class RoleWatch {
     bool heard = false;
     MonoTime heard_at = 0;
     double begun_s = 0.0;
+    bool behind_gap = false;
     std::optional<std::uint32_t> counter;
     int known = 0;  // values in a row, for differences: 0, 1, 2
     double previous = 0.0, before = 0.0;
@@ -120,6 +125,7 @@ class RoleWatch {
   void take_value(RoleCourse& course, State& state, double value, double t_s);
   double other_pulley(Role role) const;
   void take_stand(RoleCourse& course, const State& state, double other, double t_s) const;
+  void take_move(RoleCourse& course, const State& state, double value, double t_s) const;
   bool slip_explains(Role role, double other_moved) const;
 
   daemon::Config config_;

@@ -41,6 +41,17 @@ inline constexpr double kPressureMost_Pa = 10e6;
 inline constexpr double kPressureLeast_Pa = 10e3;
 inline constexpr double kPressureUsual_Pa = 100e3;
 inline constexpr double kTorqueMost_Nm = 1000.0;
+// Derived: ends of the ranges of torque in percent, from one byte (0.390625 or 0.4 % a bit, half a
+// percent with an offset, -125 to 130 of J1939); no engine's torque in Nm is coded to end there.
+inline constexpr double kPercentTops[] = {99.609375, 100.0, 102.0, 125.0, 127.5, 130.0};
+inline constexpr double kPercentBottoms[] = {-130.0, -127.5, -125.0, -102.0, -100.0, -25.0, 0.0};
+// Chosen: the lightest car with a CVT weighs 650 kg, its driver and what turns with it 100 more.
+// Measured (city, 1340 to 1420 kg by its two lines): a torque in percent of 205 Nm and more is
+// named. Above: a loaded van of 3 t, twice.
+inline constexpr double kMassLeast_kg = 700.0, kMassMost_kg = 6000.0;
+// Chosen: of that a drive tells something when it gains and loses speed in so many windows.
+inline constexpr std::size_t kMassWindows = 60;
+inline constexpr double kAccelerationSpread_m_s2 = 0.2;
 inline constexpr double kSpeedMost_m_s = 90.0;
 inline constexpr double kOilLeast_degC = -50.0, kOilMost_degC = 170.0;
 // Derived: 32 1/min a bit opens the paper's gate for good, 3 1/min do not (variator-facts 1.4).
@@ -52,10 +63,17 @@ inline constexpr double kStuck_s = 0.5;
 // Derived: while the other pulley moved by this the ratio would have left its end stop's band; the
 // way that slip goes, which a bench's motor may show at a constant speed, only by kSlipBand.
 inline constexpr double kOtherMoved = 0.03;
-// Derived: noise of three steps repeats a value in one frame of ten, ten times running in none of a
-// long drive (1 / (2 sqrt(pi) 3), to the tenth).
-inline constexpr double kNoisySteps = 3.0;
-inline constexpr std::uint64_t kRepeats = 10;
+// Derived: noise of one step repeats a value in 29 of 100 frames at most, twenty times running in
+// none of a long drive (1 / (2 sqrt(pi)), to the twentieth: 1e-11).
+inline constexpr double kNoisySteps = 1.0;
+// Chosen: where it stood for longer than it was noisy, that noise may be that of another state of a
+// bench; three steps repeat a value in one frame of ten.
+inline constexpr double kNoisyStepsSeldom = 3.0;
+inline constexpr std::uint64_t kRepeats = 20;
+// Chosen: a shaft that stood and then moves by so many of its usual largest moves (and steps) in
+// one frame was not read meanwhile. Measured (130 foreign recordings, all shipped drives): 2 at
+// most.
+inline constexpr double kLeap = 5.0, kUsualMoves = 0.99;
 // Chosen: a signal that never changed in so long is named.
 inline constexpr double kConstantFor_s = 20.0;
 

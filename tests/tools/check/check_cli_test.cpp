@@ -406,6 +406,31 @@ TEST_F(Check, TorqueInPercent) {
   found = check(wrong);
   EXPECT_EQ(count(found["roles"]["engine_torque"]["findings"], "percent of a reference torque"), 1)
       << found["roles"]["engine_torque"];
+  // Or the name, under whatever unit; not where a scale makes up for it.
+  Drive named = drive("coast-overdrive");
+  for (std::string* text : {&named.dbc, &named.toml}) {
+    while (has(*text, "EngineTorque")) *text = replaced(*text, "EngineTorque", "EngTrqPct");
+  }
+  found = check(named);
+  EXPECT_EQ(count(found["roles"]["engine_torque"]["findings"], "its name is EngTrqPct: percent"), 1)
+      << found["roles"]["engine_torque"];
+  named.toml =
+      with_role(named.toml, "engine_torque", "{ signal = \"ECU_Engine.EngTrqPct\", scale = 1.5 }");
+  EXPECT_EQ(count(check(named)["roles"]["engine_torque"]["findings"], "percent"), 0);
+}
+
+// Where name, range and unit say Nm, the car's own weight tells: some 1,400 kg here, 0.4 of it by
+// the percent of 250 Nm.
+TEST_F(Check, TorqueInPercentByTheWeightOfTheCar) {
+  Drive wrong = city();
+  wrong.toml = with_role(wrong.toml, "engine_torque",
+                         "{ signal = \"ECU_Engine.EngineTorque\", scale = 0.4, offset = -0.4 }");
+  json found = check(wrong);
+  EXPECT_EQ(count(found["across"], "engine_torque would move a car of 5"), 1) << found["across"];
+  wrong.toml = with_role(wrong.toml, "engine_torque",
+                         "{ signal = \"ECU_Engine.EngineTorque\", scale = 10, offset = -10 }");
+  found = check(wrong);
+  EXPECT_EQ(count(found["across"], "engine_torque would move 1"), 1) << found["across"];
 }
 
 TEST_F(Check, AFrozenSpeed) {
@@ -468,6 +493,38 @@ primary_torque     = "Bench.Torque"
 trigger = "always"
 )";
 
+// Both speeds climb by 6 rpm a second, as even as a step of 1 rpm lets them; from 8 to 11 s the
+// message comes again and again.
+std::string smooth_log(bool frozen) {
+  std::string log;
+  for (int i = 0; i < 2000; ++i) {
+    const int k = frozen && i >= 800 && i < 1100 ? 800 : i;
+    const int primary = 1000 + 6 * k / 100, secondary = 2250 + 135 * k / 1000;
+    char line[80];
+    std::snprintf(line, sizeof line, "(%.6f) can0 100#%02X%02X%02X%02X%02X%02X%02X%02X\n", 0.01 * i,
+                  static_cast<unsigned>(primary) & 0xFFU, static_cast<unsigned>(primary) >> 8,
+                  static_cast<unsigned>(secondary) & 0xFFU, static_cast<unsigned>(secondary) >> 8,
+                  0xE8, 0x03, 60, 0);
+    log += line;
+  }
+  return log;
+}
+
+// Nothing is noisy, nothing protected: what tells is the leap at its end.
+TEST_F(Check, AMessageThatRepeatsItselfWithoutNoise) {
+  Drive bench{smooth_log(true), kBenchToml, kBenchDbc};
+  json found = check(bench);
+  for (const char* role : {"primary_speed", "secondary_speed"}) {
+    const json& findings = found["roles"][role]["findings"];
+    EXPECT_EQ(count(findings, "wrong: stood at"), 1) << findings;
+    EXPECT_EQ(count(findings, "in one frame, where 1 is much: a frozen sender"), 1) << findings;
+  }
+  bench.log = smooth_log(false);
+  found = check(bench);
+  EXPECT_EQ(count(found["roles"]["primary_speed"]["findings"], "stood at"), 0)
+      << found["roles"]["primary_speed"];
+}
+
 // A motor holds the primary at 1000 rpm to within its step; after 15 s the secondary, at overdrive,
 // falls back by 6 %.
 std::string bench_log(int torque_Nm) {
@@ -488,7 +545,8 @@ std::string bench_log(int torque_Nm) {
   return log;
 }
 
-// What slips with the torque is no frozen sensor; against it nothing slips.
+// What slips with the torque is no frozen sensor; against it nothing slips, unless the torque's
+// sign is the other one.
 TEST_F(Check, AMotorMayHoldAPulleyWhileTheBeltSlips) {
   Drive bench{bench_log(60), kBenchToml, kBenchDbc};
   json found = check(bench);
@@ -496,7 +554,9 @@ TEST_F(Check, AMotorMayHoldAPulleyWhileTheBeltSlips) {
       << found["roles"]["primary_speed"];
   bench.log = bench_log(-60);
   found = check(bench);
-  EXPECT_EQ(count(found["roles"]["primary_speed"]["findings"], "wrong: stood at"), 1)
+  EXPECT_EQ(count(found["roles"]["primary_speed"]["findings"], "may be: stood at"), 1)
+      << found["roles"]["primary_speed"];
+  EXPECT_EQ(count(found["roles"]["primary_speed"]["findings"], "sign of the torque"), 1)
       << found["roles"]["primary_speed"];
 }
 
