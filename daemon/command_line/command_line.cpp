@@ -115,7 +115,11 @@ Parsed Program::parse(int argc, char** argv) {
 
 std::vector<std::string> Program::chosen() const {
   std::vector<std::string> names;
-  for (const CLI::App* command : owned_->get_subcommands()) names.push_back(command->get_name());
+  const CLI::App* command = owned_.get();
+  while (!command->get_subcommands().empty()) {
+    command = command->get_subcommands().front();
+    names.push_back(command->get_name());
+  }
   return names;
 }
 

@@ -362,6 +362,9 @@ Output output_of(const DecodeOptions& options, const Decoder& decoder) {
 
 // One log after the other; one that cannot be used does not hide the rest.
 void decode(const DecodeOptions& options) {
+  if (options.from_s > options.to_s) {
+    throw Failure{kUsage, "dbc decode: found a --to before --from, expected it behind"};
+  }
   end_logs_when_stopped(options.log_paths);
   Decoder decoder(options);
   const Output output = output_of(options, decoder);

@@ -3,17 +3,17 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "can_dbc/dbc/parser.h"
 #include "can_dbc/text/printable.h"
 #include "daemon/core/config/options/config.h"
+#include "daemon/core/config/options/config_bus.h"
 #include "daemon/core/config/options/config_options.h"
 #include "tools/cli/command.h"
+#include "tools/cli/dbc_file.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/role_evidence.h"
 #include "tools/cli/role_guess.h"
@@ -34,14 +34,21 @@ struct Options {
 };
 
 can::Database read_database(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  if (!file || !(text << file.rdbuf())) throw Failure{kNoInput, path + ": cannot be read"};
-  can::DbcParseResult result = can::parse_dbc(text.str());
-  if (result.database.messages.empty()) {
-    throw Failure{kBadInput, path + ": no readable message"};
-  }
+  can::DbcParseResult result = read_dbc(path);
+  if (result.database.messages.empty()) fail_without_message(path);
   return std::move(result.database);
+}
+
+// As whoever reads the configuration judges it.
+void check_interface(const std::string& name) {
+  daemon::Config config;
+  config.interface = name;
+  std::vector<daemon::ConfigError> errors;
+  daemon::ConfigErrors collected("--interface", errors);
+  daemon::check_bus(config, {}, collected);
+  if (errors.empty()) return;
+  const std::string& text = errors.front().text;
+  throw Failure{kUsage, "init: --interface: " + text.substr(text.find("found "))};
 }
 
 // As the configuration will see it: relative to its own place.
@@ -258,6 +265,7 @@ void append_assumed(std::string& text, daemon::Role torque) {
 }
 
 void run(const Options& options) {
+  check_interface(options.interface);
   Inputs inputs(options.dbc);
   inputs.add(options.log);
   OutputFile file(options.out, inputs, unless_forced(options.force));

@@ -46,7 +46,7 @@ struct Options {
   std::string signals;
   std::string log_out;
   std::string bus;
-  double speed = 1.0;
+  std::optional<double> speed;
 
   AsRecorded whether_as_recorded() const {
     if (decide_anew) return AsRecorded::kNever;
@@ -179,7 +179,7 @@ void play_logs(const Options& options) {
   if (!options.config.empty()) own = load_configuration(options.config, "").identifiers;
   const auto timeline = open_timeline(options.logs, options.interface, own);
   const auto port = open_bus(options.bus, {}, stop_descriptor());
-  play(*port, options.bus, options.speed,
+  play(*port, options.bus, options.speed.value_or(1.0),
        [&](can::StampedFrame& frame) { return timeline->next(frame); });
   if (timeline->counters().frames == 0) {
     throw Failure{kBadInput, options.logs.front() + ": no readable frame"};
@@ -217,6 +217,7 @@ std::unique_ptr<signals::SignalWriter> signal_writer(const std::string& path, Ou
 void run(const Options& options) {
   if (!options.bus.empty()) return play_logs(options);
   end_logs_when_stopped(options.logs);
+  if (options.speed) throw Failure{kUsage, "replay: --speed needs --bus"};
   if (options.config.empty()) throw Failure{kUsage, "replay: --config is required"};
   const bool separate = options.logs.size() > 1 && !options.join;
   if (separate &&
@@ -378,8 +379,7 @@ void add_replay(command_line::Command app) {
   command.add_flag("--quiet", options->quiet, "Neither progress nor speed on standard error");
   command.add_option("--bus", options->bus, "Play the log onto this bus in real time instead")
       .type_name("BUS");
-  command.add_option("--speed", options->speed, "Times real time, with --bus")
-      .capture_default_str()
+  command.add_option("--speed", options->speed, "Times real time, with --bus (default: 1)")
       .range(1e-3, 1e3);
   command.example(
       "beltgrip replay drive/trace.log --config drive/beltgrip.toml --json results.json");

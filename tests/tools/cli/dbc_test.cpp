@@ -327,6 +327,9 @@ TEST_F(Dbc, DecodeSaysWhatItCannotGive) {
     EXPECT_NE(result.err.find(text), std::string::npos) << result.err;
     EXPECT_EQ(lines(result.err), 2) << "one of the DBC's own: " << result.err;
   }
+  const RunResult backward = decode(log, {"--from", "3", "--to", "2"});
+  EXPECT_EQ(backward.status, 64);
+  EXPECT_NE(backward.err.find("found a --to before --from"), std::string::npos) << backward.err;
   // Nothing decoded is no result.
   for (const auto& [nothing, more] : std::vector<std::pair<std::string, std::vector<std::string>>>{
            {"(1.0) can0 456#0A00\n", {}}, {log, {"--messages", "Muxed"}}, {log, {"--from", "1"}}}) {

@@ -74,6 +74,8 @@ TEST(Help, IsASubcommandToo) {
   const RunResult unknown = beltgrip({"help", "reply"});
   EXPECT_EQ(unknown.status, 64);
   EXPECT_EQ(unknown.err, "beltgrip: unknown subcommand 'reply' (see beltgrip --help)\n");
+  EXPECT_EQ(beltgrip({"dbc", "decode"}).err,
+            "beltgrip: --dbc is required (see beltgrip dbc decode --help)\n");
   EXPECT_EQ(beltgrip({"-V"}).out, beltgrip({"--version"}).out);
   EXPECT_EQ(beltgrip({"dbc", "show", "-V"}).out, beltgrip({"--version"}).out);
 }

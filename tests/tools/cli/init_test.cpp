@@ -394,6 +394,12 @@ TEST(Init, WhatIsMissingIsSaid) {
     EXPECT_TRUE(std::string_view(result.out).substr(next + 1).starts_with("#   found: ")) << role;
   }
 
+  for (const char* name : {"", "a b", "can0123456789abcdef", "inproc:"}) {
+    const auto refused = test::beltgrip({"init", place.path("small.dbc"), "--interface", name});
+    EXPECT_EQ(refused.status, 64) << name;
+    EXPECT_EQ(refused.err, "beltgrip: init: --interface: found \"" + std::string(name) +
+                               "\", expected an interface of 1 to 15 characters, or inproc:NAME\n");
+  }
   EXPECT_EQ(test::beltgrip({"init", place.path("none.dbc")}).status, 66);
   place.write("empty.dbc", "VERSION \"\"\n");
   EXPECT_EQ(test::beltgrip({"init", place.path("empty.dbc")}).status, 65);

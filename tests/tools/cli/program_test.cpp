@@ -39,6 +39,7 @@ TEST(Program, AMistakeOnTheCommandLineIsOneLine) {
       {"simulate", "--bus", "vcan0", "--speed", "0"},
       {"replay", "x.log", "--bus", "vcan0", "--json", "-"},
       {"replay", "x.log", "y.log", "--bus", "vcan0"},
+      {"replay", "x.log", "--config", "y", "--speed", "2"},
       {"monitor"},
       {"run-demo", "--method", "magic"},
       {"init"}};
