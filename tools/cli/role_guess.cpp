@@ -40,7 +40,8 @@ int score(const RoleWords& row, const can::MessageDef& message, const can::Signa
           int lacking = 0) {
   const std::vector<std::string> own = all_words_of(signal.name);
   const std::vector<std::string> said = comment_words(signal.comment);
-  const std::vector<std::string> about = all_words_of(message.name);
+  std::vector<std::string> about = all_words_of(message.name);
+  std::erase_if(about, [](const std::string& word) { return word.size() < 2; });  // says nothing
   if (is_excluded(row, own)) return 0;
   if (row.role != daemon::Role::kSecondaryPressureCommand && points(asking_words(), about) > 0) {
     return 0;

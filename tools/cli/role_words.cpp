@@ -10,22 +10,26 @@ namespace {
 
 using daemon::Role;
 
-const WordList kSpeed = {"speed", "spd",  "rpm",    "drehzahl", "drz", "kaitensu",
+const WordList kSpeed = {"speed", "spd",  "rpm",    "drehzahl", "drz", "kaitensu",  "kaitensuu",
                          "rev",   "revs", "kaiten", "regime",   "n",   "revolution"};
-const WordList kPressure = {"pressure", "press", "prs", "druck", "pression", "yuatsu", "p"};
-const WordList kTorque = {"torque", "trq", "tq", "drehmoment", "moment", "couple", "toruku", "md"};
-const WordList kPrimary = {"primary", "prim",  "pri", "primaer", "primaire", "puraimari",
-                           "turbine", "input", "inp", "eingang", "entree",   "nyuryoku"};
-const WordList kSecondary = {"secondary", "sec",    "sekundaer",  "sek",  "secondaire",
-                             "sekandari", "scd",    "output",     "outp", "ausgang",
-                             "abtrieb",   "sortie", "shutsuryoku"};
-const WordList kTarget = {"command",  "cmd",     "target",      "setpoint", "desired", "demand",
-                          "req",      "request", "set",         "limit",    "max",     "min",
-                          "tgt",      "tg",      "trgt",        "rq",       "rqd",     "rqst",
-                          "lim",      "mx",      "mn",          "limited",  "limiter", "soll",
-                          "sollwert", "vorgabe", "anforderung", "wunsch",   "grenze",  "begrenzung",
-                          "consigne", "cible",   "demande",     "limite",   "mokuhyo", "shirei",
-                          "jogen",    "kagen"};
+const WordList kPressure = {"pressure", "press", "prs",    "druck", "pression",
+                            "pres",     "prsr",  "yuatsu", "p"};
+const WordList kTorque = {"torque", "trq",    "tq", "drehmoment", "moment",
+                          "couple", "toruku", "md", "mom"};
+const WordList kPrimary = {"primary",   "prim",     "pri",   "primaer", "primaire",
+                           "puraimari", "turbine",  "input", "inp",     "eingang",
+                           "entree",    "nyuryoku", "prmry", "motrice", "dr"};
+const WordList kSecondary = {"secondary", "sec",    "sekundaer",   "sek",    "secondaire",
+                             "sekandari", "scd",    "output",      "outp",   "ausgang",
+                             "abtrieb",   "sortie", "shutsuryoku", "scndry", "menee",
+                             "driven",    "dn"};
+const WordList kTarget = {"command", "cmd",        "cmnd",     "reqd",    "target",      "setpoint",
+                          "desired", "demand",     "req",      "request", "set",         "limit",
+                          "max",     "min",        "tgt",      "tg",      "trgt",        "rq",
+                          "rqd",     "rqst",       "lim",      "mx",      "mn",          "limited",
+                          "limiter", "soll",       "sollwert", "vorgabe", "anforderung", "wunsch",
+                          "grenze",  "begrenzung", "consigne", "cible",   "demande",     "limite",
+                          "mokuhyo", "shirei",     "jogen",    "kagen",   "ziel"};
 const WordList kAsking = {"command", "cmd",  "request",  "req",
                           "target",  "soll", "consigne", "shirei"};
 const WordList kNever = {"counter",    "cnt",       "checksum", "chksum",   "cks",
@@ -42,7 +46,7 @@ const WordList kNever = {"counter",    "cnt",       "checksum", "chksum",   "cks
                          "delta",      "gradient",  "average",  "capped",   "wheel",
                          "roue"};
 // "motor" is an engine's word in German; in English it is an electric one.
-const WordList kEngine = {"engine", "eng", "moteur", "enjin", "verbrennungsmotor", "ecm"};
+const WordList kEngine = {"engine", "eng", "moteur", "enjin", "verbrennungsmotor", "ecm", "mo"};
 
 // Written as one word, and what it says.
 struct Compound {
@@ -61,6 +65,11 @@ const std::vector<Compound>& compounds() {
       {"nmot", {"engine", "n"}},
       {"mdmot", {"engine", "md"}},
       {"mmot", {"engine", "moment"}},
+      {"ne", {"engine", "n"}},
+      {"neng", {"engine", "n"}},
+      {"tqeng", {"engine", "torque"}},
+      {"nin", {"input", "n"}},
+      {"nout", {"output", "n"}},
       {"npri", {"pri", "n"}},
       {"nprim", {"prim", "n"}},
       {"nsec", {"sec", "n"}},
@@ -80,24 +89,38 @@ const std::vector<Compound>& compounds() {
       {"fahrzeuggeschwindigkeit", {"vehicle", "speed"}},
       {"getriebeoeltemperatur", {"getriebe", "oil", "temperature"}},
       {"oeltemperatur", {"oil", "temperature"}},
+      {"oeltemp", {"oil", "temperature"}},
+      {"tatf", {"atf", "temperature"}},
       {"yuon", {"oil", "temperature"}},
       {"fahrpedal", {"accelerator", "pedal"}},
+      {"fahrpedalrohwert", {"accelerator", "pedal"}},
+      {"apo", {"accelerator", "pedal"}},
       {"gaspedal", {"accelerator", "pedal"}},
       {"accelerateur", {"accelerator", "pedal"}},
       {"akuseru", {"accelerator", "pedal"}},
       {"bremspedal", {"brake", "pedal"}},
       {"bremslicht", {"brake", "light"}},
       {"bremse", {"brake", "pressed"}},
+      {"bremst", {"brake", "pressed"}},
+      {"bureeki", {"brake", "pressed"}},
       {"frein", {"brake", "pressed"}},
       {"bureki", {"brake", "pressed"}},
       {"wandlerueberbrueckung", {"lockup", "state"}},
       {"ueberbrueckungskupplung", {"lockup", "state"}},
       {"wuek", {"lockup", "state"}},
       {"wk", {"lockup", "state"}},
+      {"lup", {"lockup", "state"}},
+      {"luon", {"lockup", "on"}},
       {"pontage", {"lockup", "state"}},
       {"rokkuappu", {"lockup", "state"}},
   };
   return all;
+}
+
+const Compound* compound_of(std::string_view word) {
+  const auto found = std::find_if(compounds().begin(), compounds().end(),
+                                  [&](const Compound& each) { return each.word == word; });
+  return found == compounds().end() ? nullptr : &*found;
 }
 
 WordList both(WordList a, const WordList& b) {
@@ -119,24 +142,24 @@ const std::vector<RoleWords>& table() {
       // The engine has oil, too.
       {Role::kOilTemperature,
        {{"transmission", "getriebe", "gearbox", "trans", "trn", "atf", "cvtf", "cvt", "tcu",
-         "boite", "hensokuki"},
+         "boite", "bv", "ge", "hensokuki"},
         {"oil", "atf", "cvtf", "oel", "huile", "fluid"},
         {"temperature", "temp", "tmp", "temperatur", "ondo", "t"}},
        {"engine", "eng", "coolant", "ambient", "motor", "moteur"}},
       {Role::kVehicleSpeed,
-       {{"vehicle", "veh", "fahrzeug", "vehicule", "car", "v"}, kSpeed},
-       both(kTarget, {"rad"})},
+       {{"vehicle", "veh", "fahrzeug", "vehicule", "car", "v"}, both(kSpeed, {"v"})},
+       both(kTarget, {"rad", "vl", "vr", "hl", "hr", "fl", "fr", "rl", "rr"})},
       // A throttle is a valve, no pedal.
       {Role::kAcceleratorPedal,
        {{"accelerator", "accel", "gas", "apedpos", "aped", "app"},
-        {"pedal", "position", "pos", "apedpos", "aped", "app"}},
+        {"pedal", "pdl", "pedale", "position", "pos", "apedpos", "aped", "app"}},
        kTarget},
       {Role::kBrakePressed,
        {{"brake", "brk"}, {"pressed", "switch", "sw", "pedal", "active", "lamp", "light"}},
        both(kTarget, {"park", "parking", "hand", "parkbremse"})},
       {Role::kLockupClosed,
        {{"lockup", "lock", "tcc", "lu"},
-        {"closed", "engaged", "state", "active", "on", "up"},
+        {"closed", "engaged", "state", "active", "clutch", "on", "up"},
         // Doors, seats and shift levers have locks as well.
         {"lockup", "tcc", "lu", "up", "converter", "clutch"}},
        {"door", "command", "cmd", "request", "req"}},
@@ -254,11 +277,19 @@ std::vector<std::string> words_of(const std::string& given) {
 
 std::vector<std::string> all_words_of(const std::string& name) {
   std::vector<std::string> all;
-  for (const std::string& word : words_of(name)) {
+  const std::vector<std::string> words = words_of(name);
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string& word = words[i];
+    // J1939's "wheel-based vehicle speed" is the vehicle's, no wheel's.
+    if (word == "wheel" && i + 1 < words.size() && words[i + 1] == "based") continue;
     all.push_back(word);
-    const auto compound = std::find_if(compounds().begin(), compounds().end(),
-                                       [&](const Compound& each) { return each.word == word; });
-    if (compound != compounds().end()) {
+    // "nMot", "N_Mot": what one letter and a word say together.
+    if (word.size() == 1 && i + 1 < words.size()) {
+      if (const Compound* pair = compound_of(word + words[i + 1])) {
+        all.insert(all.end(), pair->means.begin(), pair->means.end());
+      }
+    }
+    if (const Compound* compound = compound_of(word)) {
       all.insert(all.end(), compound->means.begin(), compound->means.end());
       continue;
     }

@@ -130,6 +130,86 @@ TEST(Roles, AreFoundInFourLanguagesAndByAbbreviations) {
   }
 }
 
+// Whole files in the short styles of makers: the signal of each role that stands as a line; 0:
+// none.
+TEST(Roles, AreFoundInTheShortStylesOfMakers) {
+  using daemon::Role;
+  constexpr std::array kRoles{Role::kPrimarySpeed, Role::kSecondarySpeed,  Role::kSecondaryPressure,
+                              Role::kEngineTorque, Role::kEngineSpeed,     Role::kOilTemperature,
+                              Role::kVehicleSpeed, Role::kAcceleratorPedal};
+  struct Style {
+    std::array<const char*, 8> names;
+    const char *speed_unit, *others;
+  };
+  const std::array kStyles{
+      Style{{"nPrim", "nSek", "pSek", "MMotIst", "nMot", nullptr, "vFzg", nullptr},
+            "1/min",
+            "nPrimSoll MMotSoll pPrim"},
+      Style{{"NPRI", "NSEC", "PSEC", "TQENG", "NENG", "TATF", "VSP", "APO"}, "rpm", "PPRI PSECTGT"},
+      Style{{"CVT_DR_PLY_SPD", "CVT_DN_PLY_SPD", "CVT_DN_PLY_PRS", "ENG_TRQ_EST", "ENG_RPM",
+             "CVTF_TEMP", nullptr, "PEDAL_GAS"},
+            "rpm",
+            "CVT_DR_PLY_PRS CVT_DN_PLY_PRS_TGT"},
+      Style{{"PrmryPulySpd", "ScndryPulySpd", "ScndryPulyPrs", "EngTrqActExtRng", "EngSpd",
+             "TransOilTmp", "VehSpd", nullptr},
+            "rpm",
+            "PrmryPulyPrs ScndryPulyPrsCmnd EngTrqDrvrReqd"},
+      Style{{"VITESSE_POULIE_MOTRICE", "VITESSE_POULIE_MENEE", "PRESSION_POULIE_MENEE",
+             "COUPLE_MOTEUR", "REGIME_MOTEUR", "TEMP_HUILE_BV", "VITESSE_VEHICULE", nullptr},
+            "tr/min",
+            "CONSIGNE_PRESSION_MENEE"},
+      Style{{"PRI_KAITENSUU", "SEC_KAITENSUU", "SEC_YUATSU", "ENJIN_TORUKU", "ENJIN_KAITENSUU",
+             nullptr, "SHASOKU", "AKUSERU_KAIDO"},
+            "rpm",
+            "MOKUHYO_SEC_YUATSU"},
+      Style{{"InputShaftSpeed", "OutputShaftSpeed", "SecPulleyClampPress", "ActualEngineTorque",
+             "EngineSpeed", "TransOilTemp1", "WheelBasedVehicleSpeed", "AccelPedalPos1"},
+            "rpm",
+            ""},
+      Style{
+          {"GE_Drehzahl_Primaer", "GE_Drehzahl_Sekundaer", "GE_Druck_Sekundaer", "MO_Mom_Ist_Summe",
+           "MO_Drehzahl_01", "GE_Oeltemp", "ESP_v_Signal", "MO_Fahrpedalrohwert_01"},
+          "Unit_MinutInver",
+          "GE_Druck_Primaer GE_Druck_Soll_Sek MO_Mom_Soll_Roh"},
+  };
+  for (const Style& style : kStyles) {
+    const std::array<const char*, 8> units{style.speed_unit, style.speed_unit, "bar",  "Nm",
+                                           style.speed_unit, "degC",           "km/h", "%"};
+    std::string dbc = "VERSION \"\"\n";
+    int id = 256;
+    const auto add = [&](const std::string& name, const char* unit) {
+      dbc += "BO_ " + std::to_string(id) + " S_" + std::to_string(id) + ": 8 X\n SG_ " + name +
+             " : 0|16@1+ (1,0) [0|0] \"" + unit + "\" X\n";
+      ++id;
+    };
+    // Those that are none come first.
+    std::istringstream others(style.others);
+    for (std::string name; others >> name;) {
+      for (const char* unit : {style.speed_unit, "bar", "Nm"}) add(name, unit);
+    }
+    for (std::size_t i = 0; i < kRoles.size(); ++i) {
+      if (style.names[i] != nullptr) add(style.names[i], units[i]);
+    }
+    const std::vector<can::Database> databases{can::parse_dbc(dbc).database};
+    for (std::size_t i = 0; i < kRoles.size(); ++i) {
+      const auto found = cli::guess_role(kRoles[i], databases);
+      const std::string name = found.empty() ? std::string() : found[0].signal->name;
+      EXPECT_STREQ(name.c_str(), style.names[i] == nullptr ? "" : style.names[i])
+          << daemon::role_name(kRoles[i]);
+    }
+  }
+}
+
+// An electric motor is no engine, a limiter's speed not the car's; one wheel's is not either.
+TEST(Roles, OfShortNamesAreNotGuessedTooFar) {
+  using daemon::Role;
+  EXPECT_FALSE(is_candidate(Role::kEngineSpeed, "CR_Mcu_MotActRotSpd_rpm", "rpm"));
+  EXPECT_FALSE(is_candidate(Role::kVehicleSpeed, "SLD_VS", "km/h"));
+  EXPECT_FALSE(is_candidate(Role::kVehicleSpeed, "v_Rad_VL", "km/h"));
+  EXPECT_FALSE(is_candidate(Role::kVehicleSpeed, "WheelSpeed_FL", "km/h"));
+  EXPECT_FALSE(is_candidate(Role::kPrimaryTorque, "Clutch_Driving_Tq", "Nm"));
+}
+
 // "AccPedal" may be the adaptive cruise's, "OilTemp" the engine's, "TorqueActual" anything's: never
 // a role's line, but beside the empty one. What another role claims is not offered.
 TEST(Roles, ThatLackAWordAreOfferedToAPerson) {
