@@ -451,7 +451,7 @@ void Judge::course() {
         text(course_.frozen_at).c_str(), course_.frozen_s, course_.frozen_from_s,
         100.0 * course_.frozen_other);
     // With another sign of the torque, or the speeds the other way round, the belt slips there.
-    course_.frozen_against
+    course_.frozen_against && !repeats_itself()
         ? doubt(what +
                 ": frozen, or it slips, and sign of the torque or the two speeds are swapped")
         : wrong(what);
