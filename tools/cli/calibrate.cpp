@@ -112,6 +112,14 @@ double delay_of(const daemon::RoleBinding& role, double delay_s) {
   return std::round(10.0 * (role.delay_ms + 1e3 * delay_s)) / 10.0;
 }
 
+// A column of a table that is called like message and signal is one of frames, too.
+std::string place_of(const daemon::RoleBinding& role, bool table) {
+  if (!table) return "signal = \"" + role.message_name + "." + role.signal_name + "\"";
+  const bool of_frames = role.message_name.find('.') != std::string::npos &&
+                         role.message_name.find(' ') == std::string::npos;
+  return (of_frames ? "signal = \"" : "column = \"") + role.message_name + "\"";
+}
+
 // The role as the user has it, in his unit and scale, less what it reads at zero, and later by
 // `delay_s`.
 std::string role_line(const daemon::Config& config, daemon::Role wanted, double zero,
@@ -137,7 +145,7 @@ std::string role_line(const daemon::Config& config, daemon::Role wanted, double 
                      signal.type == can::ValueType::kSigned ? "true" : "false") +
               scaling(signal.scale, less_zero(signal.offset)) + " }";
     } else {
-      line += "signal = \"" + role.message_name + "." + role.signal_name + "\"";
+      line += place_of(role, config.table != nullptr);
     }
     line += ", unit = \"" + role.unit + "\"";
     if (!role.uds) line += scaling(role.scale, less_zero(role.offset));
@@ -203,7 +211,8 @@ void keep_what_loads(std::vector<Finding>& findings, const daemon::Config& confi
   for (Finding& each : findings) {
     if (!each.value) continue;
     const std::string lines = toml({each}, config, options);
-    const std::string why = why_refused(lines, std::filesystem::absolute(options.config).string());
+    const std::string why =
+        why_refused(lines, std::filesystem::absolute(options.config).string(), config.table);
     if (why.empty()) continue;
     each.text = "found " + rounded(*each.value, each.std) + " " + each.unit +
                 ", which no configuration takes (" + why + "); " + each.text;

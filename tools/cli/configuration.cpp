@@ -73,11 +73,13 @@ daemon::Config load_configuration_text(std::string_view toml, std::string_view d
   return load_configuration(folder.path + "/beltgrip.toml", method);
 }
 
-std::string why_refused(std::string_view lines, const std::string& path) {
+std::string why_refused(std::string_view lines, const std::string& path,
+                        std::shared_ptr<const daemon::TableSource> table) {
   const TemporaryFolder folder;
   write_file(folder.path + "/lines.toml", {}, lines);
   write_file(folder.path + "/both.toml", {}, "include = [" + quoted(path) + ", \"lines.toml\"]\n");
-  const daemon::ConfigResult result = daemon::load_config(folder.path + "/both.toml");
+  const daemon::ConfigResult result =
+      daemon::load_config(folder.path + "/both.toml", std::move(table));
   if (result.config) return {};
   const std::string& text = result.errors.front().text;
   return text.substr(std::min(text.find(": ") + 2, text.size()));

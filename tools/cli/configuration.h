@@ -18,6 +18,7 @@ daemon::Config load_configuration_text(std::string_view toml, std::string_view d
 
 // Why lines that are read after the configuration at `path` (absolute) make it one that does not
 // load; empty: it loads.
-std::string why_refused(std::string_view lines, const std::string& path);
+std::string why_refused(std::string_view lines, const std::string& path,
+                        std::shared_ptr<const daemon::TableSource> table);
 
 }  // namespace beltgrip::cli

@@ -132,6 +132,36 @@ TEST_F(Calibrate, WritesAFileToInclude) {
   EXPECT_NEAR(both.config->variator.primary_inertia_kg_m2, 0.18, 0.02);
 }
 
+// The same drive as a table: the lines name what the table's reader takes, and where the columns
+// are called like message and signal, whoever reads frames as well.
+TEST_F(Calibrate, WritesForATableWhatItsReaderTakes) {
+  place.write("drive.log", drive_log(drive({}, {}, 3)));
+  const std::string table = place.path("table.csv");
+  ASSERT_EQ(beltgrip({"dbc", "decode", place.path("drive.log"), "--dbc", place.path("drive.dbc"),
+                      "--csv", table})
+                .status,
+            0);
+  const auto calibrated = [&](const char* out) {
+    return beltgrip(
+        {"calibrate", table, "--config", place.path("beltgrip.toml"), "--out", place.path(out)});
+  };
+  ASSERT_EQ(calibrated("signals.toml").status, 0);
+  const std::string signals = place.read("signals.toml");
+  EXPECT_NE(signals.find("secondary_speed = { signal = \"Speeds.Secondary\","), std::string::npos)
+      << signals;
+  place.write("both.toml", "include = [\"beltgrip.toml\", \"signals.toml\"]\n");
+  EXPECT_TRUE(daemon::load_config(place.path("both.toml")).config.has_value());
+
+  std::string named = place.read("table.csv");
+  const std::string column = "Speeds.Secondary";
+  named.replace(named.find(column), column.size(), "secondary_speed[rad/s]");
+  place.write("table.csv", named);
+  ASSERT_EQ(calibrated("columns.toml").status, 0);
+  const std::string columns = place.read("columns.toml");
+  EXPECT_NE(columns.find("secondary_speed = { column = \"secondary_speed\","), std::string::npos)
+      << columns;
+}
+
 // From quick engines to slow ones, through a log: the steps are found, and what they say is true.
 TEST_F(Calibrate, FindsInertiaAndDelayFromQuickAndSlowSteps) {
   // Steps of 20 ms move the speeds so fast that a daemon takes them for spikes.
