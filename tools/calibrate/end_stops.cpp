@@ -21,10 +21,12 @@ using estimator::EndStop;
 
 constexpr double kCell_s = 0.5;
 constexpr double kGrid_s = 0.02;
-constexpr double kReach = 0.06;        // ln: how far the configured ratio may be off
-constexpr double kDense = 0.03;        // ln: cells of one stop lie within this
-constexpr double kStill = 1.5e-3;      // ln: between the halves of a cell
-constexpr double kTractionMax = 0.06;  // mu*: below any peak; less leaves LOW too few cells
+constexpr double kReach = 0.06;          // ln: how far the configured ratio may be off
+constexpr double kSearch = 0.25;         // ln: and where the stop of another variator is looked for
+constexpr std::size_t kRestsLeast = 20;  // chosen: ten seconds at a ratio, to name it
+constexpr double kDense = 0.03;          // ln: cells of one stop lie within this
+constexpr double kStill = 1.5e-3;        // ln: between the halves of a cell
+constexpr double kTractionMax = 0.06;    // mu*: below any peak; less leaves LOW too few cells
 constexpr double kSpeedMin_rad_s = 30.0;
 constexpr double kVisitGap_s = 3.0;
 constexpr double kScatterMax = 2.5e-3;  // ln: a stop holds the ratio
@@ -68,7 +70,7 @@ class Cells {
       add_cell(primary, secondary, pressure, torque, t, number);
     }
   }
-  std::vector<Cell> cells;
+  std::vector<Cell> cells;  // within kSearch of the configured stop
 
  private:
   void add_cell(const Series& primary, const Series& secondary, const Series& pressure,
@@ -94,7 +96,7 @@ class Cells {
     half[1] /= kPoints - kFirst;
     cell.ln_ratio = std::log(mean_s / mean_p);
     if (std::abs(half[1] - half[0]) > kStill ||
-        std::abs(cell.ln_ratio - std::log(point_.ratio_g0)) > kReach) {
+        std::abs(cell.ln_ratio - std::log(point_.ratio_g0)) > kSearch) {
       return;
     }
     const auto p_Pa = pressure.mean(t, t + kCell_s);
@@ -187,6 +189,21 @@ double neighbour_noise(const std::vector<Cell>& cells, const std::vector<double>
   return count > 0 ? std::sqrt(squares / count) : 0.0;
 }
 
+// Where the ratio rests most, if that is not where the stop is configured: for a person to judge,
+// as a controller rests at ratios of its own, too.
+std::string other_rest(const std::vector<Cell>& all, double ln_configured, const std::string& key) {
+  const std::vector<Cell> there = densest(all);
+  if (there.size() < kRestsLeast) return {};
+  std::vector<double> ratios;
+  ratios.reserve(there.size());
+  for (const Cell& each : there) ratios.push_back(each.ln_ratio);
+  const double usual = estimator::median(ratios);
+  if (std::abs(usual - ln_configured) < kReach) return {};
+  return text("; it rests at %.3f for %.0f s: if that is the stop, enter ", std::exp(usual),
+              kCell_s * static_cast<double>(there.size())) +
+         key + text(" = %.3f and calibrate again", std::exp(usual));
+}
+
 struct StopFindings {
   Finding ratio, delay;
 };
@@ -201,9 +218,14 @@ StopFindings one_stop(std::span<const diagnose::SignalTable> logs, const daemon:
   found.delay.unit = "s";
   Cells all(config, stop, pressure.zero);
   for (std::size_t i = 0; i < logs.size(); ++i) all.add(logs[i], static_cast<int>(i));
-  const std::size_t candidates = all.cells.size();
+  const double ln_configured = std::log(found.ratio.configured);
+  std::vector<Cell> near = all.cells;
+  std::erase_if(near,
+                [&](const Cell& each) { return std::abs(each.ln_ratio - ln_configured) > kReach; });
+  const std::size_t candidates = near.size();
   const auto refuse = [&](const std::string& why) {
-    found.ratio.text = found.delay.text = why;
+    found.delay.text = why;
+    found.ratio.text = why + other_rest(all.cells, ln_configured, found.ratio.key);
     return found;
   };
   if (candidates == 0) {
@@ -212,8 +234,7 @@ StopFindings one_stop(std::span<const diagnose::SignalTable> logs, const daemon:
              "stands still under little traction",
              100.0 * kReach, found.ratio.configured));
   }
-  std::vector<Cell> cells = densest(all.cells);
-  const double ln_configured = std::log(found.ratio.configured);
+  std::vector<Cell> cells = densest(near);
   Eigen::VectorXd mean(static_cast<Eigen::Index>(kCoefficients));
   Eigen::VectorXd spread(static_cast<Eigen::Index>(kCoefficients));
   mean << 0.0, kDeformation_1_kN, kCreep, kCreepGrows, 0.0;

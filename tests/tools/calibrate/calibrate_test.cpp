@@ -149,7 +149,8 @@ TEST(Calibrate, RefusesToExtrapolateFarBeyondTheForces) {
 TEST(Calibrate, RefusesAnEndStopThatIsConfiguredFarOff) {
   DriveTruth truth;
   truth.ratio_overdrive = 2.0;
-  expect_refused(findings(truth, {}, 1), "variator.ratio_overdrive", "");
+  expect_refused(findings(truth, {}, 1), "variator.ratio_overdrive",
+                 "if that is the stop, enter variator.ratio_overdrive = 1.9");
 }
 
 TEST(Calibrate, RefusesAZeroThatWasNotRecorded) {
