@@ -100,6 +100,8 @@ class Across {
   void torque_sign();
   void pedal();
   void slip_direction();
+  double most_against_percent() const;
+  double against_in_percent(std::size_t from, std::size_t to) const;
   void carried();
   void mass();
   void pressure_course();
@@ -227,11 +229,15 @@ bool Across::speeds() {
 
   // A ratio that stays where a stop would be if the shafts were swapped.
   const auto near = [](double a, double b) { return std::abs(a / b - 1.0) < kStopBand; };
-  const auto stays_at = [&](double a, double b) {
-    return share_of(ratio, [&](double r) { return near(r, a) || near(r, b); });
+  const auto share_at = [&](double a, double b, double band) {
+    const auto at = [band](double r, double stop) { return std::abs(r / stop - 1.0) < band; };
+    return share_of(ratio, [&](double r) { return at(r, a) || at(r, b); });
   };
-  if (stays_at(1.0 / low, 1.0 / overdrive) > kStaysLeast && stays_at(low, overdrive) < kPasses &&
-      !is_one(engine_primary)) {
+  const auto stays_there = [&](double band) {
+    return share_at(1.0 / low, 1.0 / overdrive, band) > kStaysLeast &&
+           share_at(low, overdrive, band) < kPasses;
+  };
+  if ((stays_there(kStopBand) || stays_there(kSlipBand)) && !is_one(engine_primary)) {
     doubt(
         format("speed ratio stays at %.3f: at no end stop (%s), but 1 / %.3f is at one; primary "
                "and secondary swapped?",
@@ -393,24 +399,79 @@ void Across::pedal() {
 // Where the clamp is lowered the belt slips with the torque, never against it: sigma* there is
 // positive.
 void Across::slip_direction() {
+  double against_percent = most_against_percent();
   std::vector<double> friction;
   for (const Window& window : windows_) {
     if (std::isfinite(window.mu_star)) friction.push_back(window.mu_star);
   }
-  if (friction.size() < kWindowsLeast) return;
   const double usual = quantile(friction, 0.5), high = quantile(friction, 1.0 - kCarriedShare);
-  if (high < kLoweredLeast * usual) return;  // nobody lowered it
-  std::vector<double> slip_percent;
-  for (const Window& window : windows_) {
-    if (window.mu_star >= high) slip_percent.push_back(window.slip_percent);
+  // Else nobody lowered it.
+  if (friction.size() >= kWindowsLeast && high >= kLoweredLeast * usual) {
+    std::vector<double> slip_percent;
+    for (const Window& window : windows_) {
+      if (window.mu_star >= high) slip_percent.push_back(window.slip_percent);
+    }
+    against_percent = std::max(against_percent, -quantile(slip_percent, 0.5));
   }
-  const double there_percent = quantile(slip_percent, 0.5);
-  if (there_percent > -kSlipAgainst_percent) return;
+  if (against_percent < kSlipAgainst_percent) return;
   doubt(
       format("where the clamp was lowered most the belt slips by %.1f %% against the torque, never "
              "with it: sign of ",
-             -there_percent) +
+             against_percent) +
       std::string(daemon::role_name(torque_role())) + ", or the two speeds are swapped?");
+}
+
+// The same where slip carries the ratio away from its stop: of driving in which neither speed moves
+// much, and which begins and ends at a stop, the window that lies furthest from it of those with
+// much torque for their pressure.
+double Across::against_in_percent(std::size_t from, std::size_t to) const {
+  const auto log_ratio = [&](std::size_t i) {
+    return std::log(windows_[i][Role::kSecondarySpeed] / windows_[i][Role::kPrimarySpeed]);
+  };
+  const auto load = [&](std::size_t i) {
+    return std::abs(windows_[i][torque_role()]) / windows_[i][Role::kSecondaryPressure];
+  };
+  const auto at_stop = [&](std::size_t i) {
+    return std::abs(log_ratio(i) - std::log(config_.variator.ratio_low)) < kStopBand ||
+           std::abs(log_ratio(i) - std::log(config_.variator.ratio_overdrive)) < kStopBand;
+  };
+  if (to - from < kWindowsLeast || !at_stop(from) || !at_stop(to - 1)) return 0.0;
+  const double begin = log_ratio(from), end = log_ratio(to - 1);
+  if (std::abs(begin - end) > kBackAtStop) return 0.0;
+  const double lowered = kLoweredLeast * std::max(load(from), load(to - 1));
+  double moved = 0.0;
+  for (std::size_t i = from; i < to; ++i) {
+    const double off = log_ratio(i) - 0.5 * (begin + end);
+    if (load(i) >= lowered && std::abs(off) > std::abs(moved)) moved = off;
+  }
+  return 100.0 * (windows_[from][torque_role()] > 0.0 ? moved : -moved);
+}
+
+double Across::most_against_percent() const {
+  double most = 0.0, with = 0.0;
+  const auto turns = [&](std::size_t i) {
+    const Window& window = windows_[i];
+    return window[Role::kPrimarySpeed] > kMoving_rad_s &&
+           window[Role::kSecondarySpeed] > kMoving_rad_s &&
+           window[Role::kSecondaryPressure] > 0.0 &&
+           std::abs(window[torque_role()]) > kTorqueSigned_Nm;
+  };
+  const auto goes_on = [&](std::size_t first, std::size_t i) {
+    const auto near = [&](Role role) {
+      return std::abs(windows_[i][role] / windows_[first][role] - 1.0) < kSteadySpeeds;
+    };
+    return turns(i) && near(Role::kPrimarySpeed) && near(Role::kSecondarySpeed) &&
+           windows_[i][torque_role()] * windows_[first][torque_role()] > 0.0;
+  };
+  for (std::size_t from = 0; from < windows_.size();) {
+    std::size_t to = from + 1;
+    while (turns(from) && to < windows_.size() && goes_on(from, to)) ++to;
+    const double against = against_in_percent(from, to);
+    most = std::max(most, against);
+    with = std::max(with, -against);
+    from = to;
+  }
+  return with < kSlipAgainst_percent ? most : 0.0;
 }
 
 // Friction as read where the belt does not slip.

@@ -124,6 +124,10 @@ inline constexpr double kLoweredLeast = 1.25;
 // Derived: the radii bend back by 1.8e-6 a newton, some kilonewtons, and an end stop is known to
 // half a percent.
 inline constexpr double kSlipAgainst_percent = 1.5;
+// Chosen: speeds that a car or bench holds while its clamp is lowered and comes back; a ratio that
+// is back at its stop has come within half of the slip that is told (in ln).
+inline constexpr double kSteadySpeeds = 0.12;
+inline constexpr double kBackAtStop = 0.0075;
 // Chosen: half of what the highest known force floor leaves in a coast-down (7.6 kN at 33 Nm in
 // overdrive: 0.027); a bar read as MPa gives a tenth of 0.03 to 0.1.
 inline constexpr double kCarriedLeast = 0.015;
