@@ -431,9 +431,11 @@ double Across::against_in_percent(std::size_t from, std::size_t to) const {
   const auto load = [&](std::size_t i) {
     return std::abs(windows_[i][torque_role()]) / windows_[i][Role::kSecondaryPressure];
   };
+  // Or where it would be if the speeds were swapped.
   const auto at_stop = [&](std::size_t i) {
-    return std::abs(log_ratio(i) - std::log(config_.variator.ratio_low)) < kStopBand ||
-           std::abs(log_ratio(i) - std::log(config_.variator.ratio_overdrive)) < kStopBand;
+    const double there = std::abs(log_ratio(i));
+    return std::abs(there + std::log(config_.variator.ratio_low)) < kStopBand ||
+           std::abs(there - std::log(config_.variator.ratio_overdrive)) < kStopBand;
   };
   if (to - from < kWindowsLeast || !at_stop(from) || !at_stop(to - 1)) return 0.0;
   const double begin = log_ratio(from), end = log_ratio(to - 1);

@@ -111,6 +111,44 @@ TEST(Across, NothingSlipsAgainstTheTorque) {
       << all_of(found);
 }
 
+// On a bench in drive, at the overdrive stop (2.25): the pressure is halved and comes back, the
+// belt slips by 6 % in between. The ratio has left its stop then: no mu* is known.
+std::vector<Window> bench_that_slips(double torque_Nm, bool swapped) {
+  std::vector<Window> windows;
+  for (int i = 0; i < 60; ++i) {
+    const double lowered = std::max(0.0, 1.0 - std::abs(i - 30) / 20.0);
+    Window window;
+    window.mean.fill(std::numeric_limits<double>::quiet_NaN());
+    window.change.fill(0.0);
+    const auto set = [&](Role role, double value) {
+      window.mean[static_cast<std::size_t>(role)] = value;
+    };
+    const double primary = 150.0, secondary = 2.25 * primary * (1.0 - 0.06 * lowered);
+    set(Role::kPrimarySpeed, swapped ? secondary : primary);
+    set(Role::kSecondarySpeed, swapped ? primary : secondary);
+    set(Role::kSecondaryPressure, 6e5 * (1.0 - 0.5 * lowered));
+    set(Role::kPrimaryTorque, torque_Nm);
+    windows.push_back(window);
+  }
+  return windows;
+}
+
+TEST(Across, ARatioThatLeavesItsStopTellsTheSignToo) {
+  daemon::Config config;
+  config.estimator.torque_is_engine = false;
+  const std::string sign =
+      "slips by 6.2 % against the torque, never with it: sign of primary_torque";
+  const auto text = [&](double torque_Nm, bool swapped) {
+    return all_of(judge_across(bench_that_slips(torque_Nm, swapped), config));
+  };
+  EXPECT_EQ(text(50.0, false), "");
+  EXPECT_NE(text(-50.0, false).find(sign), std::string::npos) << text(-50.0, false);
+  // The low stop of a variator that is as far out as in: swapped, it stands at the other one.
+  config.variator.ratio_low = 1.0 / 2.25;
+  EXPECT_EQ(text(50.0, false), "");
+  EXPECT_NE(text(50.0, true).find(sign), std::string::npos) << text(50.0, true);
+}
+
 TEST(Across, APedalThatNeverMovesThoughTheTorqueTurns) {
   daemon::Config config;
   config.estimator.torque_is_engine = false;
