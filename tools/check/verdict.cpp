@@ -99,9 +99,12 @@ Verdict judge(const RoleWatch& watch, const std::vector<Window>& windows,
   }
   if (none_seen) {
     observes = commands = false;
-    verdict.missing.push_back("no message of any role is in " +
-                              grouped(static_cast<double>(watch.frames())) +
-                              " frames: the log of another car, or another bus?");
+    // Of a log without one frame there is no verdict.
+    verdict.missing.push_back(
+        watch.frames() == 0
+            ? "no frame came: is the ignition on, the interface up, the bit rate right?"
+            : "no message of any role is in " + grouped(static_cast<double>(watch.frames())) +
+                  " frames: the log of another car, or another bus?");
   } else {
     for (std::size_t i = 0; i < verdict.roles.size(); ++i) {
       const std::string text = first_wrong(verdict.roles[i]);

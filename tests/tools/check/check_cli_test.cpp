@@ -560,6 +560,18 @@ TEST_F(Check, AMotorMayHoldAPulleyWhileTheBeltSlips) {
       << found["roles"]["primary_speed"];
 }
 
+TEST_F(Check, ABusOnWhichNobodySpeaks) {
+  const Drive& car = drive("coast-overdrive");
+  place.write("vehicle.dbc", car.dbc);
+  place.write("beltgrip.toml", replaced(car.toml, "\"vcan0\"", "\"inproc:quiet\""));
+  const RunResult result =
+      beltgrip({"check", "--live", "0.2", "--config", place.path("beltgrip.toml"), "--json", "-"});
+  ASSERT_EQ(result.status, 0) << result.err;
+  const json found = json::parse(result.out);
+  EXPECT_EQ(found["ready"], "none");
+  EXPECT_TRUE(has(found["sentence"], "no frame came: is the ignition on")) << found["sentence"];
+}
+
 TEST_F(Check, TheConfigurationAlone) {
   place.write("beltgrip.toml", drive("coast-overdrive").toml);
   place.write("vehicle.dbc", drive("coast-overdrive").dbc);
