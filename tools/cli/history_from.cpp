@@ -42,8 +42,11 @@ void sort_by_time(auto& all) {
 Replayed results_of(const std::vector<std::string>& logs, const daemon::Config& config,
                     std::vector<std::string>& unusable) {
   Replayed all;
-  double undated_s = 0.0;  // where the undated logs so far have come to
+  double undated_s = 0.0;                 // where the undated logs so far have come to
+  std::set<std::filesystem::path> taken;  // one without dates would be another drive, later
   for (const std::string& log : logs) {
+    std::error_code none;
+    if (!taken.insert(std::filesystem::weakly_canonical(log, none)).second) continue;
     ReplayResult replayed;
     try {
       replayed = replay({log}, "", config, {});

@@ -119,6 +119,13 @@ TEST_F(History, FromLogs) {
   const auto opened = HistoryDb::open_to_read(place.path("fleet/car17/history.db"));
   ASSERT_NE(opened.db, nullptr) << opened.text;
   EXPECT_EQ(opened.db->read().rows.size(), 10U);
+  // And if a log is there twice, without dates as well.
+  place.write("undated.log", later(place.read("drive0/trace.log"), -1'700'000'000));
+  const std::string once = place.path("undated.log");
+  EXPECT_EQ(history({place.path("one")}, {once, once}).status, 0);
+  const auto one = HistoryDb::open_to_read(place.path("one/history.db"));
+  ASSERT_NE(one.db, nullptr) << one.text;
+  EXPECT_EQ(one.db->read().rows.size(), 1U);
 }
 
 // What the belt carried, beside its experiments or without any: kept, and not counted twice.
