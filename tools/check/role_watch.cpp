@@ -125,7 +125,9 @@ void RoleWatch::on_frame(const daemon::RxFrame& frame) {
 void RoleWatch::take_pause(MonoTime t) {
   const MonoTime before = newest_.value_or(t);
   const double silent_s = daemon::seconds(t - before);
-  if (silent_s > kSilentLeast_s) {
+  // Rows that nobody stamped come evenly, however seldom.
+  const bool evenly = config_.table && config_.table->rate_Hz > 0.0;
+  if (silent_s > kSilentLeast_s && !evenly) {
     ++pauses_;
     longest_pause_s_ = std::max(longest_pause_s_, silent_s);
     for (State& state : states_) {

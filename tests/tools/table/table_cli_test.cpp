@@ -149,6 +149,19 @@ TEST_F(TableCli, ATableOfAScanTool) {
   EXPECT_TRUE(has(replayed.err, "no column for engine_torque")) << replayed.err;
 }
 
+// Rows that come seldom are no pauses.
+TEST_F(TableCli, ASlowTableHasNoPauses) {
+  std::string csv =
+      "primary_speed[rpm],secondary_speed[rpm],secondary_pressure[bar],primary_torque[Nm]\n";
+  for (int i = 0; i < 40; ++i) csv += std::to_string(1000 + i) + ",2000,10,30\n";
+  place_->write("slow.csv", csv);
+  const RunResult result =
+      beltgrip({"check", path("slow.csv"), "--rate", "0.2", "--config", path("rig/beltgrip.toml")});
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_TRUE(has(result.out, "slower than 10 Hz")) << result.out;
+  EXPECT_FALSE(has(result.out, "no frame at all came")) << result.out;
+}
+
 TEST_F(TableCli, WhatDoesNotGoTogether) {
   place_->write("scan.csv", scan_table());
   place_->write("timed.csv", "t[s],a[rpm],b\n0,1,2\n1,2,3\n");
