@@ -237,6 +237,7 @@ void close_gaps(SignalTable& table) {
   // At most so much, however seldom rows come: what looks at the course of the signals takes time
   // by its length.
   constexpr double kPause_s = 5.0, kPausePeriods = 20.0, kPauseMost_s = 20.0;
+  constexpr double kRounding_s = 1e-4;  // of the latest stamps: a pause that was closed is none
   constexpr std::size_t kNotesMost = 5;
   std::vector<double> all;
   for (const Channel& channel : table.channels) {
@@ -259,7 +260,7 @@ void close_gaps(SignalTable& table) {
   };
   std::vector<Stretch> stretches{{all.front(), 0.0}};
   for (std::size_t i = 0; i < steps.size(); ++i) {
-    if (steps[i] <= pause_s) continue;
+    if (steps[i] <= pause_s + kRounding_s) continue;
     stretches.push_back({all[i + 1], stretches.back().shift_s + (steps[i] - pause_s)});
     if (stretches.size() > kNotesMost + 1) continue;
     std::array<char, 120> text;
