@@ -21,6 +21,11 @@ inline constexpr double kPromisedSlip = 0.10;
 inline constexpr double kPromisedSlipSpeed_m_s = 0.8;
 inline constexpr double kPromisedEnergy_J = 100.0;  // beyond the peak
 
+// What is only observed asks nothing of the belt: no torque is too large, and the shaft may turn
+// more slowly. Chosen: at half the speed the rounding of a speed weighs twice as much in the slip,
+// which the estimator reads off the data.
+inline constexpr double kObservedSpeedShare = 0.5;  // of the least speed at the start
+
 // --- the request ends itself (experiment/clamp_request) ------------------------------------------
 inline constexpr double kRequestSlip = 0.07;            // chosen: room to come back, at any speed
 inline constexpr double kRequestSlipBeyond = 0.02;      // chosen: past where friction was largest

@@ -57,12 +57,20 @@ double within(const FallRange& shown, double assumed) noexcept {
 
 }  // namespace
 
+ExperimentSettings begins_within(const Config& config) noexcept {
+  ExperimentSettings settings = config.experiment;
+  if (config.control == Control::kCommand) return settings;
+  settings.torque_max_Nm = std::numeric_limits<double>::infinity();
+  settings.primary_speed_min_rad_s *= limits::kObservedSpeedShare;
+  return settings;
+}
+
 Arming::Arming(const Config& config)
     : trigger_(config.trigger),
       control_(config.control),
       variator_(config.variator),
       choice_(config.estimator.ratio),
-      settings_(config.experiment),
+      settings_(begins_within(config)),
       inertia_kg_m2_(config.variator.primary_inertia_kg_m2),
       rate_max_N_per_s_(config.estimator.ramp_rate_max_N_per_s),
       cosine_(std::cos(config.variator.half_wedge_angle_rad)),

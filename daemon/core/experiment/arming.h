@@ -108,6 +108,9 @@ struct Obstacle {
   double needed = std::numeric_limits<double>::quiet_NaN();
 };
 
+// Within which torque and speed an experiment may begin, by who lowers the force.
+ExperimentSettings begins_within(const Config& config) noexcept;
+
 class Arming {
  public:
   static constexpr Duration kSettle = 1500 * kMillisecond;
@@ -152,6 +155,7 @@ class Arming {
   void step(const Now& now) noexcept;
   void reset() noexcept { held_ = false; }
 
+  double speed_min_rad_s() const noexcept { return settings_.primary_speed_min_rad_s; }
   bool triggered() const noexcept { return (inhibits_ & ~kClearance) == 0; }
   bool settled() const noexcept { return settled_; }
   bool cleared() const noexcept { return cleared_ && inhibits_ == 0; }

@@ -130,8 +130,7 @@ bool ExperimentStage::triggered(const Now& now) const noexcept {
 // What of the car ends the experiment under way. Torque, ratio and slip are what it is about: they
 // are the estimator's to judge.
 Stop ExperimentStage::ended_by(const VariatorSample& sample) const noexcept {
-  const double speed_min_rad_s =
-      limits::kRequestSpeedShare * config_.experiment.primary_speed_min_rad_s;
+  const double speed_min_rad_s = limits::kRequestSpeedShare * arming_.speed_min_rad_s();
   if (sample.omega_p_rad_s < speed_min_rad_s) {
     return {StopReason::kEngineSpeed,
             {.what = "falls to",

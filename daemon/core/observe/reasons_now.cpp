@@ -65,7 +65,7 @@ std::string_view quality_name(SignalQuality quality) {
 std::string figure_of(Inhibit inhibit, const Config& config, const SampleReport& report,
                       const Signals& signals) {
   const auto of = [&](Role role) { return signals[static_cast<std::size_t>(role)]; };
-  const ExperimentSettings& limits = config.experiment;
+  const ExperimentSettings limits = begins_within(config);
   switch (inhibit) {
     case Inhibit::kInputs:
       return roles_with(

@@ -200,10 +200,12 @@ constexpr Option kOptions[] = {
         "experiment", "torque_min_Nm", "Nm", 3.0, 50.0,
         "Least magnitude of the torque on the belt, triggers \"coast_down\" and \"steady\"."),
     number<&Config::experiment, &ExperimentSettings::torque_max_Nm>(
-        "experiment", "torque_max_Nm", "Nm", 51.0, 1000.0, "And the largest."),
+        "experiment", "torque_max_Nm", "Nm", 51.0, 1000.0,
+        "And the largest, with control \"command\"."),
     number<&Config::experiment, &ExperimentSettings::primary_speed_min_rad_s>(
         "experiment", "primary_speed_min_rad_s", "rad/s", 20.0, 1000.0,
-        "Least speed of the primary pulley, the same triggers."),
+        "Least speed of the primary pulley, the same triggers; with control \"observe\" half of "
+        "it."),
     number<&Config::experiment, &ExperimentSettings::oil_temperature_min_degC>(
         "experiment", "oil_temperature_min_degC", "degC", -40.0, 150.0,
         "Least temperature of the oil, the same triggers, where the role is there."),

@@ -120,6 +120,26 @@ TEST_F(ArmingTest, EveryPreconditionAloneAtItsBoundary) {
   }
 }
 
+// Nothing is asked of the belt: it may carry more, and turn at half the speed.
+TEST(ArmingObserve, BeginsAtAnyTorqueAndAtHalfTheSpeed) {
+  Config observed = config();
+  observed.control = Control::kObserve;
+  Arming arming(observed);
+  Arming::Now now = coasting();
+  const auto inhibits_at = [&](double omega_p_rad_s, double torque_Nm) {
+    now.t += kSample;
+    now.omega_p_rad_s = omega_p_rad_s;
+    now.omega_s_rad_s = omega_p_rad_s * 2.25;
+    now.torque_Nm = torque_Nm;
+    arming.step(now);
+    return arming.inhibits();
+  };
+  EXPECT_EQ(inhibits_at(52.5, -32.0), 0U);
+  EXPECT_EQ(inhibits_at(52.49, -32.0), inhibit_bit(Inhibit::kSpeed));
+  EXPECT_EQ(inhibits_at(130.0, -400.0), 0U);
+  EXPECT_EQ(inhibits_at(130.0, -9.99), inhibit_bit(Inhibit::kTorque));
+}
+
 TEST_F(ArmingTest, WhatEndsAnExperimentUnderWay) {
   const Conditions sound = coasting().conditions;
   EXPECT_FALSE(arming_.ended_by(sound));

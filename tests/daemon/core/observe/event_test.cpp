@@ -167,6 +167,7 @@ TEST(Event, AResultWithoutAValueSaysWhyAndWhatToDo) {
 TEST(ReasonsNow, SayTheFigureBesideTheLimit) {
   Config config;
   config.trigger = Trigger::kCoastDown;
+  config.control = Control::kCommand;
   config.experiment.primary_speed_min_rad_s = 100.0;
   SampleReport report;
   Signals signals{};
