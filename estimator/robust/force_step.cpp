@@ -12,7 +12,15 @@ constexpr double kCell_s = 0.05;
 constexpr std::size_t kGapCells = 2;
 constexpr std::size_t kShortest = 2, kLongest = 64;  // cells in each of four groups
 constexpr double kDeviations = 5.0;
-constexpr double kShare = 0.015;    // of the force
+// The scatter is read off a number of squares that share half of what they say: Student's quantile
+// is (z^2 + 1) / 4 nu larger than the normal one.
+constexpr double kStudent = 2.0 * (kDeviations * kDeviations + 1.0) / 4.0;
+constexpr double kFewestSquares = 6.0;
+// Chosen: longer means have few squares, and the density is that of the shorter ones as well.
+constexpr double kKnownScale_s = 0.2;
+constexpr double kShare = 0.015;  // of the force
+// Chosen: what a lag makes of the reading at the corner of a ramp stays below.
+constexpr double kLargeShare = 0.04;
 constexpr double kLeastMove = 0.4;  // of what slip would have to move by
 constexpr double kSlipDeviations = 4.0, kSlopeDeviations = 2.0;
 constexpr double kStairs = 1.5;  // steps of a signal that is rounded coarsely are no steps
@@ -50,8 +58,11 @@ bool ForceStep::steps(std::size_t length, double slip_noise, const Trend& force)
   const double drift_N = before.force_N - earlier.force_N;
   const double drift_after_N = later.force_N - after.force_N;
   const double jump_N = after.force_N - before.force_N - on * (drift_N + drift_after_N);
+  const double squares = force.squares(std::min(length_s, kKnownScale_s));
+  if (squares < kFewestSquares) return false;
+  const double deviations = kDeviations * (1.0 + kStudent / squares);
   const double force_deviation_N = std::sqrt(force.density(length_s) / length_s);
-  if (std::abs(jump_N) < std::max({kDeviations * spread * force_deviation_N,
+  if (std::abs(jump_N) < std::max({deviations * spread * force_deviation_N,
                                    kShare * std::abs(before.force_N), stair_N_})) {
     return false;
   }
@@ -65,6 +76,14 @@ bool ForceStep::steps(std::size_t length, double slip_noise, const Trend& force)
   const double slip_deviation = std::sqrt(slip_noise / length_s);
   const double surely = kSlopeDeviations * std::sqrt(2.0) * slip_deviation;
   const double creep = before.slip_percent - earlier.slip_percent;
+  const double slip_jump = after.slip_percent - before.slip_percent -
+                           on * (creep + later.slip_percent - after.slip_percent);
+  const double slip_noise_percent = kSlipDeviations * spread * slip_deviation;
+  // No cylinder is as quick as that, and slip shows nothing of it.
+  if (std::abs(jump_N) > kLargeShare * std::abs(before.force_N) &&
+      -slip_jump * jump_N < slip_noise_percent * std::abs(jump_N)) {
+    return true;
+  }
   if (!(rise > 0.0) || !(creep > surely)) return false;
   // The curve is concave: on the way up slip moves by more than along its tangent; on the way down
   // by what it has moved since mu* was last as low.
@@ -78,9 +97,7 @@ bool ForceStep::steps(std::size_t length, double slip_noise, const Trend& force)
       expected = std::max(expected, before.slip_percent - past.slip_percent - surely);
     }
   }
-  const double slip_jump = after.slip_percent - before.slip_percent -
-                           on * (creep + later.slip_percent - after.slip_percent);
-  return std::abs(slip_jump) + kSlipDeviations * spread * slip_deviation < kLeastMove * expected;
+  return std::abs(slip_jump) + slip_noise_percent < kLeastMove * expected;
 }
 
 bool ForceStep::step(const Cell& sample, double slip_noise, const Trend& force) noexcept {

@@ -4,7 +4,9 @@
 // Below its peak a belt follows a step of the force with its slip, along the curve that it has
 // just gone along, within less than the gap that is left out here. Where the force steps, and slip
 // moves by much less than that, the reading has stepped (its gain, its zero), and what mu* is
-// before and after do not belong to one curve.
+// before and after do not belong to one curve. Where slip is too noisy to say whether it followed,
+// a step that is large within less than that gap is the reading's as well: a force has its
+// cylinder's lag.
 #pragma once
 
 #include <array>

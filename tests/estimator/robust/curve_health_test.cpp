@@ -224,7 +224,7 @@ TEST(ForceStep, SeesAReadingThatStepsWhereSlipStaysAndNoForceThatSlipFollows) {
   using Force = double (*)(double);
   // rounded_to_N: what the signal shows changes by; known_N: by what it is known to.
   const auto steps = [](Force truth, Force read_of_truth, double rounded_to_N = 0.0,
-                        double known_N = 0.0) {
+                        double known_N = 0.0, double slip_noise = 0.02) {
     std::mt19937_64 random(1);
     std::normal_distribution<double> normal;
     ForceStep watch(200.0, known_N);
@@ -235,11 +235,11 @@ TEST(ForceStep, SeesAReadingThatStepsWhereSlipStaysAndNoForceThatSlipFollows) {
       double force_N = truth(t) * read_of_truth(t) + 10.0 * normal(random);
       if (rounded_to_N > 0.0) force_N = std::round(force_N / rounded_to_N) * rounded_to_N;
       const Cell cell{.t_s = t,
-                      .slip_percent = 8000.0 / truth(t) - 1.0 + 0.02 * normal(random),
+                      .slip_percent = 8000.0 / truth(t) - 1.0 + slip_noise * normal(random),
                       .torque_Nm = 50.0,
                       .clamp_force_N = force_N,
                       .omega_p_rad_s = 100.0};
-      seen |= watch.step(cell, 0.02 * 0.02 / 200.0, trend);
+      seen |= watch.step(cell, slip_noise * slip_noise / 200.0, trend);
       trend.step(t, force_N, 0.0);
     }
     return seen;
@@ -258,10 +258,16 @@ TEST(ForceStep, SeesAReadingThatStepsWhereSlipStaysAndNoForceThatSlipFollows) {
     return 1.0 - 0.02 * std::clamp(t - 9.0, 0.0, 1.0) * std::clamp(51.0 - 5.0 * t, 0.0, 1.0);
   };
   EXPECT_FALSE(steps([](double t) { return 5000.0 - 300.0 * std::min(t, 10.0); }, ends));
+  // Slip that is too noisy to say whether it followed: no force is as quick.
+  const auto quick = [](double t) { return t < 10.0 ? 1.0 : 0.9; };
+  EXPECT_TRUE(steps(ramp, quick, 0.0, 0.0, 1.0));
+  EXPECT_FALSE(steps(ramp, right, 0.0, 0.0, 1.0));
+  EXPECT_FALSE(steps(
+      ramp, [](double t) { return t < 10.0 ? 1.0 : 0.98; }, 0.0, 0.0, 1.0));
   // Rounded to steps larger than its noise: its stairs are none.
   const auto slow = [](double t) { return 5000.0 - 50.0 * t; };
-  EXPECT_TRUE(steps(slow, right, 150.0, 0.0));
-  EXPECT_FALSE(steps(slow, right, 150.0, 150.0));
+  EXPECT_TRUE(steps(slow, right, 300.0, 0.0));
+  EXPECT_FALSE(steps(slow, right, 300.0, 300.0));
   EXPECT_TRUE(steps(
       slow, [](double t) { return t < 10.0 ? 1.0 : 1.15; }, 150.0, 150.0));
 }
