@@ -216,6 +216,11 @@ void PeakFit::gather_level() noexcept {
   }
 }
 
+// By which slip has surely moved, from one mean over so long to the next.
+double PeakFit::slip_step(double duration_s) const noexcept {
+  return std::max(kSlipStep, 2.0 * std::sqrt(record_->slip_noise() / duration_s));
+}
+
 void PeakFit::make_points() noexcept {
   const double slip_noise = record_->slip_noise();
   std::size_t budget = kCellsPerStep;
@@ -234,8 +239,9 @@ void PeakFit::make_points() noexcept {
       count_in(next_cell_, 1.0, tail_s, tail);
       if (begin - next_cell_ > kTailCells) count_in(next_cell_ + kTailCells, -1.0, tail_s, tail);
       if (duration_s < kShortestPoint_s) continue;
-      const double step = std::max(kSlipStep, 2.0 * std::sqrt(slip_noise / duration_s));
-      if (std::abs(slip / duration_s - last_slip_) > step || duration_s > kLongestPoint_s) break;
+      if (std::abs(slip / duration_s - last_slip_) > slip_step(duration_s) ||
+          duration_s > kLongestPoint_s)
+        break;
       // Slip that begins to run away is seen in the newest cells, before it moves the mean.
       const double head_s = duration_s - tail_s;
       if (head_s < 0.5 * kShortestPoint_s) continue;
@@ -452,6 +458,7 @@ void PeakFit::find_span() noexcept {
     slip_low_ = std::min(slip_low_, points_[i].slip);
     slip_high_ = std::max(slip_high_, points_[i].slip);
   }
+  end_step_ = slip_step(points_[point_count_ - 1].duration_s);
   slow_terms_.setZero();
   slow_spread_ = 1.0;
   term_sums_.setZero();
@@ -598,7 +605,7 @@ void PeakFit::solve(std::size_t corner_number) noexcept {
   const auto consider = [&](double x) {
     if (x > low && x <= 0.0 && terms(x).dot(theta) >= terms(best).dot(theta)) {
       best = x;
-      inside = true;
+      inside = x < -end_step_;
     }
   };
   // Where the slope B/lambda exp(..) - d (- h) vanishes, before and beyond the corner; the corner.

@@ -123,6 +123,7 @@ class PeakFit {
 
   void go_to(Stage stage) noexcept;
   void gather_level() noexcept;
+  double slip_step(double duration_s) const noexcept;
   void make_points() noexcept;
   void add_point(std::size_t begin, std::size_t end) noexcept;
   double mean_mu(std::size_t point) const noexcept;
@@ -171,10 +172,13 @@ class PeakFit {
   double mu_top_ = 0.0;
   double slip_low_ = 0.0, slip_high_ = 0.0;  // of the stretch
   double slip_low_s_ = 0.0;                  // duration of the lowest point
-  std::vector<Whitening> whitening_;         // of the points of the stretch
-  std::vector<Terms> terms_;                 // likewise
-  Terms slow_terms_ = Terms::Zero();         // slow error in them, as expected
-  double slow_spread_ = 1.0;                 // its variance, in that of the slow error
+  // A top so near to the end of the data is none that was seen: where noise of slip ended them, the
+  // last point lies too far on.
+  double end_step_ = 0.0;
+  std::vector<Whitening> whitening_;  // of the points of the stretch
+  std::vector<Terms> terms_;          // likewise
+  Terms slow_terms_ = Terms::Zero();  // slow error in them, as expected
+  double slow_spread_ = 1.0;          // its variance, in that of the slow error
   Eigen::Matrix<double, kTermCount, kTermCount> term_sums_;
   std::size_t next_ = 0;             // where the work on this stage goes on
   Rise rise_;                        // that is being fitted, with
