@@ -185,8 +185,9 @@ void Arming::look(const Now& now) noexcept {
   if (reachable_mu(latest) < latest.mu_expected) {
     search_ = later_ = {};
     unclear_ = inhibit_bit(Inhibit::kUnreachable);
-    obstacle_ = {latest.floor_N, peak_force_N(latest, latest.mu_expected),
-                 reached_below_rad_s(latest, now.omega_s_rad_s / now.omega_p_rad_s)};
+    obstacle_ = {.figure = latest.floor_N,
+                 .limit = peak_force_N(latest, latest.mu_expected),
+                 .needed = reached_below_rad_s(latest, now.omega_s_rad_s / now.omega_p_rad_s)};
     return;
   }
   search_ = CrossingSearch(soon, reaction(now), SlipLimits{});
@@ -283,14 +284,20 @@ std::uint32_t Arming::clearance(const Now& now) noexcept {
                       reachable_mu(point) < point.mu_expected);
   if (waits) return inhibit_bit(Inhibit::kWait);
   if (crossing.slip_rate_1_s <= 0.0) {
-    obstacle_ = {.figure = point.fall / kPercent};
+    const CrossingDenied& denied = search_.denied();
+    obstacle_ = {.figure = denied.figure, .limit = denied.limit, .wall = denied.wall};
+    if (denied.wall == CrossingWall::kFall) {
+      obstacle_.needed = point.own_force_N / peak_force_N(point, point.mu_least);
+    }
     return inhibit_bit(Inhibit::kRamp);
   }
   plan_ = {crossing, point.mu_expected, point.mu_least, point.primary_radius_m};
   const double longest_s = seconds(limits::kRequestLongest);
   if (needed_s <= std::min(left_s, longest_s)) return 0U;
   const double most_s = std::min(left_s, longest_s);
-  obstacle_ = {needed_s, most_s, rate_needed_N_per_s(point, planned_1_s, most_s)};
+  obstacle_ = {.figure = needed_s,
+               .limit = most_s,
+               .needed = rate_needed_N_per_s(point, planned_1_s, most_s)};
   return inhibit_bit(Inhibit::kTime);
 }
 

@@ -103,8 +103,9 @@ struct SlipShown {
 // Why the way is not clear: what was found, and what it would have to be.
 struct Obstacle {
   double figure = 0.0, limit = 0.0;
+  CrossingWall wall = CrossingWall::kNone;  // of kRamp
   // What would do: the primary's speed below which the peak is in reach, rad/s; the ramp that is
-  // fast enough, N/s. No number: nothing would.
+  // fast enough, N/s. No number: nothing would. Of a fall: the own force, in that of the peak.
   double needed = std::numeric_limits<double>::quiet_NaN();
 };
 

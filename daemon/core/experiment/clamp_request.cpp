@@ -150,7 +150,10 @@ Stop ClampRequest::judge_room(const Now& now) const noexcept {
             {.what = "clamping force answers after",
              .figure = lag_.least_s(),
              .limit = lag_most_s,
-             .unit = "s"}};
+             .unit = "s",
+             .further = "configured",
+             .further_figure = answer_s(),
+             .further_unit = "s"}};
   }
   return {};
 }

@@ -29,6 +29,7 @@ constexpr double kExcursionMost = 0.018;
 constexpr double kSlipSpan = 1.05;  // 1 + sigma, of the slip beyond the peak
 constexpr double kNotCaught = 1e9;
 constexpr std::size_t kCorners = 4;
+constexpr int kHalvings = 6;  // chosen: the fall that is survived, to 2 % of what must be
 constexpr int kBisections = 16;
 
 // After the actuator has been told. With E = exp(a t) - 1 and L = exp(-t / lag) - 1
@@ -136,24 +137,41 @@ CrossingSearch::CrossingSearch(const RampPoint& point, const Reaction& reaction,
                                const SlipLimits& limits) noexcept
     : point_(point), reaction_(reaction), limits_(limits), done_(false) {}
 
+Excursion CrossingSearch::excursion_at(double slip_rate_1_s, Corner corner,
+                                       double fall_share) const noexcept {
+  const double silence_s = corner.fault ? std::max(reaction_.stale_s, reaction_.timeout_s) : 0.0;
+  const double steepest = corner.fault ? point_.fall_at_fault : point_.fall;
+  const double to_see_steep = std::max(kSlipToSeeSteep, kSlipToSee_s * point_.slip_rate_noise_1_s);
+  return excursion(point_, reaction_, slip_rate_1_s,
+                   corner.steep ? fall_share * steepest : kFlatFall,
+                   corner.steep ? to_see_steep : kSlipToSeeFlat, silence_s + reaction_.cycle_s);
+}
+
 bool CrossingSearch::step() noexcept {
   if (done_) return true;
-  // Steep and flat, nominal and worst, one rate after the other.
+  if (denied_.wall == CrossingWall::kFall) {
+    halve_fall();
+    done_ = halvings_ == kHalvings;
+    return done_;
+  }
+  try_corner();
+  if (tried_ < kCorners * kSlipRates_1_s.size()) return false;
+  if (crossing_.slip_rate_1_s <= 0.0) deny();
+  done_ = denied_.wall != CrossingWall::kFall;
+  return done_;
+}
+
+// Steep and flat, nominal and worst, one rate after the other.
+void CrossingSearch::try_corner() noexcept {
   const double rate_1_s = kSlipRates_1_s[tried_ / kCorners];
-  const std::size_t corner = tried_ % kCorners;
-  const bool steep = corner % 2 == 0, nominal = corner < 2;
-  const double silence_s = nominal ? 0.0 : std::max(reaction_.stale_s, reaction_.timeout_s);
-  const double steepest = nominal ? point_.fall : point_.fall_at_fault;
-  const double to_see_steep = std::max(kSlipToSeeSteep, kSlipToSee_s * point_.slip_rate_noise_1_s);
-  const Excursion all =
-      excursion(point_, reaction_, rate_1_s, steep ? steepest : kFlatFall,
-                steep ? to_see_steep : kSlipToSeeFlat, silence_s + reaction_.cycle_s);
-  const Excursion cost = steep ? Excursion{all.slip, all.time_s, all.area_s, 0.0}
-                               : Excursion{all.slip, 0.0, 0.0, all.late_s};
-  if (corner == 0) tries_ = {};
+  const std::size_t at = tried_++ % kCorners;
+  const Corner corner{.steep = at % 2 == 0, .fault = at >= 2};
+  const Excursion all = excursion_at(rate_1_s, corner, 1.0);
+  const Excursion cost = corner.steep ? Excursion{all.slip, all.time_s, all.area_s, 0.0}
+                                      : Excursion{all.slip, 0.0, 0.0, all.late_s};
+  if (at == 0) tries_ = {};
   tries_.dearest = larger(tries_.dearest, cost);
-  done_ = ++tried_ == kCorners * kSlipRates_1_s.size();
-  if (corner + 1 < kCorners) return done_;
+  if (at + 1 < kCorners) return;
   tries_.slip_rate_1_s = rate_1_s;
   tries_.peak_slip_max = peak_slip_max(tries_, limits_, point_.torque_Nm, point_.omega_p_rad_s,
                                        point_.primary_radius_m);
@@ -168,7 +186,42 @@ bool CrossingSearch::step() noexcept {
       tries_.peak_slip_told > crossing_.peak_slip_told) {
     crossing_ = tries_;
   }
-  return done_;
+}
+
+// By the last rate, the slowest: it runs on least.
+void CrossingSearch::deny() noexcept {
+  const Excursion& cost = tries_.dearest;
+  if (cost.slip >= kExcursionMost) {
+    denied_ = {CrossingWall::kFall, 0.0, point_.fall};
+    return;
+  }
+  const double slip_most =
+      std::min(limits_.slip_max,
+               limits_.slip_speed_max_m_s / (point_.omega_p_rad_s * point_.primary_radius_m));
+  if (slip_most - cost.slip <= point_.peak_slip) {
+    denied_ = {CrossingWall::kSlip, slip_most - cost.slip, point_.peak_slip};
+    return;
+  }
+  const double turn_W = point_.torque_Nm * point_.omega_p_rad_s;
+  const double fall_J = (point_.peak_slip * cost.time_s + cost.area_s) * turn_W;
+  const double flat_J =
+      limits_.energy_stop_J + (point_.peak_slip + cost.slip) * cost.late_s * turn_W;
+  denied_ = {CrossingWall::kEnergy, std::max(fall_J, flat_J), limits_.energy_max_J};
+}
+
+// One excursion: is half of the way between survived and lost survived, first with nothing wrong?
+void CrossingSearch::halve_fall() noexcept {
+  const double share = 0.5 * (survived_ + lost_);
+  const Excursion all = excursion_at(kSlipRates_1_s.back(), {.fault = fault_next_}, share);
+  const bool survives = all.slip < kExcursionMost;
+  if (survives && !fault_next_) {
+    fault_next_ = true;
+    return;
+  }
+  (survives ? survived_ : lost_) = share;
+  denied_.figure = survived_ * point_.fall;
+  fault_next_ = false;
+  ++halvings_;
 }
 
 }  // namespace beltgrip::daemon

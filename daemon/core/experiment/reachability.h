@@ -17,6 +17,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "daemon/core/base/limits.h"
 
@@ -96,6 +97,18 @@ struct Crossing {
 double peak_slip_max(const Crossing& crossing, const SlipLimits& limits, double torque_Nm,
                      double omega_p_rad_s, double primary_radius_m) noexcept;
 
+// What stands in the way of every crossing; the figure and what it would have to be.
+enum class CrossingWall : std::uint8_t {
+  kNone,
+  kFall,    // of friction behind the peak, per unit of slip: survived, and to be survived
+  kSlip,    // of the latest peak with room, and of the latest to be expected
+  kEnergy,  // J, of a crossing at that peak, and at the most
+};
+struct CrossingDenied {
+  CrossingWall wall = CrossingWall::kNone;
+  double figure = 0.0, limit = 0.0;
+};
+
 // The slip rate that tells the latest peak, with room both with a nominal stop and with the worst
 // single fault: an input that falls silent until it counts as lost, or our own silence until the
 // receiver's time-out.
@@ -109,14 +122,30 @@ class CrossingSearch {
   bool done() const noexcept { return done_; }
   const RampPoint& point() const noexcept { return point_; }
   const Crossing& crossing() const noexcept { return crossing_; }
+  const CrossingDenied& denied() const noexcept { return denied_; }
 
  private:
+  // Of what a crossing has to hold for.
+  struct Corner {
+    bool steep = true;  // else a flat top
+    bool fault = false;
+  };
+  Excursion excursion_at(double slip_rate_1_s, Corner corner, double fall_share) const noexcept;
+  void try_corner() noexcept;
+  void deny() noexcept;
+  void halve_fall() noexcept;
+
   RampPoint point_;
   Reaction reaction_;
   SlipLimits limits_;
   std::size_t tried_ = 0;
   bool done_ = true;
   Crossing tries_, crossing_;
+  CrossingDenied denied_;
+  // Shares of the falls that must be survived: one that is, one that is not.
+  double survived_ = 0.0, lost_ = 1.0;
+  int halvings_ = 0;
+  bool fault_next_ = false;  // of this halving, nothing wrong is survived
 };
 
 }  // namespace beltgrip::daemon

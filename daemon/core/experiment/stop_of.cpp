@@ -57,6 +57,34 @@ Stop stop_of(SafetyVerdict verdict, double figure, double limit) noexcept {
   }
 }
 
+namespace {
+
+StopCause no_crossing(const Obstacle& obstacle) noexcept {
+  constexpr double kPercent = 100.0;
+  switch (obstacle.wall) {
+    case CrossingWall::kSlip:
+      return {.what = "the slip speed allows a peak at",
+              .figure = kPercent * obstacle.figure,
+              .limit = kPercent * obstacle.limit,
+              .unit = "%"};
+    case CrossingWall::kEnergy:
+      return {.what = "a crossing costs",
+              .figure = obstacle.figure,
+              .limit = obstacle.limit,
+              .unit = "J"};
+    default:
+      return {.what = "a belt is caught to a fall behind its peak of",
+              .figure = obstacle.figure / kPercent,
+              .limit = obstacle.limit / kPercent,
+              .unit = "per % of slip",
+              .further = "the own force is",
+              .further_figure = obstacle.needed,
+              .further_unit = "times the peak's"};
+  }
+}
+
+}  // namespace
+
 Stop stop_of(std::uint32_t inhibits, const Obstacle& obstacle) noexcept {
   const auto has = [inhibits](Inhibit which) { return (inhibits & inhibit_bit(which)) != 0; };
   const auto numbered = [&obstacle](const char* what, const char* unit) {
@@ -83,10 +111,7 @@ Stop stop_of(std::uint32_t inhibits, const Obstacle& obstacle) noexcept {
     return {StopReason::kTime, {.what = "the controller's own force did not come to rest"}};
   }
   if (has(Inhibit::kRamp)) {
-    return {StopReason::kRoom,
-            {.what = "no crossing keeps the slip limits at a fall behind the peak of",
-             .figure = obstacle.figure,
-             .unit = "per percent of slip"}};
+    return {StopReason::kRoom, no_crossing(obstacle)};
   }
   StopCause cause = numbered("the ramp would last for", "s");
   cause.further = "in time at";

@@ -380,7 +380,12 @@ TEST_F(ArmingTest, TheFirstRequestSurvivesTheSteepestFallAndLaterOnesTheOneThatW
     arming.step(now_);
   }
   EXPECT_EQ(arming.inhibits(), inhibit_bit(Inhibit::kRamp));
-  EXPECT_NEAR(arming.obstacle().figure, 20e-3, 1e-12);
+  EXPECT_EQ(arming.obstacle().wall, CrossingWall::kFall);
+  EXPECT_NEAR(arming.obstacle().limit, 2.0, 1e-12);  // per unit of slip
+  EXPECT_GT(arming.obstacle().figure, 0.1);
+  EXPECT_LT(arming.obstacle().figure, 2.0);
+  // The own force, in that of the peak: 32 Nm at a friction of 0.085 and 78.4 mm.
+  EXPECT_NEAR(arming.obstacle().needed, 4000.0 / (32.0 * 0.98163 / (2.0 * 0.0784 * 0.085)), 1e-4);
   now_.shown = {0.6, 2.0, {0.0, 0.4}};  // 4e-3 per percent at most
   for (int i = 0; i < 400; ++i) {
     now_.t += kSample;

@@ -113,6 +113,7 @@ struct Found {
 
 struct Searched {
   Crossing crossing;
+  CrossingDenied denied;
   int steps = 0;
 };
 Searched search(const RampPoint& point, Duration stale) {
@@ -126,6 +127,7 @@ Searched search(const RampPoint& point, Duration stale) {
   do ++out.steps;
   while (!one.step());
   out.crossing = one.crossing();
+  out.denied = one.denied();
   return out;
 }
 
@@ -166,7 +168,7 @@ Account account(const Drive& drive) {
   if (a * 8.0 > 0.05 * now_rad_s && needed_s + 3.0 < left_s && gains) {
     out.found.inhibits = inhibit_bit(Inhibit::kWait);
   } else if (!safe) {
-    out.found = {inhibit_bit(Inhibit::kRamp), 0.01 * soon.fall, 0.0, {}, soon};
+    out.found = {inhibit_bit(Inhibit::kRamp), here.denied.figure, here.denied.limit, {}, soon};
   } else {
     out.found.plan = {here.crossing, soon.mu_expected, soon.mu_least, soon.primary_radius_m};
     out.found.point = soon;
