@@ -285,9 +285,14 @@ std::uint32_t Arming::clearance(const Now& now) noexcept {
   if (waits) return inhibit_bit(Inhibit::kWait);
   if (crossing.slip_rate_1_s <= 0.0) {
     const CrossingDenied& denied = search_.denied();
+    const double known = obstacle_.wall == CrossingWall::kFall
+                             ? obstacle_.figure
+                             : std::numeric_limits<double>::quiet_NaN();
     obstacle_ = {.figure = denied.figure, .limit = denied.limit, .wall = denied.wall};
     if (denied.wall == CrossingWall::kFall) {
+      obstacle_.figure = known;
       obstacle_.needed = point.own_force_N / peak_force_N(point, point.mu_least);
+      if (refused_.told()) refused_ = search_;
     }
     return inhibit_bit(Inhibit::kRamp);
   }
@@ -363,7 +368,8 @@ void Arming::step(const Now& now) noexcept {
     omega_p_since_ = now.omega_p_rad_s;
     unclear_ = 0;
     looked_ = cleared_ = false;
-    search_ = later_ = {};
+    search_ = later_ = refused_ = {};
+    obstacle_ = {};
     slip_percent_ = slip_samples_ = 0.0;
     slip_course_.begin(ratio_since_, now.torque_Nm);
     force_count_ = 0;
@@ -388,6 +394,11 @@ void Arming::step(const Now& now) noexcept {
   } else if (now.t >= next_look_) {
     next_look_ = now.t + kClearancePeriod;
     look(now);
+  } else if (!refused_.told()) {
+    refused_.tell();
+    if (refused_.told() && obstacle_.wall == CrossingWall::kFall) {
+      obstacle_.figure = refused_.denied().figure;
+    }
   }
   looked_ = looked_ || (search_.done() && later_.done());
   const std::uint32_t moving = force_rests_ ? 0U : inhibit_bit(Inhibit::kForce);

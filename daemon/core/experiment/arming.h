@@ -226,9 +226,10 @@ class Arming {
   double force_step_N_;       // least change that the pressure's signal can show
   MonoTime block_since_ = 0;
   double block_sum_N_ = 0.0, block_samples_ = 0.0;
-  CrossingSearch search_;  // if the request began now
-  CrossingSearch later_;   // if it began a little later
-  RequestPlan plan_;       // found by the last search
+  CrossingSearch search_;   // if the request began now
+  CrossingSearch later_;    // if it began a little later
+  CrossingSearch refused_;  // that found nothing, while it tells which fall is survived
+  RequestPlan plan_;        // found by the last search
   Obstacle obstacle_;
 };
 

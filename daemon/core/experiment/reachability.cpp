@@ -149,16 +149,14 @@ Excursion CrossingSearch::excursion_at(double slip_rate_1_s, Corner corner,
 
 bool CrossingSearch::step() noexcept {
   if (done_) return true;
-  if (denied_.wall == CrossingWall::kFall) {
-    halve_fall();
-    done_ = halvings_ == kHalvings;
-    return done_;
-  }
   try_corner();
-  if (tried_ < kCorners * kSlipRates_1_s.size()) return false;
-  if (crossing_.slip_rate_1_s <= 0.0) deny();
-  done_ = denied_.wall != CrossingWall::kFall;
+  done_ = tried_ == kCorners * kSlipRates_1_s.size();
+  if (done_ && crossing_.slip_rate_1_s <= 0.0) deny();
   return done_;
+}
+
+bool CrossingSearch::told() const noexcept {
+  return denied_.wall != CrossingWall::kFall || halvings_ == kHalvings;
 }
 
 // Steep and flat, nominal and worst, one rate after the other.
@@ -209,8 +207,9 @@ void CrossingSearch::deny() noexcept {
   denied_ = {CrossingWall::kEnergy, std::max(fall_J, flat_J), limits_.energy_max_J};
 }
 
-// One excursion: is half of the way between survived and lost survived, first with nothing wrong?
-void CrossingSearch::halve_fall() noexcept {
+// Is half of the way between survived and lost survived, first with nothing wrong?
+void CrossingSearch::tell() noexcept {
+  if (told()) return;
   const double share = 0.5 * (survived_ + lost_);
   const Excursion all = excursion_at(kSlipRates_1_s.back(), {.fault = fault_next_}, share);
   const bool survives = all.slip < kExcursionMost;

@@ -122,7 +122,11 @@ class CrossingSearch {
   bool done() const noexcept { return done_; }
   const RampPoint& point() const noexcept { return point_; }
   const Crossing& crossing() const noexcept { return crossing_; }
+  // Once done: what stands in the way. The fall that is survived is known once told(), by as many
+  // calls of tell(), of one excursion each.
   const CrossingDenied& denied() const noexcept { return denied_; }
+  bool told() const noexcept;
+  void tell() noexcept;
 
  private:
   // Of what a crossing has to hold for.
@@ -133,7 +137,6 @@ class CrossingSearch {
   Excursion excursion_at(double slip_rate_1_s, Corner corner, double fall_share) const noexcept;
   void try_corner() noexcept;
   void deny() noexcept;
-  void halve_fall() noexcept;
 
   RampPoint point_;
   Reaction reaction_;

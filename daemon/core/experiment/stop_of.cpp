@@ -1,5 +1,8 @@
 #include "daemon/core/experiment/stop_of.h"
 
+#include <cmath>
+#include <limits>
+
 namespace beltgrip::daemon {
 
 using estimator::StopReason;
@@ -61,6 +64,7 @@ namespace {
 
 StopCause no_crossing(const Obstacle& obstacle) noexcept {
   constexpr double kPercent = 100.0;
+  constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
   switch (obstacle.wall) {
     case CrossingWall::kSlip:
       return {.what = "the slip speed allows a peak at",
@@ -73,9 +77,12 @@ StopCause no_crossing(const Obstacle& obstacle) noexcept {
               .limit = obstacle.limit,
               .unit = "J"};
     default:
-      return {.what = "a belt is caught to a fall behind its peak of",
-              .figure = obstacle.figure / kPercent,
-              .limit = obstacle.limit / kPercent,
+      // Which fall is survived is told a little later than that this one is not.
+      const bool told = std::isfinite(obstacle.figure);
+      return {.what = told ? "a belt is caught to a fall behind its peak of"
+                           : "no belt is caught at a fall behind its peak of",
+              .figure = (told ? obstacle.figure : obstacle.limit) / kPercent,
+              .limit = told ? obstacle.limit / kPercent : kNoNumber,
               .unit = "per % of slip",
               .further = "the own force is",
               .further_figure = obstacle.needed,
