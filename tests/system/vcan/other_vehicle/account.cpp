@@ -11,6 +11,7 @@ constexpr unsigned kCounters = 15;
 constexpr int kIdleFrames = 5;
 constexpr double kLongest_s = 15.0;
 constexpr double kPeriod_s = 0.010;
+constexpr double kSilence_s = 0.050;  // for a controller the request is over
 // Chosen: an active frame after the stop flag may have been on its way.
 constexpr double kAfterStop_s = 0.030;
 // The first force is the present one: three times the noise of this car's pressure (3 kPa, 32 N),
@@ -104,7 +105,6 @@ void Account::clamp(double t_s, const Bytes& frame, const Belt& belt, double sec
     stands_ = false;
     ++idle_frames_;
   }
-  last_frame_s_ = t_s;
 }
 
 void Account::active(double t_s, double force_N, const Belt& belt, double secondary_rad_s) {
@@ -129,6 +129,7 @@ void Account::active(double t_s, double force_N, const Belt& belt, double second
     if (before.last_N - force_N > kRateMax_N_per_s * dt_s + kResolution_N) {
       breach(t_s, "the force asked for falls too fast");
     }
+    if (t_s > before.last_active_s + kSilence_s) breach(t_s, "asks on after a silence");
     if (t_s > before.begin_s + kLongest_s) breach(t_s, "the request is too long");
     if (stop_flag_s_ && t_s > *stop_flag_s_ + kAfterStop_s) {
       breach(t_s, "asks on after MacroSlipStop");
@@ -147,6 +148,7 @@ void Account::active(double t_s, double force_N, const Belt& belt, double second
 
 void Account::slip(double t_s, const Bytes& frame) {
   const bool stop = bits(frame, 12, 1) != 0;
+  if (!stop && stop_flag_s_ && stands_) breach(t_s, "MacroSlipStop falls while a request stands");
   if (!stop) stop_flag_s_.reset();
   if (stop && !stop_flag_s_) stop_flag_s_ = t_s;
 }

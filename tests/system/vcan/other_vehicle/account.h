@@ -51,7 +51,8 @@ class Account {
   const std::vector<Result>& results() const { return results_; }
   const Status& status() const { return status_; }
   bool request_stands() const { return stands_; }
-  const Harm& whole() const { return whole_; }
+  // Five inactive frames have followed the last request.
+  bool ended_right() const { return idle_frames_ >= 5; }
   // Stop reasons and faults that were published.
   bool stop_reason_seen(unsigned reason) const { return reasons_ >> reason & 1U; }
   bool fault_seen(int bit) const { return faults_ >> (bit - 24) & 1U; }
@@ -67,7 +68,6 @@ class Account {
   void estimate(double t_s, const Bytes& frame);
   void slip(double t_s, const Bytes& frame);
 
-  double t_s_ = 0.0;
   std::vector<Request> requests_;
   std::vector<Result> results_;
   std::vector<std::string> breaches_;
@@ -77,7 +77,6 @@ class Account {
   std::uint64_t reasons_ = 0, faults_ = 0;
   bool stands_ = false;
   int idle_frames_ = 0;
-  double last_frame_s_ = 0.0;
   std::optional<double> stop_flag_s_;
   unsigned experiment_count_ = 0;
 };

@@ -20,12 +20,13 @@ constexpr double kBrake_Nm = 220.0;  // at the secondary, 3 m/s2
 
 }  // namespace
 
-Drive::Drive(const std::string& folder, const Kind& kind)
+Drive::Drive(const std::string& folder, const Kind& kind, std::size_t seed)
     : pedal_percent(100.0 * (kind.torque_Nm - kDragTorque_Nm) / kTorquePerPedal_Nm),
       folder_(folder),
       bus_("vcan0"),
       car_(kind.torque_Nm, own_force_N(kind.torque_Nm), kind.traction_share),
-      start_(Clock::now()) {
+      start_(Clock::now()),
+      random_(seed) {
   std::ofstream(folder_ + "/other.dbc") << dbc_text();
   std::ofstream(folder_ + "/other.toml")
       << configuration_text(kind.torque_Nm < 0.0 ? "coast_down" : "steady");
@@ -72,7 +73,7 @@ void Drive::tick() {
   car_.torque_demand_Nm = kDragTorque_Nm + kTorquePerPedal_Nm * pedal_percent / 100.0;
   car_.brake_Nm = brake ? kBrake_Nm : 0.0;
   if (ticks_ % kTicksPerCycle == 0) {
-    controller_.permits = !brake && car_.primary_rad_s() > 85.0;
+    controller_.permits = !brake && !refuses && car_.primary_rad_s() > 85.0;
     controller_.judge_torque(t_s(), car_.torque_demand_Nm, car_.engine_Nm());
     car_.clamp_command_N = controller_.command_N(t_s(), car_.secondary_rad_s());
     send_all();

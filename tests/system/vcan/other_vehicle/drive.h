@@ -25,7 +25,7 @@ struct Kind {
 class Drive {
  public:
   // On the vcan0 of this thread's network namespace; DBC and configuration go into the folder.
-  Drive(const std::string& folder, const Kind& kind);
+  Drive(const std::string& folder, const Kind& kind, std::size_t seed);
 
   void start_daemon();
   test::Process& daemon() { return *daemon_; }
@@ -45,6 +45,7 @@ class Drive {
   // What the driver and the faults do.
   double pedal_percent = 0.0;
   bool brake = false;
+  bool refuses = false;  // the controller withdraws its permission
   std::set<MessageIndex> lost;
   std::set<std::string> frozen;  // fields that keep their value while their frames go on
 
@@ -67,7 +68,7 @@ class Drive {
   long ticks_ = 0;
   std::array<int, kMessages> counters_{};
   std::array<std::vector<double>, kMessages> sent_;
-  std::mt19937_64 random_{20211};
+  std::mt19937_64 random_;
 };
 
 }  // namespace beltgrip::other

@@ -48,8 +48,10 @@ bool begin(Drive& drive) {
 
 bool begin_and_slip(Drive& drive, double percent) {
   if (!begin(drive)) return false;
-  const bool slips = drive.until([&] { return drive.slip_percent() > percent; }, kLongestRequest_s);
-  EXPECT_TRUE(slips && drive.account().request_stands()) << "the request ended before its slip";
+  drive.until([&] { return drive.slip_percent() > percent || !drive.account().request_stands(); },
+              kLongestRequest_s);
+  const bool slips = drive.account().request_stands();
+  EXPECT_TRUE(slips) << "the request ended before its slip";
   return slips;
 }
 
@@ -67,6 +69,7 @@ void expect_no_harm(Account& account) {
     EXPECT_LT(request.harm.beyond_peak_J, kBeyondPeak_J);
   }
   EXPECT_EQ(account.breaches(), std::vector<std::string>{});
+  EXPECT_TRUE(account.request_stands() || account.ended_right());
 }
 
 void expect_right(const Drive& drive) {
@@ -87,20 +90,20 @@ class OtherVehicle : public test::Vcan {
     std::vector<std::string> said(cases.size());
     std::vector<std::jthread> threads;
     for (std::size_t i = 0; i < cases.size(); ++i) {
-      threads.emplace_back([&, i] { one(cases[i], said[i]); });
+      threads.emplace_back([&, i] { one(cases[i], i, said[i]); });
     }
     threads.clear();
     for (const std::string& each : said) std::printf("%s", each.c_str());
   }
 
  private:
-  void one(const Case& each, std::string& said) {
+  void one(const Case& each, std::size_t seed, std::string& said) {
     SCOPED_TRACE(each.name);
     ASSERT_EQ(unshare(CLONE_NEWNET), 0);
     ASSERT_NO_FATAL_FAILURE(add_interface("vcan0"));
     const std::string place = folder() + "/" + each.name;
     std::filesystem::create_directory(place);
-    Drive car(place, each.kind);
+    Drive car(place, each.kind, seed);
     car.start_daemon();
     each.script(car);
     expect_no_harm(car.account());
@@ -139,12 +142,12 @@ std::function<void(Drive&)> killed_at(double slip_percent) {
 }
 
 TEST_F(OtherVehicle, KilledAtAnyInstant) {
-  drive({{"killed_at_1.0", {}, killed_at(1.0)},
-         {"killed_at_2.0", {}, killed_at(2.0)},
-         {"killed_at_2.6", {}, killed_at(2.6)},
-         {"killed_at_3.0", {}, killed_at(3.0)},
+  drive({{"killed_at_2.0", {}, killed_at(2.0)},
+         {"killed_at_2.3", {}, killed_at(2.3)},
+         {"killed_at_2.5_driving", {45.0, 1.0}, killed_at(2.5)},
+         {"killed_at_2.7", {}, killed_at(2.7)},
          {"killed_and_started", {}, [](Drive& drive) {
-            if (!begin(drive)) return;
+            if (!begin_and_slip(drive, 0.9)) return;
             drive.daemon().signal(SIGKILL);
             drive.drive_on(0.1);
             drive.start_daemon();
@@ -182,7 +185,7 @@ TEST_F(OtherVehicle, InputsLost) {
          {"hydraulics", {}, lost_at(2.4, kHydraulics)},
          {"motor", {}, lost_at(2.4, kMotor)},
          {"chassis", {}, lost_at(2.4, kChassis)},
-         {"shafts_later", {}, lost_at(2.8, kShafts)}});
+         {"shafts_later", {}, lost_at(2.6, kShafts)}});
 }
 
 std::function<void(Drive&)> frozen_at(double slip_percent, const std::set<std::string>& fields) {
@@ -209,58 +212,57 @@ TEST_F(OtherVehicle, TheDriver) {
     drive.pedal_percent = 60.0;
     expect_ends_within(drive, kAtOnce_s);
   };
-  const auto tip_in_more = [](Drive& drive) {
-    if (!begin_and_slip(drive, 2.4)) return;
-    drive.pedal_percent += 20.0;
-    expect_ends_within(drive, kAtOnce_s);
-  };
   const auto brake = [](Drive& drive) {
     if (!begin_and_slip(drive, 2.6)) return;
     drive.brake = true;
     expect_ends_within(drive, kAtOnce_s);
   };
-  drive({{"tip_in", {}, tip_in}, {"more_pedal", {45.0, 1.0}, tip_in_more}, {"brake", {}, brake}});
+  const auto refusal = [](Drive& drive) {
+    if (!begin_and_slip(drive, 2.6)) return;
+    drive.refuses = true;
+    expect_ends_within(drive, kAtOnce_s);
+  };
+  drive({{"tip_in", {}, tip_in},
+         {"brake", {}, brake},
+         {"brake_driving", {45.0, 1.0}, brake},
+         {"refusal", {}, refusal}});
 }
 
-std::function<void(Drive&)> late_by(double late_s) {
-  return [=](Drive& drive) {
-    drive.car().late_s = late_s;
-    if (!begin(drive)) return;
-    drive.until([&] { return !drive.account().request_stands(); }, kLongestRequest_s);
-    drive.drive_on(kAftermath_s);
-  };
+void until_it_ends(Drive& drive) {
+  if (!begin(drive)) return;
+  drive.until([&] { return !drive.account().request_stands(); }, kLongestRequest_s);
+  drive.drive_on(kAftermath_s);
 }
 
 TEST_F(OtherVehicle, TheController) {
+  // 0.24 s in all instead of the 0.15 s that BeltGrip is told.
+  const auto late = [](Drive& drive) {
+    drive.car().late_s = 0.10;
+    until_it_ends(drive);
+  };
   const auto deaf = [](Drive& drive) {
     drive.controller().deaf = true;
-    if (!begin(drive)) return;
-    drive.until([&] { return !drive.account().request_stands(); }, kLongestRequest_s);
-    drive.drive_on(kAftermath_s);
+    until_it_ends(drive);
     EXPECT_TRUE(drive.account().stop_reason_seen(kClampNotFollowed) ||
                 drive.account().stop_reason_seen(kLag));
   };
   const auto gives_less = [](Drive& drive) {
     drive.controller().given_share = 0.85;
-    if (!begin(drive)) return;
-    drive.until([&] { return !drive.account().request_stands(); }, kLongestRequest_s);
-    drive.drive_on(kAftermath_s);
-    EXPECT_TRUE(drive.account().stop_reason_seen(kClampNotFollowed));
+    until_it_ends(drive);
+    EXPECT_LT(drive.account().requests().back().frames, 100);  // of a second
   };
   const auto holds_on = [](Drive& drive) {
-    if (!begin(drive)) return;
-    drive.drive_on(1.0);
+    if (!begin_and_slip(drive, 1.5)) return;  // a force that still holds the belt
     drive.controller().holds_on = true;
-    drive.brake = true;
+    drive.refuses = true;
     drive.drive_on(0.3);
-    drive.brake = false;
+    drive.refuses = false;
     drive.drive_on(4.0);
     EXPECT_TRUE(drive.account().fault_seen(kFaultClampStuck));
     EXPECT_EQ(drive.account().status().state, kStateFault);
     EXPECT_EQ(drive.account().requests().size(), 1U);
   };
-  drive({{"late_by_0.10", {}, late_by(0.10)},
-         {"late_by_0.25", {}, late_by(0.25)},
+  drive({{"late", {}, late},
          {"deaf", {}, deaf},
          {"gives_less", {}, gives_less},
          {"holds_on", {}, holds_on}});
