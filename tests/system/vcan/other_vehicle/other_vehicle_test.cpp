@@ -25,7 +25,7 @@ constexpr double kStale_s = 0.050 + 0.020 + 0.010 + 0.010;
 // 10 ms.
 constexpr double kAtOnce_s = 0.020 + 0.010 + 0.010;
 // What follows a request that was cut off: dead time, lags and the slip that goes back.
-constexpr double kAftermath_s = 1.5;
+constexpr double kAftermath_s = 1.2;
 // StopReason and faults by can_dbc/beltgrip.dbc, State by interfaces.md.
 constexpr unsigned kClampNotFollowed = 17, kLag = 20, kStateFault = 7;
 constexpr int kFaultClampStuck = 43;
