@@ -18,7 +18,6 @@ class Controller {
   // What the valve is told now. Also ends a request that has fallen silent.
   double command_N(double t_s, double secondary_rad_s);
 
-  double own_N() const { return own_N_; }
   bool obeys_now() const { return asked_N_.has_value(); }
 
   bool permits = true;

@@ -89,6 +89,7 @@ class OtherVehicle : public test::Vcan {
   void drive(const std::vector<Case>& cases) {
     std::vector<std::string> said(cases.size());
     std::vector<std::jthread> threads;
+    threads.reserve(cases.size());
     for (std::size_t i = 0; i < cases.size(); ++i) {
       threads.emplace_back([&, i] { one(cases[i], i, said[i]); });
     }
