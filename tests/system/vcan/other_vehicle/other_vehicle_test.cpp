@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sched.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
@@ -17,7 +18,7 @@ namespace {
 // What the daemon promises: CLAMP_CONTRACT.md, "What the daemon promises".
 constexpr double kSlip_percent = 10.0, kSlip_m_s = 0.8, kBeyondPeak_J = 100.0;
 // Chosen: the daemon takes the first seconds to know its inputs.
-constexpr double kFirstRequest_s = 20.0, kLongestRequest_s = 16.0;
+constexpr double kFirstRequest_s = 20.0, kLongestRequest_s = 16.0, kSeveralRequests_s = 30.0;
 // An input is stale after 50 ms (interfaces.md, section 2); a cycle of it, one of the daemon's
 // frames and one of this car's loop come beside it.
 constexpr double kStale_s = 0.050 + 0.020 + 0.010 + 0.010;
@@ -46,12 +47,13 @@ bool begin(Drive& drive) {
   return begun;
 }
 
+// The daemon may end a request before the belt slips that much (Lag is told from a noisy pressure);
+// then a later one counts.
 bool begin_and_slip(Drive& drive, double percent) {
-  if (!begin(drive)) return false;
-  drive.until([&] { return drive.slip_percent() > percent || !drive.account().request_stands(); },
-              kLongestRequest_s);
-  const bool slips = drive.account().request_stands();
-  EXPECT_TRUE(slips) << "the request ended before its slip";
+  const bool slips = drive.until(
+      [&] { return drive.account().request_stands() && drive.slip_percent() > percent; },
+      kSeveralRequests_s);
+  EXPECT_TRUE(slips) << "no request in which the belt slips by " << percent << " %";
   return slips;
 }
 
@@ -114,24 +116,21 @@ class OtherVehicle : public test::Vcan {
   }
 };
 
-void experiment(Drive& drive) {
-  if (!begin(drive)) return;
-  EXPECT_TRUE(drive.until([&] { return !drive.account().results().empty(); }, kLongestRequest_s));
-  drive.drive_on(0.5);
-  ASSERT_EQ(drive.account().results().size(), 1U);
-  EXPECT_EQ(drive.account().results()[0].kind, kValue);
+std::function<void(Drive&)> values(std::ptrdiff_t count) {
+  return [count](Drive& drive) {
+    const auto has_them = [&] {
+      return std::ranges::count(drive.account().results(), kValue, &Result::kind) == count;
+    };
+    EXPECT_TRUE(drive.until(has_them, kSeveralRequests_s));
+    drive.drive_on(0.5);
+  };
 }
 
 TEST_F(OtherVehicle, ExperimentsEndWithTheirValue) {
-  drive({{"coast", {}, experiment},
-         {"coast_worn", {kDragTorque_Nm, 0.9}, experiment},
-         {"drive", {45.0, 1.0}, experiment},
-         {"twice", {}, [](Drive& drive) {
-            experiment(drive);
-            if (!begin(drive)) return;
-            EXPECT_TRUE(drive.until([&] { return drive.account().results().size() == 2; },
-                                    kLongestRequest_s));
-          }}});
+  drive({{"coast", {}, values(1)},
+         {"coast_worn", {kDragTorque_Nm, 0.9}, values(1)},
+         {"drive", {45.0, 1.0}, values(1)},
+         {"twice", {}, values(2)}});
 }
 
 std::function<void(Drive&)> killed_at(double slip_percent) {
@@ -255,13 +254,14 @@ TEST_F(OtherVehicle, TheController) {
   const auto holds_on = [](Drive& drive) {
     if (!begin_and_slip(drive, 1.5)) return;  // a force that still holds the belt
     drive.controller().holds_on = true;
+    const std::size_t requests = drive.account().requests().size();
     drive.refuses = true;
     drive.drive_on(0.3);
     drive.refuses = false;
     drive.drive_on(4.0);
     EXPECT_TRUE(drive.account().fault_seen(kFaultClampStuck));
     EXPECT_EQ(drive.account().status().state, kStateFault);
-    EXPECT_EQ(drive.account().requests().size(), 1U);
+    EXPECT_EQ(drive.account().requests().size(), requests);
   };
   drive({{"late", {}, late},
          {"deaf", {}, deaf},
