@@ -21,6 +21,7 @@ constexpr double kKnownScale_s = 0.2;
 constexpr double kShare = 0.015;  // of the force
 // Chosen: what a lag makes of the reading at the corner of a ramp stays below.
 constexpr double kLargeShare = 0.04;
+constexpr double kFallsOn = 0.5;    // chosen: of the ramp before it, to go on as a ramp
 constexpr double kLeastMove = 0.4;  // of what slip would have to move by
 constexpr double kSlipDeviations = 4.0, kSlopeDeviations = 2.0;
 constexpr double kStairs = 1.5;  // steps of a signal that is rounded coarsely are no steps
@@ -58,11 +59,8 @@ bool ForceStep::steps(std::size_t length, double slip_noise, const Trend& force)
   const double drift_N = before.force_N - earlier.force_N;
   const double drift_after_N = later.force_N - after.force_N;
   const double jump_N = after.force_N - before.force_N - on * (drift_N + drift_after_N);
-  const double squares = force.squares(std::min(length_s, kKnownScale_s));
-  if (squares < kFewestSquares) return false;
-  const double deviations = kDeviations * (1.0 + kStudent / squares);
   const double force_deviation_N = std::sqrt(force.density(length_s) / length_s);
-  if (std::abs(jump_N) < std::max({deviations * spread * force_deviation_N,
+  if (std::abs(jump_N) < std::max({kDeviations * spread * force_deviation_N,
                                    kShare * std::abs(before.force_N), stair_N_})) {
     return false;
   }
@@ -79,8 +77,16 @@ bool ForceStep::steps(std::size_t length, double slip_noise, const Trend& force)
   const double slip_jump = after.slip_percent - before.slip_percent -
                            on * (creep + later.slip_percent - after.slip_percent);
   const double slip_noise_percent = kSlipDeviations * spread * slip_deviation;
-  // No cylinder is as quick as that, and slip shows nothing of it.
-  if (std::abs(jump_N) > kLargeShare * std::abs(before.force_N) &&
+  // No ramp is as quick as that, and slip shows nothing of it. A clamp that is given back is as
+  // quick: then the force goes on falling no more.
+  const double surely_falls_N = kSlopeDeviations * std::sqrt(2.0) * force_deviation_N;
+  const bool falls_on =
+      drift_N < 0.0 && drift_after_N < std::min(kFallsOn * drift_N, -surely_falls_N);
+  const double squares = force.squares(std::min(length_s, kKnownScale_s));
+  const double large_N =
+      std::max(kDeviations * (1.0 + kStudent / std::max(squares, 1.0)) * spread * force_deviation_N,
+               kLargeShare * std::abs(before.force_N));
+  if (falls_on && squares >= kFewestSquares && std::abs(jump_N) > large_N &&
       -slip_jump * jump_N < slip_noise_percent * std::abs(jump_N)) {
     return true;
   }

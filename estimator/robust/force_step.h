@@ -5,8 +5,8 @@
 // just gone along, within less than the gap that is left out here. Where the force steps, and slip
 // moves by much less than that, the reading has stepped (its gain, its zero), and what mu* is
 // before and after do not belong to one curve. Where slip is too noisy to say whether it followed,
-// a step that is large within less than that gap is the reading's as well: a force has its
-// cylinder's lag.
+// a step that is large within less than that gap is the reading's as well: a ramp has its rate.
+// A clamp that is given back has not; its force falls no more.
 #pragma once
 
 #include <array>
