@@ -16,6 +16,7 @@
 #include "tools/diagnose/infer/engine.h"
 #include "tools/diagnose/infer/gain.h"
 #include "tools/diagnose/infer/parallel.h"
+#include "tools/diagnose/infer/peak.h"
 #include "tools/diagnose/infer/residual_tests.h"
 #include "tools/diagnose/model/curve_family.h"
 
@@ -419,10 +420,9 @@ class Run {
   }
 
   // Beyond doubt, and by more than two machines of one type do.
-  static bool differs(double value, double sigma, const NuisanceRow& row) {
+  static bool differs(double off, double sigma, double tolerance) {
     constexpr double kSure = 5.0;  // chosen, sigmas: of some twenty constants none by chance
-    const double off = std::abs(value - row.nominal);
-    return off > row.tolerance && off > kSure * sigma;
+    return std::abs(off) > tolerance && std::abs(off) > kSure * sigma;
   }
 
   void fill_machine(const Engine& engine, const Naming& naming) {
@@ -439,22 +439,42 @@ class Run {
       }
       const double sigma = std::sqrt(std::max(variance, 0.0));
       const double value = naming.hypothesis.state.nuisance[p];
-      const bool ln = p == kLnMuMax || p == kLnPeakSlipOverdrive || p == kLnPeakSlipLow;
-      const auto shown = [&](double v) { return ln ? std::exp(v) : v; };
-      std::string name(engine.campaign().nuisances[static_cast<std::size_t>(p)].name);
-      if (ln) name = name.substr(3);
-      const Interval fitted{shown(value), shown(value - estimator::kNormal95 * sigma),
-                            shown(value + estimator::kNormal95 * sigma)};
+      // The curve's own peak and slip are the fit's; what they come to is told below.
+      if (p == kLnMuMax || p == kLnPeakSlipOverdrive || p == kLnPeakSlipLow) continue;
+      const std::string name(engine.campaign().nuisances[static_cast<std::size_t>(p)].name);
+      const Interval fitted{value, value - estimator::kNormal95 * sigma,
+                            value + estimator::kNormal95 * sigma};
       const NuisanceRow& row = engine.campaign().nuisances[static_cast<std::size_t>(p)];
       const bool is_shape = first_knot(p) >= 0;
-      if (request_.is_model_given && !is_shape && differs(value, sigma, row)) {
-        out().notes.push_back(name + ": the model has " + text_of(shown(row.nominal)) +
-                              ", these data say " + text_of(fitted.value) + " (" +
-                              text_of(fitted.low) + " to " + text_of(fitted.high) +
-                              "), which counts as the machine's own and is no finding");
-      }
-      out().machine[name] = fitted;
+      tell_machine(name, fitted, row.nominal,
+                   !is_shape && differs(value - row.nominal, sigma, row.tolerance));
     }
+    for (const int stop : {kLowStop, kOverdriveStop}) {  // mu_max of the overdrive where it is used
+      if (!uses_stop(engine, stop)) continue;
+      const FittedPeak peak = fitted_peak(engine, naming.hypothesis, stop);
+      const auto tell = [&](const std::string& name, double ln, double sigma, int p) {
+        const double half = estimator::kNormal95 * sigma;
+        const NuisanceRow& row = engine.campaign().nuisances[static_cast<std::size_t>(p)];
+        tell_machine(name, {std::exp(ln), std::exp(ln - half), std::exp(ln + half)},
+                     std::exp(row.nominal), differs(ln - row.nominal, sigma, row.tolerance));
+      };
+      const bool low = stop == kLowStop;
+      tell(low ? "peak_slip_low" : "peak_slip_overdrive", peak.ln_slip, peak.ln_slip_sigma,
+           low ? kLnPeakSlipLow : kLnPeakSlipOverdrive);
+      if (low && uses_stop(engine, kOverdriveStop)) continue;
+      tell("mu_max", peak.ln_mu, peak.ln_mu_sigma, kLnMuMax);
+    }
+  }
+
+  void tell_machine(const std::string& name, const Interval& fitted, double of_model,
+                    bool is_different) {
+    if (request_.is_model_given && is_different) {
+      out().notes.push_back(name + ": the model has " + text_of(of_model) + ", these data say " +
+                            text_of(fitted.value) + " (" + text_of(fitted.low) + " to " +
+                            text_of(fitted.high) +
+                            "), which counts as the machine's own and is no finding");
+    }
+    out().machine[name] = fitted;
   }
 
   void fill_baseline(const Engine& engine, const Naming& naming) {
