@@ -22,10 +22,18 @@ void demote_order(std::vector<Cell>& cells) {
                         [&](const Cell& cell) { return !is_order(cell); });
 }
 
+// Of the residuals that wander by as much as matters.
 double least_whiteness(const Engine& engine) {
+  const auto by_kind = wander(engine, engine.state());
+  const auto wanders = [&](const std::string& acts_on) {
+    const ResidualKind kind = acts_on == "torque"        ? kBalanceResidual
+                              : acts_on == "clamp force" ? kTrackingResidual
+                                                         : kFrictionResidual;
+    return by_kind[kind] > thresholds::kWander;
+  };
   double least = 1.0;
   for (const ResidualTest& each : test_residuals(engine, engine.state())) {
-    if (each.name == "whiteness") least = std::min(least, each.p);
+    if (each.name == "whiteness" && wanders(each.acts_on)) least = std::min(least, each.p);
   }
   return least;
 }

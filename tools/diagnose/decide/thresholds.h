@@ -29,6 +29,9 @@ inline constexpr double kChannelLine = 10.0;
 inline constexpr double kLineShare = 0.2;
 // Common p-value of the residuals' autocorrelation.
 inline constexpr double kWhiteness = 1e-9;
+// Of residuals that wander within experiments, rms, by as much as healthy ones differ from each
+// other: less is what sensors do.
+inline constexpr double kWander = 1.0;
 // Scatter between experiments over its base, standard deviations.
 inline constexpr double kScatterFriction = 2.2;
 inline constexpr double kScatterRatio = 3.3;

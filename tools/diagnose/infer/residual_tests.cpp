@@ -188,4 +188,63 @@ std::vector<ResidualTest> test_residuals(const Engine& engine, const ModelState&
   return out;
 }
 
+namespace {
+// Products of samples so far apart that they share no noise, for each distance: what swings has
+// none at a quarter of its period.
+constexpr std::array kApart_s{1.0, 1.5, 2.0, 2.5, 3.0};
+
+// Each sample over what the usual scatter moves it by.
+VectorXd over_usual_scatter(const RawColumns& raw, std::size_t kind, const VectorXd& rest) {
+  const Scatter usual = default_scatter();
+  VectorXd variance = VectorXd::Zero(rest.size());
+  for (int i = 0; i < kRandomEffects; ++i) {
+    const ArrayXd& column =
+        raw.columns[raw.columns.size() - kRandomEffects + static_cast<std::size_t>(i)][kind];
+    if (column.size() > 0) variance.array() += column.square() * usual.variance[i];
+  }
+  return (variance.array() > 0.0).select(rest.array() / variance.array().sqrt(), 0.0);
+}
+}  // namespace
+
+std::array<double, kResidualKinds> wander(const Engine& engine, const ModelState& state) {
+  const Campaign& campaign = engine.campaign();
+  const Whitening plain = identity_whitening(campaign);
+  struct Products {
+    std::array<double, kApart_s.size()> sum{}, count{};
+  };
+  std::array<Products, kResidualKinds> products;
+  for (const int run : engine.used()) {
+    const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+    Residuals at = residuals_of(campaign, run, state);
+    const RawColumns raw = raw_columns(campaign, run, state, at, {}, {}, true);
+    const auto rest = white_residuals(campaign, run, state, plain, engine.scatter());
+    for (std::size_t kind = 0; kind < kResidualKinds; ++kind) {
+      if (rest[kind].size() == 0) continue;
+      const VectorXd z = over_usual_scatter(raw, kind, rest[kind]);
+      Index row = 0;
+      for (const auto& [begin, end] : data.stretches) {
+        const VectorXd here = z.segment(row, end - begin);
+        row += end - begin;
+        for (std::size_t i = 0; i < kApart_s.size(); ++i) {
+          const auto lag = static_cast<Index>(std::ceil(kApart_s[i] / data.dt_s));
+          for (Index k = lag; k < here.size(); ++k) {
+            // A sample that this residual does not use is exactly zero.
+            if (here[k] == 0.0 || here[k - lag] == 0.0) continue;
+            products[kind].sum[i] += here[k] * here[k - lag];
+            products[kind].count[i] += 1.0;
+          }
+        }
+      }
+    }
+  }
+  std::array<double, kResidualKinds> out{};
+  for (std::size_t kind = 0; kind < kResidualKinds; ++kind) {
+    for (std::size_t i = 0; i < kApart_s.size(); ++i) {
+      const double mean = products[kind].sum[i] / std::max(products[kind].count[i], 1.0);
+      out[kind] = std::max(out[kind], std::sqrt(std::abs(mean)));
+    }
+  }
+  return out;
+}
+
 }  // namespace beltgrip::diagnose

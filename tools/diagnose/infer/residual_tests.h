@@ -2,6 +2,7 @@
 // and the scatter between experiments counted.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -18,5 +19,9 @@ struct ResidualTest {
 // Whiteness of each residual; step of friction, ratio and torque with the direction of the clamp
 // force, the sign of the torque and the end stop. Call with the engine's last noise model.
 std::vector<ResidualTest> test_residuals(const Engine& engine, const ModelState& nominal);
+
+// By how much each residual wanders slowly within the experiments, rms, in units of what healthy
+// experiments scatter by. By kind of residual.
+std::array<double, kResidualKinds> wander(const Engine& engine, const ModelState& state);
 
 }  // namespace beltgrip::diagnose
