@@ -180,35 +180,5 @@ TEST(Staircase, KeepsThePlateausAndNotTheSteps) {
   EXPECT_EQ(data.stretches.size(), 3U);
 }
 
-// A ramp of the clamp force that is given back at once: what lies before the step is where the belt
-// is nearest to its peak.
-TEST(Reclamp, KeepsTheRampUpToTheStep) {
-  constexpr double kTurn_s = 8.0;
-  const auto pressure_Pa = [&](double t_s) {
-    const double ramp = 6e5 - 4e4 * std::min(t_s, kTurn_s);
-    return ramp + std::clamp((t_s - kTurn_s) / 0.3, 0.0, 1.0) * 4e5 + 1e3 * t_s;
-  };
-  SignalTable table;
-  for (int i = 0; i < 1200; ++i) {
-    const auto add = [&](Role role, double value) {
-      table[role].t_s.push_back(0.01 * i);
-      table[role].value.push_back(value);
-    };
-    add(Role::kPrimarySpeed, 100.0);
-    add(Role::kSecondarySpeed, 222.0);
-    add(Role::kSecondaryPressure, pressure_Pa(0.01 * i));
-    add(Role::kPrimaryTorque, 50.0);
-  }
-  const ExperimentData data = prepare(table, estimator::VariatorParameters{});
-  ASSERT_FALSE(data.stretches.empty());
-  const int last = data.stretches.front().end - 1;
-  EXPECT_GT(data.t_s[last], kTurn_s - 0.55);
-  EXPECT_LT(data.t_s[last], kTurn_s);
-  for (int k = data.stretches.front().begin; k <= last; ++k) {
-    EXPECT_NEAR(data.pressure.value[k], pressure_Pa(data.t_s[k]), 500.0) << k;
-    EXPECT_NEAR(data.pressure.slow[k], pressure_Pa(data.t_s[k]), 6e3) << k;
-  }
-}
-
 }  // namespace
 }  // namespace beltgrip::diagnose

@@ -150,14 +150,7 @@ struct LocalFit {
   ArrayXd value, slope;
 };
 // Local linear fit with Gaussian weights; where there is none, what is given.
-constexpr int kOwnReach = 2;  // samples, of the fit to a sample
-// What a fit to a sample takes in.
-struct Around {
-  bool ends_before = false;                // none that its own fit reaches, nor any behind it
-  const std::vector<int>* part = nullptr;  // none of another part
-};
-LocalFit local_fit(const ArrayXd& values, const ArrayXd& slopes, double dt_s, double sigma_s,
-                   const Around& around = {}) {
+LocalFit local_fit(const ArrayXd& values, const ArrayXd& slopes, double dt_s, double sigma_s) {
   LocalFit out{values, slopes};
   const auto n = static_cast<int>(values.size());
   const int reach = static_cast<int>(std::ceil(3.0 * sigma_s / dt_s));
@@ -165,16 +158,11 @@ LocalFit local_fit(const ArrayXd& values, const ArrayXd& slopes, double dt_s, do
   for (int i = 0; i <= reach; ++i) {
     weight.push_back(std::exp(-0.5 * std::pow(i * dt_s / sigma_s, 2.0)));
   }
-  const auto is_apart = [&](int a, int b) {
-    return around.part != nullptr && (*around.part)[static_cast<std::size_t>(a)] !=
-                                         (*around.part)[static_cast<std::size_t>(b)];
-  };
   for (int k = 0; k < n; ++k) {
     double w0 = 0.0, w1 = 0.0, w2 = 0.0, y0 = 0.0, y1 = 0.0;
-    const int last = around.ends_before ? k - kOwnReach - 1 : std::min(n - 1, k + reach);
-    for (int i = std::max(0, k - reach); i <= last; ++i) {
+    for (int i = std::max(0, k - reach); i <= std::min(n - 1, k + reach); ++i) {
       const double y = values[i];
-      if (!std::isfinite(y) || is_apart(i, k)) continue;
+      if (!std::isfinite(y)) continue;
       const double w = weight[static_cast<std::size_t>(std::abs(i - k))];
       const double u = (i - k) * dt_s;
       w0 += w;
@@ -241,17 +229,17 @@ void trim(ExperimentData& data) {
   data.valid = kept;
 }
 
-// Takes out the samples where the pressure moves too fast, and those behind them: a delay moves the
+// Takes out the samples where the pressure moves too fast, and those beside them: a delay moves the
 // step there. Where the pressure moves in steps all along, next to which the signals are whole, as
 // they are not at the end of a stretch, nothing more goes: between two steps a second is worth
 // keeping.
 void mask_and_segment(const std::vector<bool>& masked, ExperimentData& data) {
-  constexpr int kShortest = 4, kLong = 10, kBehind = 2;
+  constexpr int kShortest = 4, kLong = 10, kBeside = 2;
   const int n = data.size();
-  const auto stretches = [&](int behind) {
+  const auto stretches = [&](int beside) {
     const auto is_kept = [&](int k) {
-      const auto from = masked.begin() + std::max(0, k - behind);
-      const auto to = masked.begin() + k + 1;
+      const auto from = masked.begin() + std::max(0, k - beside);
+      const auto to = masked.begin() + std::min(n, k + beside + 1);
       return data.valid[static_cast<std::size_t>(k)] && std::find(from, to, true) == to;
     };
     std::vector<std::pair<int, int>> out;
@@ -271,7 +259,7 @@ void mask_and_segment(const std::vector<bool>& masked, ExperimentData& data) {
   for (const auto& [begin, end] : found) {
     (end - begin >= kLong ? in_long : in_short) += end - begin;
   }
-  if (in_long > in_short) found = stretches(kBehind);
+  if (in_long > in_short) found = stretches(kBeside);
   std::vector<bool> kept(data.valid.size(), false);
   for (const auto& [begin, end] : found) {
     if (!data.stretches.empty() && data.stretches.back().end == begin) {
@@ -285,42 +273,10 @@ void mask_and_segment(const std::vector<bool>& masked, ExperimentData& data) {
   data.valid = kept;
 }
 
-// A slow copy departs already where a step is still to come; what went before it is smooth: such
-// samples are no longer too fast, but where their own fit reaches into the step. Returns the part
-// of the experiment that each sample is of; parts are what steps part.
-std::vector<int> parts_between(std::vector<bool> steps, std::vector<bool>& too_fast) {
-  const auto n = static_cast<int>(steps.size());
-  const auto at = [](std::vector<bool>& flags, int k) {
-    return flags[static_cast<std::size_t>(k)];
-  };
-  // In the middle of a step the slow copy meets the samples.
-  for (int k = 0; k < n; ++k) {
-    if (!at(too_fast, k)) continue;
-    int next = std::min(k + kOwnReach + 1, n - 1);
-    while (next > k && !at(too_fast, next)) --next;
-    for (int i = k + 1; i < next; ++i) {
-      if (at(too_fast, i)) continue;
-      at(too_fast, i) = at(steps, i) = true;
-    }
-  }
-  std::vector<int> out(steps.size(), 0);
-  int part = 0;
-  bool was_step = false;
-  for (int k = 0; k < n; ++k) {
-    bool is_step = false;
-    for (int i = k; i <= std::min(k + kOwnReach, n - 1); ++i) is_step = is_step || at(steps, i);
-    if (is_step != was_step) ++part;
-    was_step = is_step;
-    out[static_cast<std::size_t>(k)] = part;
-    if (!is_step) at(too_fast, k) = false;
-  }
-  return out;
-}
-
 }  // namespace
 
-void add_slow(GridSignal& signal, double dt_s, const std::vector<int>* part) {
-  const LocalFit fit = local_fit(signal.value, signal.slope, dt_s, kSlowSigma_s, {.part = part});
+void add_slow(GridSignal& signal, double dt_s) {
+  const LocalFit fit = local_fit(signal.value, signal.slope, dt_s, kSlowSigma_s);
   signal.slow = fit.value;
   signal.slow_slope = fit.slope;
   signal.sharp = fit.value;
@@ -493,9 +449,6 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
   data.stop.assign(static_cast<std::size_t>(n), kNoStop);
   data.valid.assign(static_cast<std::size_t>(n), false);
   std::vector<bool> too_fast(static_cast<std::size_t>(n), false);
-  std::vector<bool> steps = too_fast, runs_away = too_fast;
-  const LocalFit before = local_fit(data.pressure.value, data.pressure.slope, data.dt_s,
-                                    kSlowSigma_s, {.ends_before = true});
   const auto usable = [](const GridSignal& signal, int k) {
     return !signal.present || std::isfinite(signal.value[k]);
   };
@@ -513,31 +466,16 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
                                   (data.omega_p.value[k] * data.omega_p.value[k]) -
                               data.omega_s.slope[k] / data.omega_p.value[k]) /
                              ratio;
-    data.valid[i] = data.pressure.present && force_N > kForceMin_N && data.torque.present &&
-                    usable(data.pressure, k) && usable(data.torque, k) &&
-                    usable(data.torque_s, k) && usable(data.command, k) &&
+    const double step_N =
+        variator.secondary_piston_area_m2 * (data.pressure.value[k] - data.pressure.slow[k]);
+    data.valid[i] = std::abs(slip) < kSlipMax + kSoftness_1_N * force_N &&
+                    std::abs(slip_rate) < kSlipRateMax_1_s && data.pressure.present &&
+                    force_N > kForceMin_N && data.torque.present && usable(data.pressure, k) &&
+                    usable(data.torque, k) && usable(data.torque_s, k) && usable(data.command, k) &&
                     usable(data.temperature, k) && usable(data.pressure_p, k) && !saturated[i];
-    runs_away[i] = !(std::abs(slip) < kSlipMax + kSoftness_1_N * force_N &&
-                     std::abs(slip_rate) < kSlipRateMax_1_s);
-    const auto departs_N = [&](double slow_Pa) {
-      return std::abs(variator.secondary_piston_area_m2 * (data.pressure.value[k] - slow_Pa));
-    };
-    const double most_N = kForceStepMax * force_N;
-    too_fast[i] = !(departs_N(data.pressure.slow[k]) < most_N);
-    steps[i] = too_fast[i] && !(departs_N(before.value[k]) < most_N);
-  }
-  const std::vector<int> part = parts_between(steps, too_fast);
-  for (GridSignal* signal : {&data.omega_p, &data.omega_s, &data.pressure, &data.torque,
-                             &data.torque_s, &data.pressure_p, &data.command}) {
-    add_slow(*signal, data.dt_s, &part);
+    too_fast[i] = !(std::abs(step_N) < kForceStepMax * force_N);
   }
   trim(data);
-  for (std::size_t k = 0; k < runs_away.size(); ++k) {  // and what the local fits take from there
-    const std::size_t last = std::min(k + 1, runs_away.size() - 1);
-    for (std::size_t i = k > 0 ? k - 1 : 0; i <= last; ++i) {
-      if (runs_away[i]) data.valid[k] = false;
-    }
-  }
   mask_and_segment(too_fast, data);
   widen_slow(data.pressure, data.dt_s);
   if (data.saturated_pressure) {

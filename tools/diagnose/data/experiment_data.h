@@ -59,9 +59,8 @@ struct ExperimentData {
 ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator,
                        Reaches reached = {});
 
-// Both slow copies, from value; part: which each sample is of, no copy reaches from one into
-// another.
-void add_slow(GridSignal& signal, double dt_s, const std::vector<int>* part = nullptr);
+// Both slow copies, from value.
+void add_slow(GridSignal& signal, double dt_s);
 
 // Slow copies over the widest of some windows that agrees with all narrower ones within their
 // noise: a signal that moves on straight lines is left with next to none of its noise. sharp is the
