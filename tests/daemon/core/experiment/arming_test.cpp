@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include <cmath>
 #include <functional>
 #include <random>
@@ -375,10 +377,14 @@ TEST_F(ArmingTest, TheFirstRequestSurvivesTheSteepestFallAndLaterOnesTheOneThatW
   Config c = config();
   c.experiment.fall_max_per_percent = 20e-3;
   Arming arming(c);
+  std::set<double> figures;  // nothing on the way to the one that is found is said
   for (int i = 0; i < 400; ++i) {
     now_.t += kSample;
     arming.step(now_);
+    const bool fall = arming.obstacle().wall == CrossingWall::kFall;
+    if (fall && !std::isnan(arming.obstacle().figure)) figures.insert(arming.obstacle().figure);
   }
+  EXPECT_EQ(figures.size(), 1U);
   EXPECT_EQ(arming.inhibits(), inhibit_bit(Inhibit::kRamp));
   EXPECT_EQ(arming.obstacle().wall, CrossingWall::kFall);
   EXPECT_NEAR(arming.obstacle().limit, 2.0, 1e-12);  // per unit of slip

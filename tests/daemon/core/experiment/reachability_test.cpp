@@ -396,5 +396,77 @@ TEST(Reachability, WhatIsNotCaughtIsTooMuchInEveryRespect) {
   EXPECT_GT(lost.area_s, 1e3);
 }
 
+// Each wall by another account: of every case, which one it is, and its figure.
+TEST(Reachability, TheWallIsTheFirstThatAnotherAccountMeets) {
+  int falls = 0, slips = 0, energies = 0, by_stops = 0;
+  for (const double fall : {0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 2.0, 3.0}) {
+    for (const double share_at_fault : {0.3, 1.0}) {
+      for (const double torque_Nm : {8.0, 15.0, 25.0, 34.0, 45.0}) {
+        for (const double omega_rad_s : {60.0, 104.0, 140.0, 250.0, 450.0}) {
+          for (const double peak : {0.02, 0.06, 0.07}) {
+            RampPoint p = point(torque_Nm, omega_rad_s);
+            p.fall = fall;
+            p.fall_at_fault = share_at_fault * fall;
+            p.peak_slip = peak;
+            // A controller with much reserve where the fault weighs as much as the fall.
+            if (share_at_fault == 1.0) p.own_force_N *= 3.0;
+            Reaction r = reaction(share_at_fault == 1.0 ? 0.04 : 0.08);
+            if (share_at_fault == 1.0) r.stale_s = 0.2;
+            CrossingSearch search = searched(p, r);
+            if (search.denied().wall == CrossingWall::kNone) continue;
+            // What is told stays as it is.
+            const CrossingDenied told = search.denied();
+            for (int i = 0; i < 5; ++i) search.tell();
+            EXPECT_EQ(search.denied().figure, told.figure);
+
+            const double silence_s = std::max(r.stale_s, r.timeout_s) + r.cycle_s;
+            Excursion steep, flat;
+            for (const bool fault : {false, true}) {
+              const double of = fault ? p.fall_at_fault : p.fall;
+              const double wait_s = fault ? silence_s : r.cycle_s;
+              const Excursion one = excursion(p, r, 0.02, of, 0.003, wait_s);
+              const Excursion other = excursion(p, r, 0.02, 0.05, 0.008, wait_s);
+              steep.slip = std::max({steep.slip, one.slip, other.slip});
+              steep.time_s = std::max(steep.time_s, one.time_s);
+              steep.area_s = std::max(steep.area_s, one.area_s);
+              flat.late_s = std::max(flat.late_s, other.late_s);
+            }
+            const double room = std::min(SlipLimits{}.slip_max,
+                                         SlipLimits{}.slip_speed_max_m_s / (omega_rad_s * 0.0784));
+            if (steep.slip >= 0.018) {
+              ++falls;
+              EXPECT_EQ(told.wall, CrossingWall::kFall) << steep.slip;
+              // To a sixty-fourth, by both of its cases.
+              const double share = told.figure / told.limit;
+              if (runs_on(p, r, 1.0) >= 0.018) {  // else a flat top does
+                EXPECT_GE(runs_on(p, r, share + 1.0 / 64.0), 0.018) << fall << share_at_fault;
+              }
+              if (share > 0.0) {
+                EXPECT_LT(runs_on(p, r, share), 0.018);
+              }
+            } else if (room - steep.slip <= peak) {
+              ++slips;
+              EXPECT_EQ(told.wall, CrossingWall::kSlip) << steep.slip;
+            } else {
+              ++energies;
+              ASSERT_EQ(told.wall, CrossingWall::kEnergy) << steep.slip;
+              const double turn_W = torque_Nm * omega_rad_s;
+              const double by_fall = turn_W * (peak * steep.time_s + steep.area_s);
+              const double by_stop =
+                  SlipLimits{}.energy_stop_J + turn_W * flat.late_s * (peak + steep.slip);
+              by_stops += by_stop > by_fall ? 1 : 0;
+              EXPECT_NEAR(told.figure, std::max(by_fall, by_stop), 1e-9 * told.figure);
+            }
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(falls, 20);
+  EXPECT_GT(slips, 10);
+  EXPECT_GT(energies, 5);
+  EXPECT_GT(by_stops, 1);
+}
+
 }  // namespace
 }  // namespace beltgrip::daemon
