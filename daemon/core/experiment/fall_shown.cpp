@@ -12,8 +12,9 @@ constexpr double kDeviations = 2.0;  // 95 % of a normal distribution
 // Derived: of points that lie on a line evenly, a tenth of a point of slip, spread 0.1 / sqrt(12).
 constexpr double kSpreadLeast_percent = 0.03;
 constexpr std::size_t kPointsLeast = 10;  // chosen: fewer tell little of their own noise
-// Measured: 45 slopes of one belt scatter by 4.1 times what their points' own scatter says, for
-// pressure and torque err for longer than a sample (build/tests/campaign --soak 0.5, without faults).
+// Measured: 45 slopes of one belt, in a drive of half an hour with the sensors of coast-overdrive,
+// scatter by 4.1 times what their points' own scatter says: pressure and torque err for longer than
+// a sample.
 constexpr double kSlowNoise = 4.0;
 // Chosen: a belt does not fall more steeply than it did by more than half; what it is taken for at
 // the least, per unit of slip.
