@@ -29,7 +29,7 @@ double least_whiteness(const Engine& engine) {
     const ResidualKind kind = acts_on == "torque"        ? kBalanceResidual
                               : acts_on == "clamp force" ? kTrackingResidual
                                                          : kFrictionResidual;
-    return by_kind[kind] > thresholds::kWander;
+    return by_kind[static_cast<std::size_t>(kind)] > thresholds::kWander;
   };
   double least = 1.0;
   for (const ResidualTest& each : test_residuals(engine, engine.state())) {
