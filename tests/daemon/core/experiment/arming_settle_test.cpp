@@ -201,7 +201,7 @@ TEST_F(Observing, SaysWhatEndsAnExperiment) {
 
 // It looks every tenth of a second, from 1.5 s on: the figure of a belt that slips ever more.
 TEST_F(Settling, LooksEveryTenthOfASecond) {
-  now_.shown = {1.0, 2.0, 0.0};
+  now_.shown = {1.0, 2.0, {}};
   now_.slip_percent = 1.5;
   step();
   const MonoTime held = now_.t;
@@ -236,7 +236,7 @@ TEST_F(Settling, AnInterruptionForgetsWhatWasFound) {
   EXPECT_FALSE(arming_.cleared());
   EXPECT_FALSE(arming_.settled());  // before it has looked
   now_.slip_percent = 3.0;
-  now_.shown = {1.0, 2.0, 0.0};
+  now_.shown = {1.0, 2.0, {}};
   hold(2 * kSecond);
   ASSERT_EQ(arming_.inhibits(), inhibit_bit(Inhibit::kGrip));
   interrupt();
