@@ -82,6 +82,7 @@ class Across {
   void note(std::string text) { found_.push_back({Weight::kNote, std::move(text)}); }
 
   std::vector<double> ratio_of(Role above, Role below, bool closed_only) const;
+  double slipped_beyond_share() const;
   bool is_bound(Role role) const {
     return std::any_of(config_.roles.begin(), config_.roles.end(),
                        [role](const daemon::RoleBinding& each) { return each.role == role; });
@@ -143,6 +144,36 @@ std::vector<double> Across::ratio_of(Role above, Role below, bool closed_only) c
     ratios.push_back(window[above] / window[below]);
   }
   return ratios;
+}
+
+// Share of the windows that lie beyond the end stops with so much more torque for their pressure
+// than those at a stop that it is slip: a clamp was lowered past the peak.
+double Across::slipped_beyond_share() const {
+  const double low = config_.variator.ratio_low, overdrive = config_.variator.ratio_overdrive;
+  std::vector<double> loads_at_stop, loads_beyond;
+  std::size_t turning = 0;
+  for (const Window& window : windows_) {
+    const double primary = window[Role::kPrimarySpeed], secondary = window[Role::kSecondarySpeed];
+    if (!(primary > kMoving_rad_s) || !(secondary > 0.0)) continue;
+    ++turning;
+    const double ratio = secondary / primary;
+    const double load = std::abs(window[torque_role()]) / window[Role::kSecondaryPressure];
+    if (!std::isfinite(load)) continue;
+    const bool with_torque =
+        ratio > 1.0 ? window[torque_role()] < 0.0 : window[torque_role()] > 0.0;
+    const bool beyond = ratio < low * (1.0 - kSlipBand) || ratio > overdrive * (1.0 + kSlipBand);
+    if (beyond && with_torque) {
+      loads_beyond.push_back(load);
+    } else if (std::abs(ratio / low - 1.0) < kSlipBand ||
+               std::abs(ratio / overdrive - 1.0) < kSlipBand) {
+      loads_at_stop.push_back(load);
+    }
+  }
+  if (loads_at_stop.size() < kWindowsLeast) return 0.0;
+  const double lowered = kLoweredLeast * quantile(loads_at_stop, 0.5);
+  const auto count = std::count_if(loads_beyond.begin(), loads_beyond.end(),
+                                   [lowered](double load) { return load >= lowered; });
+  return static_cast<double>(count) / static_cast<double>(std::max<std::size_t>(turning, 1));
 }
 
 // True: something is wrong with them, and what rests on them would accuse others.
@@ -219,8 +250,10 @@ bool Across::speeds() {
     } else if (mostly_beyond) {
       wrong(text + "a scale of one speed, or the end stops are another variator's");
     } else {
+      const double beyond_share = 1.0 - inside_share;
+      if (beyond_share - slipped_beyond_share() < 1.0 - kInStopsLeast) return false;
       doubt(text + format("%.0f %% of the time beyond them; a scale, or another variator's stops",
-                          100.0 * (1.0 - inside_share)));
+                          100.0 * beyond_share));
       return false;
     }
     return true;
@@ -478,10 +511,11 @@ double Across::most_against_percent() const {
 
 // Friction as read where the belt does not slip.
 void Across::carried() {
-  std::vector<double> friction;
+  std::vector<double> friction, slipping;
   for (const Window& window : windows_) {
     if (!std::isfinite(window.mu_star) || !(std::abs(window[torque_role()]) > 10.0)) continue;
     friction.push_back(window.mu_star);
+    if (window.slip_percent > kSlips_percent) slipping.push_back(window.mu_star);
   }
   if (friction.size() < kWindowsLeast) return;
   const double high = quantile(friction, 1.0 - kCarriedShare);
@@ -503,6 +537,15 @@ void Across::carried() {
                "clamp force would be %.0f times what it needs: unit of pressure (MPa for bar?) "
                "or torque, piston area",
                high, estimator::kBeltLeast / high));
+  } else if (slipping.size() >= kWindowsLeast &&
+             quantile(slipping, 1.0 - kCarriedShare) < estimator::kMuLeast) {
+    doubt(
+        format("the belt slips by %.0f %% and more where it is read as carrying a friction of %.3g "
+               "at most; belts have %.2f to %.2f: torque in percent or another unit, another "
+               "pressure, piston area or radius",
+               kSlips_percent, quantile(slipping, 1.0 - kCarriedShare), estimator::kBeltLeast,
+               estimator::kBeltMost) +
+        swapped_too() + "?");
   }
 }
 

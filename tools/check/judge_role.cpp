@@ -255,7 +255,7 @@ void Judge::rate() {
     }
   }
   const bool moves = is_required(binding_.role, config_);
-  if (moves && rate_Hz < kRateLeast_Hz) {
+  if (moves && rate_Hz < kRateMeasured * kRateLeast_Hz) {
     doubt(format("comes at %.3g Hz: slower than %.0f Hz tells little of slip", rate_Hz,
                  kRateLeast_Hz));
   }
@@ -320,9 +320,10 @@ void Judge::speed_level() {
   const double most = secondary ? kSecondaryMost_rad_s : kPrimaryMost_rad_s;
   const double high = at(0.99), low = at(0.01);
   if (high > most) {
-    wrong(text(high) + " (" + grouped(high * kPerMinute) +
-          " 1/min): no such shaft turns so fast; " +
-          (binding_.unit == "rad/s" ? "1/min read as rad/s?" : "unit or scale?"));
+    const bool in_rad_s = binding_.unit == "rad/s";
+    wrong(text(high) + (in_rad_s ? " (" + grouped(high * kPerMinute) + " 1/min)" : "") +
+          ": no such shaft turns so fast; " +
+          (in_rad_s ? "1/min read as rad/s?" : "unit or scale?"));
   }
   if (at(0.5) < -kStanding_rad_s) {
     wrong("below zero for most of the time (" + text(at(0.5)) + "): sign?");

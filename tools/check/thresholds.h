@@ -25,6 +25,8 @@ inline constexpr double kSilentLeast_s = 3.0, kSilentPeriods = 20.0;
 // Derived: the sampler waits for at most 50 ms (daemon/core/input/sampler.h), of a slower signal
 // the slope is followed.
 inline constexpr double kRateLeast_Hz = 10.0;
+// Chosen: a sender's clock and the pauses of a log make its rate in the mean come out lower.
+inline constexpr double kRateMeasured = 0.95;
 
 // --- values of one role -------------------------------------------------------------------------
 // Chosen: a few values at the edge of the range are the signal's "not available" at start-up.
@@ -128,6 +130,8 @@ inline constexpr double kSlipAgainst_percent = 1.5;
 // is back at its stop has come within half of the slip that is told (in ln).
 inline constexpr double kSteadySpeeds = 0.12;
 inline constexpr double kBackAtStop = 0.0075;
+// Derived: a stop that is known to half a percent and pulleys that bend by 2 % leave no such slip.
+inline constexpr double kSlips_percent = 3.0;
 // Chosen: half of what the highest known force floor leaves in a coast-down (7.6 kN at 33 Nm in
 // overdrive: 0.027); a bar read as MPa gives a tenth of 0.03 to 0.1.
 inline constexpr double kCarriedLeast = 0.015;

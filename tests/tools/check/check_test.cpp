@@ -111,6 +111,44 @@ TEST(Across, NothingSlipsAgainstTheTorque) {
       << all_of(found);
 }
 
+// The pressure is halved in the last fifth, and the belt slips by 22 %: the ratio is 28 % above the
+// stop. Without that pressure it is a ratio beyond the stops and nothing else.
+TEST(Across, WhatLiesBeyondAStopWithALoweredClampIsSlip) {
+  daemon::Config config;
+  config.estimator.torque_is_engine = false;
+  const auto beyond = [](double pressure_there_Pa) {
+    std::vector<Window> windows = coast_that_slips(-30.0);
+    for (std::size_t i = 0; i < windows.size(); ++i) {
+      const bool last = i >= 48;
+      const auto set = [&](Role role, double value) {
+        windows[i].mean[static_cast<std::size_t>(role)] = value;
+      };
+      const double primary = windows[i][Role::kPrimarySpeed];
+      set(Role::kSecondarySpeed, 2.25 / (last ? 0.78 : 1.0) * primary);
+      set(Role::kSecondaryPressure, last ? pressure_there_Pa : 0.8e6);
+      windows[i].mu_star = std::numeric_limits<double>::quiet_NaN();
+    }
+    return windows;
+  };
+  const std::string slipped = all_of(judge_across(beyond(0.4e6), config));
+  EXPECT_EQ(slipped.find("beyond them"), std::string::npos) << slipped;
+  const std::string held = all_of(judge_across(beyond(0.8e6), config));
+  EXPECT_NE(held.find("20 % of the time beyond them"), std::string::npos) << held;
+}
+
+// Slip of more than 3 % for four seconds at a third of the friction that belts have.
+TEST(Across, AFrictionThatNoBeltHasWhileItSlips) {
+  daemon::Config config;
+  config.estimator.torque_is_engine = false;
+  std::vector<Window> windows = coast_that_slips(-30.0);
+  for (Window& window : windows) window.mu_star /= 3.0;
+  const std::string found = all_of(judge_across(windows, config));
+  EXPECT_NE(found.find("slips by 3 % and more where it is read as carrying a friction of 0.03"),
+            std::string::npos)
+      << found;
+  EXPECT_NE(found.find("torque in percent"), std::string::npos) << found;
+}
+
 // On a bench in drive, at the overdrive stop (2.25): the pressure is halved and comes back, the
 // belt slips by 6 % in between. The ratio has left its stop then: no mu* is known.
 std::vector<Window> bench_that_slips(double torque_Nm, bool swapped) {
