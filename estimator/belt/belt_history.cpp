@@ -270,7 +270,6 @@ FusedFriction fuse(std::span<const BeltExperiment> experiments, Direction direct
   const Seen* held = nullptr;
   double held_z = 0.0;
   double constant = 0.0;
-  bool taken = false;
   for (std::size_t i = 0; i < window.count; ++i) {
     const Seen& seen = window.seen[i];
     if (i > 0) bank.age(seen.time_s - window.seen[i - 1].time_s, true);
@@ -285,18 +284,19 @@ FusedFriction fuse(std::span<const BeltExperiment> experiments, Direction direct
       bank.foresee(seen);
       bank.take(seen, true);
       held = nullptr;
+      fused.weighed = 2;
     } else if (std::abs(z) > kHold) {
       held = &seen;
       held_z = z;
-      continue;
     } else {
       bank.take(seen, true);
       held = nullptr;
+      ++fused.weighed;
     }
-    taken = true;
   }
   fused.experiments = static_cast<int>(window.count);
-  if (!taken) return fused;
+  fused.last_waits = held != nullptr;
+  if (fused.weighed == 0) return fused;
   const double age_s = now_s - window.seen[window.count - 1].time_s;
   if (age_s < -kDay_s) {
     bank.forget();

@@ -49,6 +49,8 @@ struct FusedFriction {
   double drift_percent_std = 0.0;      // 0: fewer than five experiments
   double torque_Nm = 0.0;              // mean magnitude
   int experiments = 0;                 // looked at
+  int weighed = 0;                     // of them: on which mu_max rests
+  bool last_waits = false;             // more than four deviations off: for a second on its side
 };
 
 struct LearnedFriction {

@@ -154,13 +154,13 @@ Verdict judge(const RoleWatch& watch, const std::vector<Window>& windows,
       if (seen && prospects.judged && prospects.opportunities > 0 && prospects.in_reach == 0) {
         verdict.sentence += ", not to command: " + forbidden;
       } else {
+        if (!reach.empty()) verdict.sentence += "; " + reach;
         for (const std::string& each : verdict.missing) {
           constexpr std::string_view kCommand = "to command: ";
           if (!each.starts_with(kCommand)) continue;
-          verdict.sentence += "; to command, this is missing: " + each.substr(kCommand.size());
+          verdict.sentence += ". To command, this is missing: " + each.substr(kCommand.size());
           break;
         }
-        if (!reach.empty()) verdict.sentence += "; " + reach;
       }
       break;
     case Ready::kCommand:

@@ -191,12 +191,14 @@ std::string notes_text(std::uint32_t notes, const char* separator) {
 std::string fused_text(const HistoryGroup& group) {
   std::string out;
   const estimator::FusedFriction& fused = group.fused;
-  out += format(
-      "%s, %s: mu_max %.4f, std %.4f, 95 %% %.4f .. %.4f, from %d experiments that "
-      "scatter by %.1f %%",
-      snake_case(direction_name(group.direction)).c_str(),
-      snake_case(end_stop_name(group.end_stop)).c_str(), fused.mu_max, fused.mu_max_std,
-      fused.ci95_low, fused.ci95_high, fused.experiments, fused.repeatability_percent);
+  out += format("%s, %s: mu_max %.4f, std %.4f, 95 %% %.4f .. %.4f, from %d experiment%s",
+                snake_case(direction_name(group.direction)).c_str(),
+                snake_case(end_stop_name(group.end_stop)).c_str(), fused.mu_max, fused.mu_max_std,
+                fused.ci95_low, fused.ci95_high, fused.weighed, fused.weighed == 1 ? "" : "s");
+  if (fused.weighed > 1) {
+    out += format(" that scatter by %.1f %%", fused.repeatability_percent);
+  }
+  if (fused.last_waits) out += "; the last lies far off and counts when another one agrees with it";
   if (fused.drift_percent_std > 0.0) {
     out += format("; drift %+.3f +- %.3f %% an experiment", fused.drift_percent,
                   fused.drift_percent_std);

@@ -13,6 +13,8 @@ namespace {
 
 constexpr int kLinesLooked = 60;
 constexpr std::size_t kColumnsLeast = 3;
+constexpr std::size_t kNameLongest =
+    64;  // chosen: a signal's long name and its unit; prose is longer
 
 std::string_view trimmed(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r\"";
@@ -34,7 +36,8 @@ std::vector<std::string> cells_of(std::string_view line, char separator) {
 // Names, no numbers.
 bool is_head(const std::vector<std::string>& cells) {
   const auto named = std::count_if(cells.begin(), cells.end(), [](const std::string& cell) {
-    return !cell.empty() && std::isalpha(static_cast<unsigned char>(cell.front())) != 0;
+    return !cell.empty() && cell.size() <= kNameLongest &&
+           std::isalpha(static_cast<unsigned char>(cell.front())) != 0;
   });
   return cells.size() >= kColumnsLeast && 10 * named >= 9 * static_cast<long>(cells.size());
 }
@@ -43,6 +46,18 @@ bool is_time(std::string cell) {
   for (char& c : cell) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   return cell == "t" || cell.starts_with("t[") || cell.starts_with("t_") ||
          cell.starts_with("time");
+}
+
+// Below the names of a table stand cells, as many: prose and other formats have no such line.
+bool row_follows(std::ifstream& file, std::size_t cells, char separator) {
+  const std::ifstream::pos_type here = file.tellg();
+  std::string line;
+  while (std::getline(file, line) && line.empty()) {
+  }
+  const bool follows = cells_of(line, separator).size() == cells;
+  file.clear();
+  file.seekg(here);
+  return follows;
 }
 
 // "; it looks like a table of ..."; empty where the beginning of the file does not look like one.
@@ -55,7 +70,7 @@ std::string table_hint(const std::string& path) {
     if (line.empty() || line.front() == '#') continue;
     for (const char separator : {',', ';', '\t'}) {
       const std::vector<std::string> cells = cells_of(line, separator);
-      if (!is_head(cells)) continue;
+      if (!is_head(cells) || !row_follows(file, cells.size(), separator)) continue;
       const bool timed = std::any_of(cells.begin(), cells.end(), is_time);
       return "; it looks like a table of " + std::to_string(cells.size()) + " signals" +
              (timed ? "" : " without a time column") + ": expected a " + kLogKinds;

@@ -211,11 +211,16 @@ TEST(Fusion, OneOutlierWaitsForASecond) {
   history.push_back(experiment(0.08, 0.3));
   EXPECT_NEAR(fused(history).mu_max, 0.1, 0.0003);
   EXPECT_EQ(notes_on_last(history, kBegin_s), note_bit(Note::kOutlier));
+  EXPECT_EQ(fused(history).weighed, 20);
+  EXPECT_TRUE(fused(history).last_waits);
   history.push_back(experiment(0.0802, 0.3));
   EXPECT_NEAR(fused(history).mu_max, 0.0801, 0.0005);
+  EXPECT_EQ(fused(history).weighed, 2);
+  EXPECT_FALSE(fused(history).last_waits);
   history.pop_back();
   history.push_back(experiment(0.1001, 0.3));
   EXPECT_NEAR(fused(history).mu_max, 0.1, 0.0003);
+  EXPECT_EQ(fused(history).weighed, 21);
   EXPECT_EQ(notes_on_last(history, kBegin_s), 0U);
 }
 
