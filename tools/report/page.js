@@ -14,7 +14,9 @@ const colourOf = (name) => {
   return colours[names.indexOf(name) % colours.length];
 };
 
-// What is not in sight is drawn once it comes there, or before it is printed.
+// The first are drawn with the page, so that who takes its picture at once has them. What is not in
+// sight of the rest is drawn once it comes there, or before it is printed.
+const atOnce = 24;
 const waiting = new Map();
 const drawWaiting = (element) => {
   const draw = waiting.get(element);
@@ -25,7 +27,9 @@ const drawWaiting = (element) => {
 const observer = new IntersectionObserver(
   (entries) => entries.filter((e) => e.isIntersecting).forEach((e) => drawWaiting(e.target)),
   {rootMargin: '600px'});
+let asked = 0;
 const drawInSight = (element, draw) => {
+  if (asked++ < atOnce) return draw();
   waiting.set(element, draw);
   observer.observe(element);
 };
