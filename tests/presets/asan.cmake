@@ -1,0 +1,5 @@
+# cmake -S . -B build-clang -G Ninja -C tests/presets/asan.cmake: address and undefined-behaviour
+# sanitizers, with the fuzzers.
+include(${CMAKE_CURRENT_LIST_DIR}/clang.cmake)
+set(BELTGRIP_SANITIZE address,undefined CACHE STRING "" FORCE)
+set(BELTGRIP_FUZZ ON CACHE BOOL "" FORCE)
