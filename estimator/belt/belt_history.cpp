@@ -353,38 +353,88 @@ WearTest compare(std::span<const double> before, std::span<const double> after) 
   return test;
 }
 
-WearTest wear(std::span<const BeltExperiment> experiments, Direction direction, EndStop end_stop) {
-  constexpr double kOilReach_K = 10.0;
-  constexpr double kReach = 0.2;
-  std::array<double, kWearAfter> after{};
-  std::array<double, kBeforeMax> before{};
-  std::size_t after_count = 0, before_count = 0;
-  double oil_degC = 0.0, torque_Nm = 0.0, omega_rad_s = 0.0;
-  for (std::size_t i = experiments.size(); i-- > 0 && before_count < kBeforeMax;) {
-    const BeltExperiment& each = experiments[i];
-    if (!counts(each, direction, end_stop)) continue;
-    if (after_count < kWearAfter) {
-      after[after_count++] = std::log(each.mu_max);
-      oil_degC += each.oil_degC / static_cast<double>(kWearAfter);
-      torque_Nm += each.torque_Nm / static_cast<double>(kWearAfter);
-      omega_rad_s += each.omega_p_rad_s / static_cast<double>(kWearAfter);
-      continue;
-    }
+namespace {
+
+// What an experiment must be like to be held against the last five.
+class Conditions {
+ public:
+  void take(const BeltExperiment& each) {
+    oil_degC_ += each.oil_degC;
+    torque_Nm_ += each.torque_Nm;
+    omega_rad_s_ += each.omega_p_rad_s;
+    count_ += 1.0;
+  }
+  bool equal(const BeltExperiment& each) const {
+    constexpr double kOilReach_K = 10.0;
+    constexpr double kReach = 0.2;
+    const double oil_degC = oil_degC_ / count_;
     const bool oil_differs = std::isfinite(oil_degC) && std::isfinite(each.oil_degC) &&
                              std::abs(each.oil_degC - oil_degC) > kOilReach_K;
-    if (oil_differs || !near(each.torque_Nm, torque_Nm, kReach) ||
-        !near(each.omega_p_rad_s, omega_rad_s, kReach)) {
+    return !oil_differs && near(each.torque_Nm, torque_Nm_ / count_, kReach) &&
+           near(each.omega_p_rad_s, omega_rad_s_ / count_, kReach);
+  }
+
+ private:
+  double oil_degC_ = 0.0, torque_Nm_ = 0.0, omega_rad_s_ = 0.0, count_ = 0.0;
+};
+
+// The last five values of a group and those before under their conditions; newest first.
+struct Comparable {
+  std::array<double, kWearAfter + kBeforeMax> ln_mu{};
+  std::array<std::size_t, kWearAfter + kBeforeMax> place{};  // in the history
+  std::size_t count = 0;
+  std::size_t after() const { return std::min(count, kWearAfter); }
+  std::size_t before() const { return count - after(); }
+};
+
+Comparable comparable(std::span<const BeltExperiment> experiments, Direction direction,
+                      EndStop end_stop) {
+  Comparable all;
+  Conditions last;
+  for (std::size_t i = experiments.size(); i-- > 0 && all.count < all.ln_mu.size();) {
+    const BeltExperiment& each = experiments[i];
+    if (!counts(each, direction, end_stop)) continue;
+    if (all.count < kWearAfter) {
+      last.take(each);
+    } else if (!last.equal(each)) {
       continue;
     }
-    before[before_count++] = std::log(each.mu_max);
+    all.ln_mu[all.count] = std::log(each.mu_max);
+    all.place[all.count++] = i;
   }
-  if (after_count < kWearAfter || before_count < kWearBeforeMin) {
+  return all;
+}
+
+}  // namespace
+
+WearTest wear(std::span<const BeltExperiment> experiments, Direction direction, EndStop end_stop) {
+  const Comparable all = comparable(experiments, direction, end_stop);
+  if (all.after() < kWearAfter || all.before() < kWearBeforeMin) {
     WearTest test;
-    test.before = static_cast<int>(before_count);
-    test.after = static_cast<int>(after_count);
+    test.before = static_cast<int>(all.before());
+    test.after = static_cast<int>(all.after());
     return test;
   }
-  return compare({before.data(), before_count}, {after.data(), after_count});
+  return compare({all.ln_mu.data() + kWearAfter, all.before()}, {all.ln_mu.data(), kWearAfter});
+}
+
+WearStep wear_step(std::span<const BeltExperiment> experiments, Direction direction,
+                   EndStop end_stop) {
+  constexpr std::size_t kLeast = 2;
+  const Comparable all = comparable(experiments, direction, end_stop);
+  WearStep step;
+  double ways = 0.0;
+  for (std::size_t after = kLeast; after + kLeast <= all.count; ++after) {
+    const WearTest test =
+        compare({all.ln_mu.data() + after, all.count - after}, {all.ln_mu.data(), after});
+    ways += 1.0;
+    if (step.test.judged && test.p_value >= step.test.p_value) continue;
+    step.test = test;
+    step.first = all.place[after - 1];
+  }
+  step.test.p_value = std::min(1.0, step.test.p_value * std::max(1.0, ways));
+  step.test.found = step.test.judged && step.test.p_value < kStepFalseAlarm;
+  return step;
 }
 
 std::uint32_t notes_on_last(std::span<const BeltExperiment> experiments, double now_s) {

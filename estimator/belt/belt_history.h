@@ -107,6 +107,17 @@ struct WearTest {
   int before = 0;
   int after = 0;
 };
+// Where friction fell: of all ways to part the last kBeforeMax + kWearAfter experiments of a group,
+// under the conditions of the last five, in those before and those after, two at least on either
+// side, the one that Student's test finds least like chance. The p-value counts how many ways were
+// tried. Found below kStepFalseAlarm: it is asked beside `wear`, which keeps its own 1 %.
+inline constexpr double kStepFalseAlarm = 0.002;
+struct WearStep {
+  WearTest test;          // of that way
+  std::size_t first = 0;  // after it, in `experiments`
+};
+WearStep wear_step(std::span<const BeltExperiment> experiments, Direction direction,
+                   EndStop end_stop);
 // ln(mu_max) of both sides; at least two values each.
 WearTest compare(std::span<const double> before, std::span<const double> after);
 WearTest wear(std::span<const BeltExperiment> experiments, Direction direction, EndStop end_stop);

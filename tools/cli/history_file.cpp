@@ -83,27 +83,16 @@ daemon::CarriedBounds carried_beside(const History& history) {
   return {};
 }
 
-// Of the values that the wear test holds against those before.
-const HistoryRow* first_of_the_last(const History& history, Direction direction, EndStop end_stop) {
-  std::size_t left = estimator::kWearAfter;
-  for (std::size_t i = history.rows.size(); i-- > 0;) {
-    const HistoryRow& row = history.rows[i];
-    if (row.fingerprint != history.fingerprint || row.result.direction != direction ||
-        row.result.end_stop != end_stop || belt_experiment(row).kind != PeakKind::kValue) {
-      continue;
-    }
-    if (--left == 0) return &row;
-  }
-  return nullptr;
-}
-
 // As of the last experiment, so that the same file gives the same answer on any day.
 void judge(History& history) {
   if (history.rows.empty()) return;
   history.fingerprint = history.rows.back().fingerprint;
   std::vector<estimator::BeltExperiment> experiments;
+  std::vector<const HistoryRow*> rows;  // of the experiments
   for (const HistoryRow& row : history.rows) {
-    if (row.fingerprint == history.fingerprint) experiments.push_back(belt_experiment(row));
+    if (row.fingerprint != history.fingerprint) continue;
+    experiments.push_back(belt_experiment(row));
+    rows.push_back(&row);
   }
   history.comparable = experiments.size();
   for (const Direction direction : {Direction::kDrive, Direction::kOverrun}) {
@@ -111,7 +100,14 @@ void judge(History& history) {
       HistoryGroup group{direction, end_stop,
                          fuse(experiments, direction, end_stop, history.rows.back().time_s),
                          wear(experiments, direction, end_stop)};
-      if (group.wear.judged) group.since = first_of_the_last(history, direction, end_stop);
+      const estimator::WearStep step = wear_step(experiments, direction, end_stop);
+      if (group.wear.found || step.test.found) {
+        const double p_value = std::min(group.wear.p_value, step.test.p_value);
+        group.wear = step.test;
+        group.wear.p_value = p_value;
+        group.wear.found = true;
+        group.since = rows[step.first];
+      }
       if (group.fused.known) history.groups.push_back(group);
     }
   }

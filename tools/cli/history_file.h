@@ -19,8 +19,9 @@ struct HistoryGroup {
   estimator::Direction direction;
   estimator::EndStop end_stop;
   estimator::FusedFriction fused;
+  // The last five against those before; where friction has fallen, what is after its fall.
   estimator::WearTest wear;
-  const daemon::HistoryRow* since = nullptr;  // the first of those that the wear test compares
+  const daemon::HistoryRow* since = nullptr;  // the first after it; null where it has not fallen
 };
 
 struct History {

@@ -141,6 +141,47 @@ TEST(Wear, EqualConditionsOnly) {
   EXPECT_FALSE(found().judged);
 }
 
+// Friction fell by 5 % after so many experiments, and stayed: the place and the size of the fall
+// are told whatever came after it.
+TEST(Wear, TheStepIsFoundWhereItIs) {
+  std::mt19937_64 random(8);
+  std::normal_distribution<double> normal;
+  const auto history = [&](int before, int after) {
+    std::vector<BeltExperiment> all;
+    for (int i = 0; i < before + after; ++i) {
+      const double level = i < before ? 0.105 : 0.105 * 0.95;
+      all.push_back(experiment(level * std::exp(0.002 * normal(random)), 0.3));
+    }
+    return all;
+  };
+  for (const auto& [before, after] :
+       {std::pair{10, 2}, {10, 4}, {10, 6}, {10, 10}, {4, 3}, {5, 30}}) {
+    const std::vector<BeltExperiment> all = history(before, after);
+    const WearStep step = wear_step(all, Direction::kDrive, EndStop::kOverdrive);
+    EXPECT_TRUE(step.test.found) << before << " + " << after;
+    EXPECT_EQ(step.first, static_cast<std::size_t>(before)) << before << " + " << after;
+    EXPECT_EQ(step.test.after, after);
+    EXPECT_NEAR(step.test.change_percent, -5.0, 0.7) << before << " + " << after;
+  }
+  EXPECT_FALSE(wear_step(history(2, 1), Direction::kDrive, EndStop::kOverdrive).test.judged);
+  EXPECT_FALSE(wear_step(history(5, 5), Direction::kOverrun, EndStop::kOverdrive).test.judged);
+}
+
+TEST(Wear, AStepIsSeldomFoundWhereThereIsNone) {
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> normal;
+  constexpr int kBelts = 4000;
+  int found = 0;
+  for (int i = 0; i < kBelts; ++i) {
+    std::vector<BeltExperiment> all;
+    for (int k = 0; k < 4 + i % 16; ++k) {
+      all.push_back(experiment(0.105 * std::exp(0.01 * normal(random)), 0.3));
+    }
+    found += wear_step(all, Direction::kDrive, EndStop::kOverdrive).test.found;
+  }
+  EXPECT_LE(found, 0.003 * kBelts);  // 0.2 % at most, and what 4,000 belts scatter by
+}
+
 // --- fusion -----------------------------------------------------------------------------------
 
 struct Belt {

@@ -72,6 +72,25 @@ TEST_F(History, Table) {
   EXPECT_NE(result.out.find("1 experiments under other configurations"), std::string::npos);
 }
 
+// Ten experiments after the fall, and four: the words name the first after it both times.
+TEST_F(History, WearIsToldWhereItBegan) {
+  for (const int after : {4, 10}) {
+    Workplace belt;
+    const auto opened = HistoryDb::open(belt.path("history.db"));
+    std::string why;
+    for (int i = 1; i <= 10 + after; ++i) {
+      HistoryRow each = row(i, (i <= 10 ? 0.105 : 0.0945) + 1e-4 * (i % 3));
+      ASSERT_TRUE(opened.db->append(each, why)) << why;
+    }
+    const RunResult result = beltgrip({"history", belt.path("")});
+    EXPECT_NE(result.out.find("\n  10.0 % less friction since experiment 11 ("), std::string::npos)
+        << result.out;
+    EXPECT_NE(result.out.find("the last " + std::to_string(after) + " against 10 before: -10"),
+              std::string::npos)
+        << result.out;
+  }
+}
+
 // The same log, recorded so many seconds later.
 std::string later(const std::string& log, long seconds) {
   std::istringstream in(log);
