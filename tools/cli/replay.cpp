@@ -65,6 +65,7 @@ void run_task(Task& task, const Options& options, const daemon::Config& config,
   try {
     task.result =
         replay(task.paths, options.interface, config, outputs, options.whether_as_recorded());
+    task.result->stopped = stop_asked();
   } catch (const Failure& failure) {
     task.failure = failure;
   } catch (const std::exception& error) {
@@ -313,7 +314,7 @@ void run(const Options& options) {
         }
         any = true;
         frames += task.result->frames;
-        if (resumed && !stop_asked() &&
+        if (resumed && !task.result->stopped &&
             !resumed->append(experiment_lines(*task.result) + summary_line(*task.result))) {
           text::complain(options.json + ": cannot write");
           exit_code = kCannotWrite;

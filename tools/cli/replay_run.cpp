@@ -103,17 +103,35 @@ class Sink final : public daemon::SampleSink {
 
  private:
   void count_inhibits(const daemon::SampleReport& report, std::int64_t samples) noexcept {
-    if (report.in_experiment || (report.inhibits & kFeet) != 0) return;
-    result_.beyond.take(report.beyond);
+    if (report.in_experiment) return;
+    const bool by_feet = is_by_feet(report.inhibits);
+    if (!by_feet) result_.beyond.take(report.beyond);
     for (std::size_t i = 0; i < daemon::kInhibitCount; ++i) {
       if ((report.inhibits >> i & 1) == 0) continue;
-      double& held_s = result_.inhibited_s[i];
-      const bool shown = held_s >= kShownInhibit_s;
+      // The figure is that of without a foot on a pedal, where there is such a time, and taken
+      // again as the time doubles: of most of it, not of how it began.
+      double& held_s = by_feet ? by_feet_s_[i] : result_.inhibited_s[i];
+      double& figure_s = by_feet ? figure_by_feet_s_[i] : figure_s_[i];
       held_s += static_cast<double>(samples) * period_s_;
-      if (shown || held_s < kShownInhibit_s) continue;
+      if (held_s < std::max(kShownInhibit_s, 2.0 * figure_s)) continue;
+      if (by_feet && figure_s_[i] > 0.0) continue;
+      figure_s = held_s;
       result_.inhibit_figures[i] = daemon::figure_of(static_cast<daemon::Inhibit>(i), config_,
                                                      report, daemon::signals_of(pipeline_));
     }
+  }
+
+  // Where the inputs forbid an experiment nothing else is looked at: the pedals are asked here.
+  bool is_by_feet(std::uint32_t inhibits) const noexcept {
+    if ((inhibits & kFeet) != 0) return true;
+    if ((inhibits & daemon::inhibit_bit(daemon::Inhibit::kInputs)) == 0) return false;
+    const auto pressed = [&](daemon::Role role, double most) {
+      const daemon::SignalObservation signal = pipeline_.signal(role);
+      return signal.seen && signal.value > most;
+    };
+    const bool coast = config_.trigger == daemon::Trigger::kCoastDown;
+    return (coast && pressed(daemon::Role::kAcceleratorPedal, daemon::Arming::kPedalReleased)) ||
+           pressed(daemon::Role::kBrakePressed, 0.5);
   }
 
   std::string lost_now() const {
@@ -137,16 +155,17 @@ class Sink final : public daemon::SampleSink {
     row_.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
   }
 
-  static constexpr std::uint32_t kFeet = daemon::inhibit_bit(daemon::Inhibit::kPedal) |
-                                         daemon::inhibit_bit(daemon::Inhibit::kBrake) |
-                                         daemon::inhibit_bit(daemon::Inhibit::kInputs);
+  static constexpr std::uint32_t kFeet =
+      daemon::inhibit_bit(daemon::Inhibit::kPedal) | daemon::inhibit_bit(daemon::Inhibit::kBrake);
 
   ReplayResult& result_;
   const daemon::Pipeline& pipeline_;
   const daemon::Config& config_;
   std::FILE* trace_;
   signals::SignalWriter* signals_;
-  std::vector<double> values_;  // of one sample
+  std::vector<double> values_;                             // of one sample
+  std::array<double, daemon::kInhibitCount> by_feet_s_{};  // as ReplayResult.inhibited_s
+  std::array<double, daemon::kInhibitCount> figure_s_{}, figure_by_feet_s_{};  // at the last figure
   daemon::SampleSink* also_;
   std::function<void(const ReplayResult&)> on_result_;
   double period_s_;
@@ -507,6 +526,7 @@ std::string summary_line(const ReplayResult& result) {
       .field("lines_bad", result.lines_bad)
       .key("duration_s")
       .raw(text::seconds_text(result.duration_ns))
+      .field("stopped", result.stopped)
       .key("requests_followed");
   if (result.requests_followed) {
     json.value(result.requests_followed->size());

@@ -38,6 +38,7 @@ struct ReplayResult {
   // Clamp requests of the log that were followed; none: it was decided anew when to ask.
   std::optional<std::vector<daemon::RecordedRequest>> requests_followed;
   std::string unusable;      // what was wrong with the inputs in the end; empty: nothing
+  bool stopped = false;      // by a signal, before its end
   daemon::BeyondBox beyond;  // while no experiment ran and the driver's feet did not forbid one
   // What was carried without slip.
   std::vector<daemon::CarriedWindow> carried_windows;
@@ -45,7 +46,7 @@ struct ReplayResult {
   // How long each daemon::Inhibit kept an experiment from beginning while the driver's feet did
   // not, triggers "coast_down" and "steady".
   std::array<double, daemon::kInhibitCount> inhibited_s{};
-  std::array<std::string, daemon::kInhibitCount> inhibit_figures;  // when it first had
+  std::array<std::string, daemon::kInhibitCount> inhibit_figures;  // of most of it
 };
 
 struct ReplayOutputs {

@@ -27,7 +27,9 @@ std::string number(const char* pattern, auto... values) {
 constexpr std::size_t kFirstInhibit = 1, kFirstFault = kFirstInhibit + daemon::kInhibitCount;
 
 std::uint64_t standing(const daemon::SampleReport& report) {
-  return (report.in_experiment ? 1U : 0U) | std::uint64_t{report.inhibits} << kFirstInhibit |
+  // What would keep another one from beginning while one runs is no hindrance.
+  const std::uint32_t inhibits = report.in_experiment ? 0U : report.inhibits;
+  return (report.in_experiment ? 1U : 0U) | std::uint64_t{inhibits} << kFirstInhibit |
          std::uint64_t{report.faults} << kFirstFault;
 }
 

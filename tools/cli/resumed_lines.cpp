@@ -15,12 +15,14 @@ namespace {
 
 constexpr std::string_view kBegin = "{";
 
-// The name of the log if the line is a summary; empty for an experiment. False: neither.
+// The name of the log if the line is a summary; empty for an experiment, and where a signal ended
+// the run before the log's end. False: neither.
 bool read_line(const std::string& line, std::string& log) {
   const auto values = nlohmann::json::parse(line, nullptr, false);
   if (!values.is_object() || !values.contains("type") || !values.contains("log")) return false;
   if (!values["log"].is_string()) return false;
-  if (values["type"] == "summary") log = values["log"].get<std::string>();
+  const bool whole = !values.value("stopped", false);
+  if (values["type"] == "summary" && whole) log = values["log"].get<std::string>();
   return values["type"] == "summary" || values["type"] == "experiment";
 }
 

@@ -38,14 +38,14 @@ void add_drive(HtmlPage& page, Drive drive) {
   panel("traction coefficient",
         {{"mu*", std::move(drive.mu_star)}, {"mu_max", std::move(drive.mu_max), Style::kSteps}});
   panel("slip, %", {{"sigma*", std::move(drive.sigma_star_percent)}});
-  panel("slip energy so far, J", {{"energy", std::move(drive.slip_energy_J)}});
+  panel("slip energy so far, before the peak too, J", {{"energy", std::move(drive.slip_energy_J)}});
   panel("torque, Nm", {{"as measured", std::move(drive.torque_Nm)},
                        {"on the belt", std::move(drive.belt_torque_Nm)}});
   panel("speed, rad/s", {{"primary", std::move(drive.primary_speed_rad_s)},
                          {"secondary", std::move(drive.secondary_speed_rad_s)}});
   page.courses(courses);
-  page.table({"what the belt went through", "slip known for, s", "slip energy, J", "slip path, m",
-              "slip up to, %"},
+  page.table({"what the belt went through", "slip known for, s",
+              "slip energy, before the peak too, J", "slip path, m", "slip up to, %"},
              {wear_row("while an experiment ran or could have begun", drive.whole),
               wear_row("while one ran", drive.in_experiments)});
   if (!drive.reasons.empty()) page.table(kReasonHeader, drive.reasons);

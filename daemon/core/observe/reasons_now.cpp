@@ -48,6 +48,21 @@ bool is_of_obstacle(Inhibit inhibit, std::uint32_t inhibits) {
   return false;
 }
 
+// Every signal is there, and yet the belt cannot be read: what that rests on.
+std::string belt_unread(const Config& config, const Signals& signals) {
+  const auto of = [&](Role role) { return signals[static_cast<std::size_t>(role)]; };
+  const Role torque =
+      config.estimator.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque;
+  const double primary_rad_s = of(Role::kPrimarySpeed).value;
+  std::string text = format("torque %.3g Nm", of(torque).value);
+  if (primary_rad_s > 0.0) {
+    text += format(", ratio %.3f, end stops %.4g and %.4g",
+                   of(Role::kSecondarySpeed).value / primary_rad_s, config.variator.ratio_low,
+                   config.variator.ratio_overdrive);
+  }
+  return text;
+}
+
 }  // namespace
 
 Signals signals_of(const Pipeline& pipeline) {
@@ -67,13 +82,15 @@ std::string figure_of(Inhibit inhibit, const Config& config, const SampleReport&
   const auto of = [&](Role role) { return signals[static_cast<std::size_t>(role)]; };
   const ExperimentSettings limits = begins_within(config);
   switch (inhibit) {
-    case Inhibit::kInputs:
-      return roles_with(
+    case Inhibit::kInputs: {
+      const std::string lost = roles_with(
           signals,
           [](SignalQuality each) {
             return each != SignalQuality::kValid && each != SignalQuality::kUnbound;
           },
           true);
+      return lost.empty() ? belt_unread(config, signals) : lost;
+    }
     case Inhibit::kFault:
       return fault_names(report.faults);
     case Inhibit::kPedal:

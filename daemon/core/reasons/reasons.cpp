@@ -25,7 +25,7 @@ constexpr std::array<InhibitRow, kInhibitCount> kInhibitWords{{
       "nothing where it comes and goes with the pedals; else `beltgrip status can0` shows each "
       "role "
       "with its age; is the right interface, DBC and message named?"}},
-    {Inhibit::kFault, {"a fault that forbids requests (below)", "mend the fault"}},
+    {Inhibit::kFault, {"a fault that forbids requests", "mend the fault"}},
     {Inhibit::kPermission,
      {"`experiment_permitted` is 0", "the controller withholds it; ask it why"}},
     {Inhibit::kPedal,

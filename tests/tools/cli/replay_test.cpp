@@ -480,6 +480,14 @@ TEST_F(Replay, ResumesWhereItEnded) {
     EXPECT_EQ(result.status, 0) << result.err;
     EXPECT_EQ(place_->read("grows.jsonl"), whole) << size;
   }
+  // A signal ended the run within the third log: it is read again.
+  const std::size_t mark = whole.rfind("\"stopped\":false");
+  ASSERT_NE(mark, std::string::npos);
+  place_->write("grows.jsonl", whole.substr(0, mark) + "\"stopped\":true" +
+                                   whole.substr(mark + std::string("\"stopped\":false").size()));
+  const RunResult cut = replay(all, "grows.jsonl");
+  EXPECT_NE(cut.err.find("2 of 3 logs are done"), std::string::npos) << cut.err;
+  EXPECT_EQ(place_->read("grows.jsonl"), whole);
   // One that cannot be read costs a line each time, and the others stand.
   const RunResult missing = replay({"one.log", "none.log", "two.log"}, "missing.jsonl");
   EXPECT_EQ(missing.status, 66);

@@ -152,10 +152,11 @@ TEST_F(Hour, TheMouseZoomsToEverySampleAndBack) {
   expect_no_complaint();
 }
 
-// For how many samples each inhibit stood, by `--signals-out`: its column has a bit for each.
+// For how many samples each inhibit stood while no experiment ran, by `--signals-out`: its column
+// has a bit for each, behind that of the experiment.
 std::array<double, daemon::kInhibitCount> samples_inhibited(const std::string& csv) {
   std::istringstream in(csv);
-  std::string line, cell;
+  std::string line, cell, before;
   std::getline(in, line);
   std::size_t column = 0;
   std::istringstream head(line);
@@ -164,7 +165,11 @@ std::array<double, daemon::kInhibitCount> samples_inhibited(const std::string& c
   std::array<double, daemon::kInhibitCount> samples{};
   while (std::getline(in, line)) {
     std::istringstream row(line);
-    for (std::size_t i = 0; i <= column; ++i) std::getline(row, cell, ',');
+    for (std::size_t i = 0; i <= column; ++i) {
+      before = cell;
+      std::getline(row, cell, ',');
+    }
+    if (before == "1") continue;
     const auto bits = static_cast<std::uint32_t>(std::stoul(cell));
     for (std::size_t i = 0; i < samples.size(); ++i) samples[i] += bits >> i & 1U;
   }
