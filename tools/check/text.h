@@ -14,8 +14,10 @@ inline std::string format(const char* pattern, auto... values) {
   return line.data();
 }
 
-// "7,280"
+// "7,280"; what has more digits than a person counts as 1.2e+15.
 inline std::string grouped(double value) {
+  constexpr double kMost = 1e12;
+  if (std::abs(value) >= kMost) return format("%.2g", value);
   std::string digits = format("%.0f", std::abs(value));
   for (std::size_t at = digits.size(); at > 3; at -= 3) digits.insert(at - 3, ",");
   return (value < 0.0 && digits != "0" ? "-" : "") + digits;

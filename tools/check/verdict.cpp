@@ -195,9 +195,19 @@ void tell_doubts(Verdict& verdict) {
   for (const Findings& each : verdict.roles) add(each);
   add(verdict.across);
   if (doubts == 0 || verdict.ready == Ready::kNone) return;
-  verdict.sentence +=
-      doubts == 1 ? " But first look at the \"may be\" above."
-                  : " But first look at the " + std::to_string(doubts) + " \"may be\" above.";
+  const std::string look =
+      doubts == 1 ? "first look at the \"may be\" above."
+                  : "first look at the " + std::to_string(doubts) + " \"may be\" above.";
+  // A clamp is not lowered by signals that may be others.
+  constexpr std::string_view kReady = "Ready to command";
+  if (verdict.ready == Ready::kCommand && verdict.sentence.starts_with(kReady)) {
+    verdict.ready = Ready::kObserve;
+    verdict.sentence.replace(0, kReady.size(), "Ready to observe");
+    verdict.missing.push_back("to command: " + look);
+    verdict.sentence += " To command, " + look;
+    return;
+  }
+  verdict.sentence += " But " + look;
 }
 
 }  // namespace beltgrip::check

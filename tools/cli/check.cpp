@@ -184,7 +184,7 @@ check::Findings constants(const std::vector<std::string>& logs, const daemon::Co
   if (verdict.ready == check::Ready::kNone || watch.frames() > kFramesMost || logs.empty()) {
     return {};
   }
-  if (!std::all_of(logs.begin(), logs.end(), is_file)) return {};
+  if (!std::all_of(logs.begin(), logs.end(), is_file) || stop_asked()) return {};
   std::vector<diagnose::SignalTable> tables;
   tables.reserve(logs.size());
   for (const std::string& log : logs) tables.push_back(read_log(log, config, true));
@@ -201,7 +201,7 @@ void run(const Options& options) {
   if (live && !options.logs.empty()) {
     throw Failure{kUsage, "check: found logs and --live, expected one of them"};
   }
-  end_streams_when_stopped(options.logs);
+  if (!live) end_logs_when_stopped(options.logs);
   const daemon::Config config =
       load_configuration_for(options.logs, options.rate_Hz, options.config, "");
   Inputs inputs(options.logs);
@@ -222,6 +222,7 @@ void run(const Options& options) {
   Progress progress(!options.quiet);
   RunProgress run_progress(progress, options.logs.size());
   for (const std::string& log : options.logs) {
+    if (!what.empty() && stop_asked()) break;
     look_at_log(log, config, watch, progress, run_progress, seen);
     what += (what.empty() ? "" : ", ") + log;
   }

@@ -9,6 +9,7 @@
 #include "daemon/io/history_keeper.h"
 #include "tools/cli/failure.h"
 #include "tools/cli/replay_run.h"
+#include "tools/cli/stop_signals.h"
 #include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
@@ -54,6 +55,7 @@ Replayed results_of(const std::vector<std::string>& logs, const daemon::Config& 
       unusable.push_back(failure.text);
       continue;
     }
+    if (stop_asked()) break;  // of a log that is not read whole nothing is kept
     for (const std::string& warning : replayed.warnings) text::warn(warning);
     double last_s = undated_s;
     const auto time_of = [&](daemon::MonoTime end) {
@@ -93,6 +95,7 @@ std::vector<std::string> fill_history(const std::string& folder,
                                       const std::vector<std::string>& logs,
                                       const daemon::Config& config) {
   std::vector<std::string> unusable;
+  end_logs_when_stopped(logs);
   const Replayed replayed = results_of(logs, config, unusable);
   const std::vector<Dated>& results = replayed.results;
   const std::string fingerprint = config_fingerprint(config);

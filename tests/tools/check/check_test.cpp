@@ -32,6 +32,7 @@ TEST(Text, Numbers) {
   EXPECT_EQ(grouped(7280.4), "7,280");
   EXPECT_EQ(grouped(-1234567.0), "-1,234,567");
   EXPECT_EQ(grouped(-0.2), "0");
+  EXPECT_EQ(grouped(-9.5e300), "-9.5e+300");
   EXPECT_EQ(number(0.125), "0.125");
   EXPECT_EQ(number(28651.2), "28,651");
   EXPECT_EQ(number(0.00025), "0.00025");

@@ -271,7 +271,8 @@ TEST_F(Stop, KeepsWhatCameThroughAPipe) {
       {"dbc", "decode", pipe(), "--dbc", dbc, "--json", place.path("out.json")},
       {"replay", pipe(), "--config", config(), "--json", place.path("out.json"), "--trace",
        place.path("out.csv"), "--log-out", place.path("out.log")},
-      {"report", pipe(), "--config", config(), "--out", place.path("out.html")}};
+      {"report", pipe(), "--config", config(), "--out", place.path("out.html")},
+      {"check", pipe(), "--config", config(), "--json", place.path("out.json")}};
   for (const auto& command : commands) {
     for (const int number : {SIGINT, SIGTERM}) {
       for (const char* name : {"pipe", "out.json", "out.csv", "out.log", "out.html"}) {
@@ -362,6 +363,24 @@ TEST_F(Stop, ByCtrlCKeepsWhatAFileGaveUntilThen) {
             std::string::npos);
   EXPECT_EQ(lines(place.read("out.json")), 3);
   EXPECT_EQ(place.read("out.json").find("long.log"), std::string::npos);
+
+  // The same of a check, which judges what it has read, and of a history, which keeps whole logs.
+  const auto cut_soon = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), program_path());
+    arguments.insert(arguments.end(), {"--config", place.path("drive/beltgrip.toml")});
+    Process process(arguments);
+    EXPECT_FALSE(process.wait(Milliseconds(1000)).has_value()) << process.err();
+    process.signal(SIGINT);
+    EXPECT_EQ(process.wait(kLimit), 128 + SIGINT) << process.err();
+    EXPECT_NE(process.err().find("stopped: what was read until then is used"), std::string::npos)
+        << process.err();
+    return process.out();
+  };
+  EXPECT_NE(cut_soon({"check", long_log, "--json", place.path("check.json")}).find("Ready to"),
+            std::string::npos);
+  EXPECT_TRUE(nlohmann::json::accept(place.read("check.json")));
+  EXPECT_NE(cut_soon({"history", place.path("belt"), "--from", whole, long_log}).find("mu_max 0.1"),
+            std::string::npos);
 }
 
 // SIGTERM leaves nothing of a log that is a file: what an earlier run left stays.
