@@ -377,6 +377,13 @@ int run(const Arguments& arguments) {
   return kDone;
 }
 
+// What was printed has come out.
+int printed() {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return kDone;
+  complain("beltgripd: standard output: cannot write");
+  return kCannotWrite;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -405,14 +412,14 @@ int main(int argc, char** argv) {
     case command_line::Parsed::kGoOn:
       break;
     case command_line::Parsed::kShown:
-      return kDone;
+      return printed();
     case command_line::Parsed::kWrong:
       complain(app.error() + " (see beltgripd --help)");
       return kUsage;
   }
   if (arguments.print_default_config) {
     std::fputs(default_config_text().c_str(), stdout);
-    return kDone;
+    return printed();
   }
   try {
     return arguments.check ? check(arguments) : run(arguments);

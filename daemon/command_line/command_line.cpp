@@ -1,8 +1,10 @@
 #include "daemon/command_line/command_line.h"
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdint>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 namespace beltgrip::command_line {
@@ -45,7 +47,16 @@ Option Option::one_of(const std::vector<std::string>& values) const {
 
 template <typename T>
 Option Command::add_option(const std::string& name, T& value, const std::string& help) const {
-  return Option(app_->add_option(name, value, help));
+  CLI::Option* const option = app_->add_option(name, value, help);
+  // No range holds against NaN, which is neither below nor above it.
+  if constexpr (std::is_same_v<T, double> || std::is_same_v<T, std::optional<double>>) {
+    option->check([](const std::string& text) {
+      double number = 0.0;
+      const bool finite = CLI::detail::lexical_cast(text, number) && std::isfinite(number);
+      return finite ? std::string() : "found " + text + ", expected a finite number";
+    });
+  }
+  return Option(option);
 }
 
 Option Command::add_flag(const std::string& name, bool& value, const std::string& help) const {

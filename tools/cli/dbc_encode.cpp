@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "can_dbc/dbc/message_codec.h"
@@ -55,9 +57,26 @@ std::optional<std::uint64_t> labelled(const can::SignalDef& signal, const std::s
   return std::nullopt;
 }
 
+// What a floating-point signal carries besides numbers, as dbc decode writes it.
+std::optional<std::uint64_t> no_number(const can::SignalDef& signal, const std::string& text) {
+  const bool is_double = signal.type == can::ValueType::kFloat64;
+  if (!is_double && signal.type != can::ValueType::kFloat32) return std::nullopt;
+  double value = std::numeric_limits<double>::infinity();
+  if (text == "nan") {
+    value = std::numeric_limits<double>::quiet_NaN();
+  } else if (text == "-inf") {
+    value = -value;
+  } else if (text != "inf") {
+    return std::nullopt;
+  }
+  if (is_double) return std::bit_cast<std::uint64_t>(value);
+  return std::bit_cast<std::uint32_t>(static_cast<float>(value));
+}
+
 std::uint64_t raw_of(const can::SignalDef& signal, const can::SignalCodec& codec,
                      const std::string& text) {
   if (const auto raw = labelled(signal, text)) return *raw & codec.mask();
+  if (const auto raw = no_number(signal, text)) return *raw;
   const std::optional<double> value = number(text);
   if (!value) {
     refuse(signal.name + ": found \"" + text + "\", expected a number" +

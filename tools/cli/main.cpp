@@ -85,7 +85,7 @@ int run(std::vector<char*> words) {
       case command_line::Parsed::kGoOn:
         break;
       case command_line::Parsed::kShown:
-        return kDone;
+        break;
       case command_line::Parsed::kWrong: {
         std::string hint = "beltgrip";
         for (const std::string& name : app.chosen()) hint += " " + name;

@@ -81,7 +81,9 @@ void ScenarioOptions::add_to(command_line::Command command) {
                   "A shipped scenario (" + shipped_names() + ") or a TOML file")
       .type_name("NAME")
       .capture_default_str();
-  command.add_option("--belt", belt, "The belt that is mounted: new, worn").type_name("BELT");
+  command.add_option("--belt", belt, "The belt that is mounted")
+      .type_name("BELT")
+      .one_of({"new", "worn"});
   command.add_option("--seed", seed, "Seed of the sensor noise").capture_default_str();
   command.add_option("--start", start_s, "Leave out the first seconds")
       .type_name("SECONDS")

@@ -59,7 +59,13 @@ Status ask_status(const std::string& path) {
       });
   setsockopt(*fd, SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
   if (connect(*fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    throw Failure{kUnavailable, path + ": no beltgripd answers (" + std::strerror(errno) + ")"};
+    const int error = errno;
+    throw Failure{kUnavailable,
+                  path + ": no beltgripd answers (" + std::strerror(error) + ")" +
+                      (error == ENOENT ? "; one that is no service answers where it was started "
+                                         "with RUNTIME_DIRECTORY=" +
+                                             fs::path(path).parent_path().string()
+                                       : "")};
   }
   std::string text;
   char buffer[4096];

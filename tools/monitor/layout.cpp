@@ -340,8 +340,10 @@ std::vector<Line> layout_of(const View& view, Size size) {
   lines.push_back(daemon_line(view));
   lines.push_back(state_line(view));
   if (!view.in_experiment) {
-    const std::string none = view.inhibits_known ? "nothing keeps an experiment from beginning"
-                                                 : "inputs and inhibits: with --config FILE";
+    // The inputs are looked at here, the faults are what the daemon says.
+    const std::string none = !view.inhibits_known  ? "inputs and inhibits: with --config FILE"
+                             : view.faults.empty() ? "nothing keeps an experiment from beginning"
+                                                   : "by the inputs nothing; the faults may";
     add_reasons("why", view.inhibits, none, Tone::kPlain, columns, why_rows, lines);
   }
   add_reasons("faults", view.faults, "none", Tone::kAlarm, columns, why_rows, lines);

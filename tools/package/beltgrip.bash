@@ -1,6 +1,12 @@
 # Completion for beltgrip and beltgripd, for bash and, through bashcompinit, zsh: subcommands, options
 # and the values of options as the programs' own help lists them; else names of files or interfaces.
 # Names that zsh keeps for itself (path, words) are not used.
+_beltgrip_interfaces() {
+  local folder
+  for folder in /sys/class/net/*can*; do
+    [[ -e $folder ]] && echo "${folder##*/}"
+  done
+}
 _beltgrip() {
   local word=${COMP_WORDS[COMP_CWORD]} program=${COMP_WORDS[0]} names=() help choices option i
   for ((i = 1; i < COMP_CWORD; ++i)); do
@@ -8,7 +14,8 @@ _beltgrip() {
     names+=("${COMP_WORDS[i]}")
     ((${#names[@]} == 2)) && break
   done
-  # The second word counts where it is a subcommand of the first.
+  # "beltgrip help X" is about X, and the second word counts where it is a subcommand of the first.
+  [[ ${names[0]} == help ]] && names=("${names[@]:1}")
   help=$("$program" "${names[@]}" --help 2>/dev/null || "$program" "${names[0]}" --help 2>/dev/null)
   option= choices=
   ((COMP_CWORD > 1)) && option=${COMP_WORDS[COMP_CWORD - 1]}
@@ -19,10 +26,14 @@ _beltgrip() {
   elif [[ $option == --* ]] && grep -qE -- "^  $option [A-Z]" <<<"$help"; then
     choices=$(sed -nE "s/^  $option [A-Z]+:\{([^}]*)\}.*/\1/p" <<<"$help" | tr , ' ')
     if grep -qE -- "^  $option (INTERFACE|BUS)" <<<"$help"; then
-      choices=$(cd /sys/class/net && echo *can*)
+      choices=$(_beltgrip_interfaces)
     fi
   else
     choices=$(sed -n '/^Subcommands:/,$s/^  \([a-z-]*\) .*/\1/p' <<<"$help")
+    [[ ${#names[@]} == 0 && $program == *beltgrip ]] && choices+=" help"
+    if grep -qE '^  (INTERFACE|SOURCE)( |$)' <<<"$help"; then
+      choices+=" $(_beltgrip_interfaces)"
+    fi
   fi
   COMPREPLY=()
   while read -r i; do COMPREPLY+=("$i"); done < <(compgen -W "$choices" -- "$word")

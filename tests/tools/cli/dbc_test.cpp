@@ -354,6 +354,8 @@ TEST_F(Dbc, EncodeGivesTheFrameOfCansend) {
            {{"Engine"}, "123#0000000000000000"},
            {{"Muxed", "Page=2", "Second=7"}, "124#0207000000000000"},
            {{"Muxed", "Float=1.5", "Page=3"}, "124#030000000000C03F"},
+           {{"Muxed", "Float=nan", "Page=3"}, "124#030000000000C07F"},
+           {{"Muxed", "Float=-inf", "Page=3"}, "124#03000000000080FF"},
            {{"Ccvs", "Vehicle=87.65"}, "18FEF1FE#00A6570000000000"},
            {{"Muxed", "First=7", "Page=2"}, "First: not in a frame with this value of Page"},
            {{"Engine", "Speed=7000"},

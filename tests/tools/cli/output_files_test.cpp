@@ -305,6 +305,13 @@ TEST_F(OutputPairs, DevicesAndPipesAreWrittenAsTheyAre) {
   const std::string full =
       beltgrip({"dbc", "show", place.path("vehicle.dbc"), "--json", "/dev/full"}).err;
   EXPECT_NE(full.find("cannot be written"), std::string::npos) << full;
+  for (const char* shown : {"help", "help replay", "--version", "replay --help"}) {
+    const RunResult result =
+        test::run({"sh", "-c", std::string("\"$0\" ") + shown + " >/dev/full", program_path()},
+                  Milliseconds{60000});
+    EXPECT_EQ(result.status, 74) << shown;
+    EXPECT_EQ(lines(result.err), 1) << result.err;
+  }
   const RunResult piped =
       test::run({"sh", "-c",
                  "mkfifo \"$2/p\" && (cat \"$2/p\" & \"$0\" dbc show \"$1\" --json \"$2/p\"; wait)",

@@ -49,6 +49,18 @@ TEST(Csv, CountsWhatItLeavesOut) {
   EXPECT_EQ(table.notes[2], "a.csv:5: 1 lines whose time does not increase, ignored");
 }
 
+TEST(Csv, AShareHasTheUnitOneOrPercent) {
+  const SignalTable table =
+      parse_csv("t[s],accelerator_pedal[1],primary_speed[rad/s]\n0,0.5,1\n", "a.csv");
+  EXPECT_EQ(table[Role::kAcceleratorPedal].value.at(0), 0.5);
+  EXPECT_EQ(
+      parse_csv("t[s],accelerator_pedal[%]\n0,50\n", "a.csv")[Role::kAcceleratorPedal].value.at(0),
+      0.5);
+  EXPECT_EQ(error_of("t[s],primary_speed[1]\n0,1\n"),
+            "a.csv:1: column 'primary_speed[1]': expected a unit of angular speed, e.g. "
+            "primary_speed[rad/s]");
+}
+
 TEST(Csv, RefusesWithLineAndReason) {
   EXPECT_EQ(error_of("t[s],primary_speed[bar]\n0,1\n"),
             "a.csv:1: column 'primary_speed[bar]': expected a unit of angular speed, e.g. "

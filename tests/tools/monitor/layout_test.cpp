@@ -132,6 +132,14 @@ TEST(Layout, SaysWhyNothingBegins) {
                       "outside its window\n"),
             std::string::npos)
       << shown(view, 120, 24);
+  // No inhibit of the inputs, and a fault that the daemon tells of.
+  View faulty = view;
+  faulty.inhibits.clear();
+  EXPECT_NE(shown(faulty, 120, 24).find("nothing keeps an experiment from beginning"),
+            std::string::npos);
+  faulty.faults = {{"SampleLate", "a sample came late", "", ""}};
+  EXPECT_NE(shown(faulty, 120, 24).find("by the inputs nothing; the faults may"), std::string::npos)
+      << shown(faulty, 120, 24);
   // Rows that no other reason takes hold the rest of a long one.
   view.inhibits[0].figure = "3.2 Nm, needs 10 to 100 Nm in overrun, coasting";
   EXPECT_NE(shown(view, 80, 24)

@@ -30,12 +30,18 @@ TEST(Completion, KnowsWhatHelpKnows) {
   EXPECT_EQ(completed({"beltgrip", "replay", "a.log", "--j"}), "--join --jobs --json\n");
   EXPECT_EQ(completed({"beltgrip", "dbc", "decode", "--mes"}), "--messages\n");
   EXPECT_EQ(completed({"beltgripd", "--rec"}), "--record\n");
+  EXPECT_EQ(completed({"beltgrip", "hel"}), "help\n");
+  EXPECT_EQ(completed({"beltgrip", "help", "mon"}), "monitor\n");
 }
 
 TEST(Completion, KnowsTheValues) {
   EXPECT_EQ(completed({"beltgrip", "replay", "--method", ""}), "robust paper\n");
   EXPECT_EQ(completed({"beltgrip", "simulate", "--scenario", "worn"}), "worn-belt\n");
   EXPECT_EQ(completed({"beltgripd", "--log-level", "w"}), "warning\n");
+  EXPECT_EQ(completed({"beltgrip", "simulate", "--belt", ""}), "new worn\n");
+  // Of interfaces those that there are: no pattern, and nothing but names.
+  EXPECT_EQ(completed({"beltgrip", "replay", "--interface", ""}).find('*'), std::string::npos);
+  EXPECT_EQ(completed({"beltgrip", "status", ""}).find('*'), std::string::npos);
   EXPECT_EQ(completed({"beltgrip", "replay", "--config", ""}), "\n") << "a file: by the shell";
 }
 

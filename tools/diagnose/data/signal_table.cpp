@@ -139,8 +139,11 @@ class CsvParser {
     const std::string_view unit_text = open == std::string_view::npos
                                            ? std::string_view{}
                                            : cell.substr(open + 1, cell.rfind(']') - open - 1);
-    const std::optional<can::Unit> unit =
-        unit_text.empty() ? std::optional<can::Unit>{} : can::parse_unit(unit_text);
+    // "[1]" is what replay --signals-out writes for a share.
+    const bool share = wanted == can::Dimension::kShare && unit_text == can::si_unit_text(wanted);
+    const std::optional<can::Unit> unit = share               ? can::Unit{wanted}
+                                          : unit_text.empty() ? std::nullopt
+                                                              : can::parse_unit(unit_text);
     if (wanted == can::Dimension::kNone) return column;
     if (!unit || unit->dimension != wanted) {
       fail("column '" + std::string(cell) + "': expected a unit of " +
