@@ -3,9 +3,14 @@
 #include <sched.h>
 #include <sys/mman.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdint>
+#include <cstdio>
 #include <cstring>
+#include <fstream>
+#include <string_view>
 
 namespace beltgrip::daemon {
 
@@ -14,10 +19,52 @@ namespace {
 // More than the loop and what it calls use.
 constexpr std::size_t kStack = std::size_t{256} << 10;
 
+// Libraries whose code the loop never enters: the configuration's reader, the journal's writer, the
+// history's, the recorder's, and what libsystemd has for journals. Six megabytes that need not be
+// held.
+constexpr std::array<std::string_view, 11> kOfOthers{
+    "/libtomlplusplus.", "/libspdlog.", "/libfmt.", "/libsqlite3.",   "/libzstd.", "/libz.",
+    "/libgcrypt.",       "/liblzma.",   "/liblz4.", "/libgpg-error.", "/libcap."};
+
 void touch_stack() {
   std::array<volatile char, kStack> stack;
   constexpr std::size_t kPage = 4096;
   for (std::size_t i = 0; i < stack.size(); i += kPage) stack[i] = 0;
+}
+
+// "7f00a000-7f00b000 r-xp 00000000 08:01 123   /usr/lib/libx.so.1"
+struct Mapping {
+  std::uintptr_t begin = 0, end = 0;
+  bool held = false;  // by the loop
+};
+
+bool read_mapping(const std::string& line, Mapping& mapping) {
+  std::array<char, 5> may{};
+  unsigned long begin = 0, end = 0;
+  if (std::sscanf(line.c_str(), "%lx-%lx %4s", &begin, &end, may.data()) != 3) return false;
+  const bool none = may[0] == '-' && may[1] == '-';  // a guard page
+  const bool kernels = line.ends_with("[vvar]") || line.ends_with("[vvar_vclock]") ||
+                       line.ends_with("[vdso]") || line.ends_with("[vsyscall]");
+  const bool of_others =
+      may[1] != 'w' && std::any_of(kOfOthers.begin(), kOfOthers.end(), [&](std::string_view each) {
+        return line.find(each) != std::string::npos;
+      });
+  mapping = {begin, end, !none && !kernels && !of_others};
+  return true;
+}
+
+// False with errno: not all could be locked.
+bool lock_mappings() {
+  std::ifstream maps("/proc/self/maps");
+  if (!maps) return mlockall(MCL_CURRENT) == 0;
+  Mapping mapping;
+  for (std::string line; std::getline(maps, line);) {
+    if (!read_mapping(line, mapping) || !mapping.held) continue;
+    if (mlock(reinterpret_cast<const void*>(mapping.begin), mapping.end - mapping.begin) != 0) {
+      return false;
+    }
+  }
+  return true;
 }
 
 }  // namespace
@@ -25,7 +72,7 @@ void touch_stack() {
 bool lock_memory(std::string& line) {
   // Not what is mapped later: that is the helper thread's business, and would count against the
   // limit.
-  const bool locked = mlockall(MCL_CURRENT) == 0;
+  const bool locked = lock_mappings();
   line = locked ? "memory locked"
                 : std::string("memory not locked (") + std::strerror(errno) +
                       "; LimitMEMLOCK= or CAP_IPC_LOCK permits it)";
