@@ -86,6 +86,11 @@ void add_experiments(HtmlPage& page, const std::vector<ExperimentCourse>& experi
   rows.reserve(experiments.size());
   for (const ExperimentCourse& course : experiments) rows.push_back(course.verdict);
   page.table(kVerdictHeader, rows);
+  if (!thresholds) {
+    page.paragraph(
+        "Method robust: its phases and its stop follow from what it finds probable, not from "
+        "thresholds of slip variance and slope; with method paper these are drawn.");
+  }
   for (const ExperimentCourse& course : experiments) {
     page.heading(course.name);
     if (course.t_s.empty()) {

@@ -37,7 +37,7 @@ inline const std::vector<std::string> kVerdictHeader{"experiment",
                                                      "slip at the stop, %",
                                                      "slip at the peak, %",
                                                      "slip up to, %",
-                                                     "slip energy, J",
+                                                     "slip energy, before the peak too, J",
                                                      "slip path, m"};
 
 // Of the paper's phases; method "robust" has none.
