@@ -78,7 +78,7 @@ class RigLog final : public can::LogReader {
   }
   bool next(can::LogRecord& record) override {
     can::StampedFrame stamped;
-    if (!next_frame(source_, stamped)) return false;
+    if (stop_asked() || !next_frame(source_, stamped)) return false;
     if (copy_) copy_->write(stamped.t_ns, kInterface, stamped.frame);
     if (stats_.frames++ == 0) first_ns_ = stamped.t_ns;
     if (progress_.steps()) {
@@ -180,6 +180,7 @@ void run(const Options& options) {
       throw Failure{kCannotCreate, options.out_dir + ": cannot be created: " + error.message()};
     }
   }
+  end_drives_when_stopped();
   const Inputs inputs{options.scenario.scenario, options.model};
   std::optional<OutputFile> log, json, dbc, configuration, truth;
   if (!options.out_dir.empty()) {

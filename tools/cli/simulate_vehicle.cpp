@@ -130,6 +130,7 @@ DriveResult drive_with_daemon(const sim::VehicleScenario& believed,
     if (writer) writer->write(frame.t, kInterface, frame.frame);
     ++result.daemon.frames;
   };
+  observers.ends = stop_asked;
   sim::VehiclePort port(machine, seed, observers);
   run_daemon(port, config, result.daemon);
   port.run_alone();  // where the script ended the daemon before the drive

@@ -33,7 +33,8 @@ std::array<Slot, 16> slots;
 
 std::atomic<bool> in_good_order{false};
 std::atomic<bool> of_files{false};  // their end is not this signal
-std::atomic<int> asked{0};          // the signal
+std::atomic<bool> of_drive{false};
+std::atomic<int> asked{0};  // the signal
 std::atomic<int> descriptor{-1};
 std::atomic<void (*)()> before_end{nullptr};
 
@@ -124,9 +125,17 @@ void end_logs_when_stopped(const std::vector<std::string>& logs) {
   can::ByteSource::end_with(stop_descriptor());
 }
 
+void end_drives_when_stopped() {
+  of_files.store(true);
+  of_drive.store(true);
+  end_in_good_order();
+}
+
 void end_if_cut() {
   if (!of_files.load() || !stop_asked()) return;
-  text::complain("stopped: what was read until then is used, what follows is not");
+  text::complain(of_drive.load()
+                     ? "stopped: the drive ends there"
+                     : "stopped: what was read until then is used, what follows is not");
   end(asked.load());
 }
 

@@ -24,7 +24,10 @@ int stop_descriptor();
 void end_streams_when_stopped(const std::vector<std::string>& logs);
 // And logs that are all files end with SIGINT: what was read until then is used.
 void end_logs_when_stopped(const std::vector<std::string>& logs);
-// Once all is written: says that logs which are files have been cut, and ends as the signal would.
+// A drive in virtual time ends with SIGINT as such a log does.
+void end_drives_when_stopped();
+// Once all is written: says that logs which are files, or a drive, have been cut, and ends as the
+// signal would.
 void end_if_cut();
 
 // Called where a signal ends the program; async-signal-safe.

@@ -92,6 +92,7 @@ void VehiclePort::flood(double t_s) {
 void VehiclePort::advance(std::int64_t t_ns, bool stop_at_frame) {
   const auto due = [this] { return arrivals_.empty() ? INT64_MAX : arrivals_.front().t_ns; };
   while (!vehicle_.finished() && vehicle_.finite()) {
+    if (!stop_at_frame && ended()) break;
     if (stop_at_frame && due() <= vehicle_.now_ns()) break;
     if (vehicle_.now_ns() >= t_ns) break;
     vehicle_.step();
@@ -113,7 +114,7 @@ void VehiclePort::advance(std::int64_t t_ns, bool stop_at_frame) {
 }
 
 daemon::Wake VehiclePort::wait_until(daemon::MonoTime deadline) noexcept {
-  if (daemon_is_dead()) return daemon::Wake::kClosed;
+  if (daemon_is_dead() || ended()) return daemon::Wake::kClosed;
   std::int64_t until = deadline;
   if (const FaultStep* fault = active(FaultKind::kLoopLate)) {
     until = std::max<std::int64_t>(until, deadline + std::llround(fault->size * 1e9));

@@ -23,6 +23,7 @@ class VehiclePort final : public daemon::Port {
     std::function<void(std::int64_t, const can::CanFrame&)> on_sent;
     std::function<void(const daemon::RxFrame&)> on_received;
     std::function<void()> on_unsent;  // a frame that the bus did not take
+    std::function<bool()> ends;       // true: the drive ends here
   };
   VehiclePort(const VehicleScenario& scenario, std::uint64_t seed, Observers observers = {});
 
@@ -33,6 +34,7 @@ class VehiclePort final : public daemon::Port {
   daemon::BusState bus_state() noexcept override;
 
   // By the script the daemon is gone: whatever it still says, nobody hears.
+  bool ended() const { return observers_.ends && observers_.ends(); }
   bool daemon_is_dead() const { return active(FaultKind::kDaemonDies) != nullptr; }
   // Runs the rest without the daemon.
   void run_alone();

@@ -383,6 +383,22 @@ TEST_F(Stop, ByCtrlCKeepsWhatAFileGaveUntilThen) {
             std::string::npos);
 }
 
+// A drive in virtual time: what was driven until then is whole and can be replayed.
+TEST_F(Stop, ByCtrlCKeepsTheDriveUntilThen) {
+  const std::string folder = place.path("cut");
+  Process process({program_path(), "simulate", "--scenario", "coast-overdrive", "--set",
+                   "run.duration_s=100000", "--out-dir", folder});
+  EXPECT_FALSE(process.wait(Milliseconds(1000)).has_value()) << process.err();
+  process.signal(SIGINT);
+  EXPECT_EQ(process.wait(kLimit), 128 + SIGINT) << process.err();
+  EXPECT_NE(process.err().find("stopped: the drive ends there"), std::string::npos)
+      << process.err();
+  const RunResult checked =
+      beltgrip({"check", folder + "/trace.log", "--config", folder + "/beltgrip.toml"});
+  EXPECT_EQ(checked.status, 0) << checked.err;
+  EXPECT_TRUE(fs::exists(folder + "/truth.json"));
+}
+
 // SIGTERM leaves nothing of a log that is a file: what an earlier run left stays.
 TEST_F(Stop, KeepsTheEarlierResultOfAFile) {
   std::string log;
