@@ -308,7 +308,7 @@ void add_history(command_line::Command app) {
       .type_name("FILE");
   command
       .add_option("--from", options->from,
-                  "Replay these logs of one vehicle: FILE comes to hold their experiments too; "
+                  "Replay these CAN logs of one vehicle: FILE comes to hold their experiments too; "
                   "without FILE they are only shown")
       .type_name("LOG");
   command.add_option("--json", options->json, "As JSON lines, '-': standard output")

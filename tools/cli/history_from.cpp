@@ -1,6 +1,10 @@
 #include "tools/cli/history_from.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <set>
 
@@ -95,6 +99,11 @@ std::vector<std::string> fill_history(const std::string& folder,
                                       const std::vector<std::string>& logs,
                                       const daemon::Config& config) {
   std::vector<std::string> unusable;
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (access(folder.c_str(), W_OK | X_OK) != 0) {
+    throw Failure{kCannotCreate, folder + ": cannot be written (" + std::strerror(errno) + ")"};
+  }
   end_logs_when_stopped(logs);
   const Replayed replayed = results_of(logs, config, unusable);
   const std::vector<Dated>& results = replayed.results;

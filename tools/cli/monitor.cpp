@@ -97,7 +97,7 @@ void add_monitor(command_line::Command app) {
   const command_line::Command command =
       app.add_subcommand("monitor", "What BeltGrip does, and why: a view of a bus or a log");
   auto options = std::make_shared<Options>();
-  command.add_option("SOURCE", options->source, "A SocketCAN interface, or a log as for replay")
+  command.add_option("SOURCE", options->source, "A SocketCAN interface, or a CAN log")
       .type_name("")
       .required();
   command
