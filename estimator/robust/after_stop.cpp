@@ -6,13 +6,14 @@
 namespace beltgrip::estimator {
 namespace {
 
-// A clamp that is told to come back begins to do so within some tenths of a second.
-constexpr double kKeep_s = 0.15;
+// For so long the belt is watched after the stop (follow_on.h); a clamp that is given back ends it
+// sooner.
+constexpr double kKeep_s = 0.5;
 // The force is judged in means over this; when it has risen, the group before may have as well.
 constexpr double kGroup_s = 0.02;
 constexpr double kForceDeviations = 3.0;
 // Further away slip moves on too fast for channels that are read one after the other.
-constexpr double kRunAway_percent = 1.0;
+constexpr double kRunAway_percent = 1.5;
 constexpr double kSwingFrom_s = 0.02, kSwingTo_s = 0.08, kSwingShortest_s = 0.03;
 constexpr std::size_t kBeforeCells = 20, kSwingCells = 10;
 constexpr double kSwing_percent = 0.3, kSwingDeviations = 3.0, kSwingShare = 0.4;

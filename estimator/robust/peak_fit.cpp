@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "estimator/robust/thresholds.h"
 #include "estimator/signal/slow_noise.h"
@@ -15,7 +16,7 @@ constexpr std::size_t kMostCells = kCellsPerLevel * History::kLevels;
 constexpr std::size_t kMostPoints = 256;  // the newest
 constexpr std::size_t kFewestPoints = 8;
 // Work of one step; that on forms in instructions, about.
-constexpr std::size_t kCellsPerStep = 48, kPointsPerStep = 64, kFormsPerStep = 128;
+constexpr std::size_t kCellsPerStep = 48, kPointsPerStep = 64, kFormsPerStep = 48;
 constexpr std::size_t kLevelsPerStep = 4;
 constexpr int kFormWork = 8000, kPointWork = 130, kSolveWork = 650;
 constexpr std::size_t kTermsPerStep = 16;
@@ -39,6 +40,7 @@ constexpr double kCornersOver = 0.75;  // of the span, from its upper end
 constexpr std::size_t kMostForms = 16 * (kCorners + 1) + kCorners * kCorners;
 constexpr double kFormError = 0.05;       // of how far mu* lies below its top: forms are local
 constexpr double kFormTolerance = 0.002;  // of mu: no friction is quite one of the forms
+constexpr double kSmallestSlope = 1e-9;   // 1/percent, of a deviation that is divided by
 constexpr double kNearTop = 0.98;
 constexpr double kHealthFrom = 0.6;        // of the top of mu*
 constexpr double kStandsStill = 0.02;      // of the clamp force
@@ -81,6 +83,10 @@ class Factors {
   Eigen::Vector4d inverse_;  // of D
 };
 
+double normal_density(double z) noexcept {
+  return std::exp(-0.5 * z * z) / std::sqrt(2.0 * std::numbers::pi);
+}
+
 }  // namespace
 
 double PeakFit::Rise::at(double x) const noexcept {
@@ -100,11 +106,12 @@ PeakFit::PeakFit()
       health_sums_(kMostPoints + 1),
       residuals_(kMostPoints) {}
 
-void PeakFit::begin(const ExperimentRecord& record, double traction_per_Nm_N,
-                    double inertia_kg_m2) noexcept {
+void PeakFit::begin(const ExperimentRecord& record, double traction_per_Nm_N, double inertia_kg_m2,
+                    double stop_s) noexcept {
   record_ = &record;
   c_ = traction_per_Nm_N;
   inertia_ = inertia_kg_m2;
+  stop_s_ = stop_s;
   stage_ = Stage::kCells;
   level_ = 0;
   cell_count_ = point_count_ = form_count_ = 0;
@@ -160,18 +167,8 @@ bool PeakFit::step() noexcept {
       return false;
     case Stage::kResult:
       finish();
-      go_to(result_.valid ? Stage::kEndSlope : Stage::kIdle);
-      if (stage_ == Stage::kIdle) return true;
-      next_ = first_;
-      end_slope_.begin(slip_high_, record_->torque_slow_variance(), record_->torque_line(),
-                       record_->force_line());
-      return false;
-    case Stage::kEndSlope:
-      find_end_slope();
-      return false;
-    case Stage::kEndSpread:
-      find_end_spread();
-      return false;
+      go_to(result_.valid ? Stage::kHealthSums : Stage::kIdle);
+      return stage_ == Stage::kIdle;
     case Stage::kHealthSums:
       sum_for_health();
       go_to(Stage::kChords);
@@ -458,7 +455,6 @@ void PeakFit::find_span() noexcept {
     slip_low_ = std::min(slip_low_, points_[i].slip);
     slip_high_ = std::max(slip_high_, points_[i].slip);
   }
-  end_step_ = slip_step(points_[point_count_ - 1].duration_s);
   slow_terms_.setZero();
   slow_spread_ = 1.0;
   term_sums_.setZero();
@@ -601,12 +597,8 @@ void PeakFit::solve(std::size_t corner_number) noexcept {
     return Eigen::Vector4d(1.0, -rise.at(x), -x, has_corner ? -std::max(0.0, x - corner) : 0.0);
   };
   double best = 0.0;  // the end of the data
-  bool inside = false;
   const auto consider = [&](double x) {
-    if (x > low && x <= 0.0 && terms(x).dot(theta) >= terms(best).dot(theta)) {
-      best = x;
-      inside = x < -end_step_;
-    }
+    if (x > low && x <= 0.0 && terms(x).dot(theta) >= terms(best).dot(theta)) best = x;
   };
   // Where the slope B/lambda exp(..) - d (- h) vanishes, before and beyond the corner; the corner.
   const auto level_at = [&](double fall) {
@@ -627,6 +619,8 @@ void PeakFit::solve(std::size_t corner_number) noexcept {
   const double prior = rise.power > 0 ? 4.0 / square(kCorners) : has_corner ? 1.0 / kCorners : 1.0;
   const Eigen::Vector4d g = terms(best);
   const Eigen::Vector4d g_fall = g - terms(0.0);
+  const double rise_slope = rise.power == 0 ? rise.at(0.0) / rise.lambda : 0.0;
+  const Eigen::Vector4d g_end(0.0, rise_slope, -1.0, has_corner ? -1.0 : 0.0);
   forms_[form_count_++] = {.chi2 = sum(kY, kY) - 2.0 * theta.dot(b) + theta.dot(A * theta),
                            .prior = prior,
                            .mu = mu_top_ + g.dot(theta),
@@ -634,7 +628,8 @@ void PeakFit::solve(std::size_t corner_number) noexcept {
                            .slip = slip_high_ + best,
                            .fall = g_fall.dot(theta),
                            .fall_variance = factors.square_of(g_fall),
-                           .inside = inside};
+                           .end_slope = g_end.dot(theta),
+                           .end_slope_variance = factors.square_of(g_end)};
   const double chi2 = forms_[form_count_ - 1].chi2;
   if (form_count_ > 1 && !(chi2 < best_chi2_)) return;
   best_chi2_ = chi2;
@@ -658,7 +653,13 @@ void PeakFit::average() noexcept {
     average_.squares += w * rest * rest;
     average_.variance += w * form.variance * scale;
     average_.slip += w * form.slip;
-    average_.inside += form.inside ? w : 0.0;
+    // All of these curves bend down only: one that falls at the end of the data has its top in
+    // them.
+    const double deviation = std::max(kSmallestSlope, std::sqrt(form.end_slope_variance * scale));
+    const double z = form.end_slope / deviation;
+    const double rises = 0.5 * std::erfc(-z / std::numbers::sqrt2);
+    average_.inside += w * (1.0 - rises);
+    average_.end_rise += w * (form.end_slope * rises + deviation * normal_density(z));
     average_.fall += w * form.fall;
     average_.fall_variance += w * form.fall_variance * scale;
   }
@@ -673,6 +674,8 @@ void PeakFit::finish() noexcept {
   result_.variance = a.variance / a.weight + std::max(0.0, a.squares / a.weight - mu * mu);
   result_.slip = a.slip / a.weight;
   result_.inside = a.inside / a.weight;
+  result_.end_slip = slip_high_;
+  result_.end_rise = a.end_rise / a.weight;
   result_.fall = a.fall / a.weight;
   result_.fall_variance = a.fall_variance / a.weight;
   result_.t_s = points_[point_count_ - 1].t_s;
@@ -709,50 +712,13 @@ bool PeakFit::came_after() const noexcept {
          last.mean() > result_.slip;
 }
 
-EndPoint PeakFit::end_point(const Point& point) const noexcept {
-  const double mu_per_Nm = c_ / point.force_N;
-  const double speed_gain = mu_per_Nm * point.inertia_per_s;
-  const double speeds =
-      square(speed_gain) * (point.speed_variance_begin + point.speed_variance_end);
-  return {.t_s = point.t_s,
-          .slip_percent = point.slip,
-          .mu = point.mu,
-          .weight = 1.0 / point.variance,
-          .own_variance = std::max(0.0, point.variance - speeds) + point.force_variance,
-          .mu_per_Nm = mu_per_Nm,
-          .slow_share = 1.0 - point.held_share,
-          .speed_gain = speed_gain,
-          .begin_speed_variance = point.speed_variance_begin,
-          .end_speed_variance = point.speed_variance_end};
-}
-
-void PeakFit::find_end_slope() noexcept {
-  const std::size_t end = std::min(point_count_, next_ + kPointsPerStep);
-  for (; next_ < end; ++next_) end_slope_.collect(end_point(points_[next_]));
-  if (next_ < point_count_) return;
-  end_slope_.solve();
-  go_to(Stage::kEndSpread);
-  next_ = first_;
-}
-
-void PeakFit::find_end_spread() noexcept {
-  const std::size_t end = std::min(point_count_, next_ + kPointsPerStep);
-  for (; next_ < end; ++next_) end_slope_.spread(end_point(points_[next_]));
-  if (next_ < point_count_) return;
-  result_.end_slope_valid = end_slope_.valid();
-  result_.end_slope = end_slope_.slope();
-  result_.end_slope_variance = end_slope_.variance();
-  result_.end_slip = slip_high_;
-  go_to(Stage::kHealthSums);
-}
-
 // Where the clamp force has come to a stand, the load alone moves slip and mu* to and fro, by less
 // than slip's noise: that is no curve to be tested.
 double PeakFit::tested_until_s() const noexcept {
   const Line& line = record_->force_line();
   const double end_s = record_->duration_s();
   const bool stands = std::abs(line.slope) * (end_s - line.begin_s) < kStandsStill * line.at(end_s);
-  return std::min(stands ? line.begin_s : end_s, record_->lowered_until_s());
+  return std::min({stands ? line.begin_s : end_s, record_->lowered_until_s(), stop_s_});
 }
 
 // From where mu* came to a share of its top, to where the curve has its top.

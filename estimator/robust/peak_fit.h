@@ -21,7 +21,6 @@
 
 #include "estimator/record/experiment_record.h"
 #include "estimator/robust/curve_health.h"
-#include "estimator/robust/end_slope.h"
 
 namespace beltgrip::estimator {
 
@@ -46,10 +45,10 @@ struct PeakFitResult {
   double reached = 0.0;
   double reached_deviation = 0.0;
   double reached_slip = 0.0;
-  // Of the curve at the end of the data, 1/percent, for what it may still rise.
-  bool end_slope_valid = false;
-  double end_slope = 0.0, end_slope_variance = 0.0;
+  // Where the data end, for what the curve may still rise: its expected slope there, 1/percent,
+  // falling taken for level.
   double end_slip = 0.0;
+  double end_rise = 0.0;
   // Do the points lie on one curve? In deviations (curve_health.h).
   double below_chord = 0.0;
   ResidualTests residuals;
@@ -58,9 +57,10 @@ struct PeakFitResult {
 class PeakFit {
  public:
   PeakFit();
-  // c: cos(theta) / (2 R_p); inertia 0 where the torque of the belt is measured.
-  void begin(const ExperimentRecord& record, double traction_per_Nm_N,
-             double inertia_kg_m2) noexcept;
+  // c: cos(theta) / (2 R_p); inertia 0 where the torque of the belt is measured. Whether the points
+  // lie on one curve is tested until the stop.
+  void begin(const ExperimentRecord& record, double traction_per_Nm_N, double inertia_kg_m2,
+             double stop_s) noexcept;
   // One piece of the work; true when the result stands.
   bool step() noexcept;
   const PeakFitResult& result() const noexcept { return result_; }
@@ -79,7 +79,7 @@ class PeakFit {
   };
   struct Form {
     double chi2, prior, mu, variance, slip, fall, fall_variance;
-    bool inside;
+    double end_slope, end_slope_variance;
   };
   enum class Stage {
     kIdle,
@@ -92,8 +92,6 @@ class PeakFit {
     kForms,
     kAverage,
     kResult,
-    kEndSlope,
-    kEndSpread,
     kHealthSums,
     kChords,
     kResiduals
@@ -117,8 +115,8 @@ class PeakFit {
     double faded, per_Nm, gain, per_deviation;
   };
   struct Average {
-    double weight = 0, mu = 0, squares = 0, variance = 0, slip = 0, inside = 0, fall = 0,
-           fall_variance = 0;
+    double weight = 0, mu = 0, squares = 0, variance = 0, slip = 0, inside = 0, end_rise = 0,
+           fall = 0, fall_variance = 0;
   };
 
   void go_to(Stage stage) noexcept;
@@ -144,9 +142,6 @@ class PeakFit {
   void solve(std::size_t corner) noexcept;
   void average() noexcept;
   void finish() noexcept;
-  EndPoint end_point(const Point& point) const noexcept;
-  void find_end_slope() noexcept;
-  void find_end_spread() noexcept;
   double tested_until_s() const noexcept;
   void sum_for_health() noexcept;
   bool slip_moves(double until_s) const noexcept;
@@ -156,6 +151,7 @@ class PeakFit {
 
   const ExperimentRecord* record_ = nullptr;
   double c_ = 0.0, inertia_ = 0.0;
+  double stop_s_ = 0.0;
   Stage stage_ = Stage::kIdle;
   std::size_t level_ = 0;
   std::vector<Cell> cells_;  // newest first, without overlap
@@ -172,13 +168,10 @@ class PeakFit {
   double mu_top_ = 0.0;
   double slip_low_ = 0.0, slip_high_ = 0.0;  // of the stretch
   double slip_low_s_ = 0.0;                  // duration of the lowest point
-  // A top so near to the end of the data is none that was seen: where noise of slip ended them, the
-  // last point lies too far on.
-  double end_step_ = 0.0;
-  std::vector<Whitening> whitening_;  // of the points of the stretch
-  std::vector<Terms> terms_;          // likewise
-  Terms slow_terms_ = Terms::Zero();  // slow error in them, as expected
-  double slow_spread_ = 1.0;          // its variance, in that of the slow error
+  std::vector<Whitening> whitening_;         // of the points of the stretch
+  std::vector<Terms> terms_;                 // likewise
+  Terms slow_terms_ = Terms::Zero();         // slow error in them, as expected
+  double slow_spread_ = 1.0;                 // its variance, in that of the slow error
   Eigen::Matrix<double, kTermCount, kTermCount> term_sums_;
   std::size_t next_ = 0;             // where the work on this stage goes on
   Rise rise_;                        // that is being fitted, with
@@ -191,7 +184,6 @@ class PeakFit {
   Average average_;
   std::vector<Form> forms_;
   std::size_t form_count_ = 0;
-  EndSlope end_slope_;
   std::vector<CurveSums> health_sums_;
   std::size_t health_count_ = 0;
   Rise best_rise_;

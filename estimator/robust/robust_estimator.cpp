@@ -84,7 +84,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     narrow_ = 0;
     first_mu_ = first_force_N_ = 0.0;
     started_ = concluding_ = concluded_ = false;
-    waiting_ = refitting_ = stepped_ = at_the_top_ = false;
+    waiting_ = stepped_ = at_the_top_ = false;
   }
 
   const CurveEstimate& step(const VariatorSample& read) noexcept override {
@@ -128,6 +128,8 @@ class RobustEstimator final : public SlipCurveEstimator {
 
   bool conclude() noexcept override {
     if (concluded_ || !started_) return true;
+    const bool stepped = stepped_;
+    stepped_ = false;
     if (!concluding_) {
       concluding_ = true;
       peak_ = {};
@@ -138,20 +140,22 @@ class RobustEstimator final : public SlipCurveEstimator {
         return true;
       }
       if (out_.stop == StopReason::kNone) after_stop_.begin(record_);  // ended by the caller
-      fit_.begin(record_, traction_, inertia_kg_m2_);
+      stop_s_ = record_.duration_s();
+      // What the belt did next may tell what the curve up to the stop leaves open.
+      waiting_ = out_.stop == StopReason::kSlope || at_the_top_;
+      if (!waiting_) begin_fit();
+      return false;
     }
-    const bool stepped = stepped_;
-    stepped_ = false;
-    if (waiting_) return (after_stop_.over() || !stepped) && join_what_followed();
+    if (waiting_) {
+      if (after_stop_.over() || !stepped) join_what_followed();
+      return false;
+    }
     if (!fit_.step()) return false;
     if (stepped && follow_on_.waits()) return false;
     judge();
     refuse_impossible(peak_, reading_reach_);
-    // What the belt did next may tell what the curve up to the stop leaves open.
-    waiting_ = !refitting_ && (out_.stop == StopReason::kSlope || at_the_top_) &&
-               peak_.kind != PeakKind::kValue && !peak_.contradictory && !peak_.impossible;
-    concluded_ = !waiting_;
-    return concluded_;
+    concluded_ = true;
+    return true;
   }
 
   const PeakEstimate& peak() const noexcept override { return peak_; }
@@ -202,18 +206,16 @@ class RobustEstimator final : public SlipCurveEstimator {
     return clean;
   }
 
-  // Some of the samples after the stop join the record; after the last one the curve is fitted
-  // again.
-  bool join_what_followed() noexcept {
+  void begin_fit() noexcept { fit_.begin(record_, traction_, inertia_kg_m2_, stop_s_); }
+
+  // Some of the samples after the stop join the record; after the last one the curve is fitted.
+  void join_what_followed() noexcept {
     for (int i = 0; i < kFollowedPerStep && next_after_ < after_stop_.size(); ++i) {
       record_.step(after_stop_[next_after_++]);
     }
-    if (next_after_ < after_stop_.size()) return false;
+    if (next_after_ < after_stop_.size()) return;
     waiting_ = false;
-    concluded_ = next_after_ == 0;
-    refitting_ = !concluded_;
-    if (refitting_) fit_.begin(record_, traction_, inertia_kg_m2_);
-    return concluded_;
+    begin_fit();
   }
 
   void decide() noexcept {
@@ -252,27 +254,23 @@ class RobustEstimator final : public SlipCurveEstimator {
            omega_s_.verdict() == ReadingVerdict::kFrozen;
   }
 
-  // What the curve may still rise by beyond the data, if they do not hold its top: as much as a
-  // power law of that slope, the friction that bends least, up to where friction counts. In drive
-  // what the clamp force deforms is read as slip: the belt may slip by less.
-  struct Rise {
-    double expected = 0.0, uncertain = 0.0;  // its one-sided 95 % beyond that
-  };
-  Rise further_rise(const PeakFitResult& fit) const noexcept {
-    const double outside = 1.0 - fit.inside;  // probability
-    if (!fit.end_slope_valid) return {.expected = outside * kUnknownRise * fit.mu};
-    if (!(fit.end_slip > 0.0)) return {};
+  // What the curve may still rise by beyond the data, up to where friction counts; 1.96 deviations.
+  // It rises with probability 1 - inside, else not at all: by a slope that the data do not show,
+  // and as a power law of the slope that they show. In drive what the clamp force deforms is read
+  // as slip: the belt may slip by less.
+  double further_rise(const PeakFitResult& fit) const noexcept {
     const bool drive = chain_.point().direction == Direction::kDrive;
     const double deformed =
         drive ? kPercent * kDeformationMost_1_N * record_.force_line().at(record_.duration_s())
               : 0.0;
-    // Of all slips that it may be, the one from which such a law rises most.
+    const double to_come = std::max(0.0, kFrictionTo_percent - (fit.end_slip - deformed));
+    const double unseen = kNormal95 * std::sqrt(1.0 - fit.inside) * kUnseenRise * fit.mu * to_come;
+    // Of all slips that it may be, the one from which a power law rises most.
     const double slip = std::min(
         fit.end_slip, std::max(fit.end_slip - deformed, kFrictionTo_percent / std::numbers::e));
-    const double per_slope = outside * slip * std::max(0.0, std::log(kFrictionTo_percent / slip));
-    const double most = fit.end_slope + kRiseDeviations * std::sqrt(fit.end_slope_variance);
-    const double expected = std::max(0.0, fit.end_slope);
-    return {per_slope * expected, per_slope * std::max(0.0, most - expected)};
+    if (!(slip > 0.0)) return unseen;
+    const double seen = fit.end_rise * slip * std::max(0.0, std::log(kFrictionTo_percent / slip));
+    return std::hypot(unseen, seen);
   }
 
   // A value is an interval that is narrow enough, whether friction turned down or lies level.
@@ -390,9 +388,8 @@ class RobustEstimator final : public SlipCurveEstimator {
     const double square = fit.mu * fit.mu;
     const double noise_variance = fit.variance + square * alike_variance(fit.t_s, fit.held_share);
     const double noise = kNormal95 * std::max(std::sqrt(noise_variance), kSmallestStd);
-    const Rise rise = further_rise(fit);
     const double low = fit.mu - noise;
-    const double high = fit.mu + rise.expected + std::hypot(noise, rise.uncertain);
+    const double high = fit.mu + std::hypot(noise, further_rise(fit));
     if (fit.valid && seen && is_value(fit.mu, low, high)) {
       const double sensors = kNormal95 * fit.mu * std::sqrt(sensor_variance(fit.mu, F));
       peak_.kind = PeakKind::kValue;
@@ -464,11 +461,11 @@ class RobustEstimator final : public SlipCurveEstimator {
   double omega_s_rad_s_ = 0.0;
   std::int64_t first_t_ns_ = 0;
   double first_mu_ = 0.0, first_force_N_ = 0.0;
+  double stop_s_ = 0.0;
   double expected_noise_low_ = 0.0, expected_noise_high_ = 0.0;
   int narrow_ = 0;  // forecasts in a row within confidence_width
   bool started_ = false, concluding_ = false, concluded_ = false;
-  bool waiting_ = false;    // for what comes after the stop
-  bool refitting_ = false;  // with it
+  bool waiting_ = false;  // for what comes after the stop
   bool at_the_top_ = false;
   bool stepped_ = false;  // since the last conclude()
 };

@@ -33,7 +33,7 @@ class AfterTheStop : public testing::Test {
   }
   // Slip runs on at this rate, the force comes back at that one after this time.
   void go_on(double slip_percent_per_s, double returns_after_s, double returns_N_per_s) {
-    for (int i = 1; i <= 100; ++i) {
+    for (int i = 1; i <= 120; ++i) {
       const double after_s = i / kRate_hz;
       after_.step(sample(4.0 - 1.0 / kRate_hz + after_s, slip_percent_per_s * after_s,
                          returns_N_per_s * std::max(0.0, after_s - returns_after_s)));
@@ -49,7 +49,7 @@ class AfterTheStop : public testing::Test {
 TEST_F(AfterTheStop, SamplesAreKeptForAMoment) {
   go_on(2.0, 10.0, 0.0);
   EXPECT_TRUE(after_.over());
-  EXPECT_NEAR(static_cast<double>(after_.size()) / kRate_hz, 0.15, 0.021);
+  EXPECT_NEAR(static_cast<double>(after_.size()) / kRate_hz, 0.5, 0.021);
 }
 
 TEST_F(AfterTheStop, NoneIsKeptFromWhereTheForceComesBack) {
@@ -62,7 +62,7 @@ TEST_F(AfterTheStop, NoneIsKeptFromWhereTheForceComesBack) {
 TEST_F(AfterTheStop, NoneIsKeptWhereSlipRunsAway) {
   go_on(30.0, 10.0, 0.0);
   EXPECT_TRUE(after_.over());
-  for (std::size_t i = 0; i < after_.size(); ++i) EXPECT_LT(after_[i].slip_percent, 3.2);
+  for (std::size_t i = 0; i < after_.size(); ++i) EXPECT_LT(after_[i].slip_percent, 3.7);
 }
 
 TEST_F(AfterTheStop, NoneIsKeptWithoutAStop) {
