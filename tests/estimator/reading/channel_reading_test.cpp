@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <random>
 
 namespace beltgrip::estimator {
@@ -107,6 +108,32 @@ TEST(ChannelReading, ARoundedReadingMayRestInTheMiddleOfAStep) {
   EXPECT_FALSE(frozen(0.2, false));
   EXPECT_FALSE(frozen(3.0, false));
   EXPECT_TRUE(frozen(3.0, true));
+}
+
+// 10 kPa a step, read with noise of half of that: on a slow ramp it goes to and fro between two
+// steps for a while, and is none the less a signal that has left two steps before it stops.
+TEST(ChannelReading, ARoundedReadingOfASlowRampThatStopsIsFrozen) {
+  const auto frozen = [](std::uint64_t seed, bool stands) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    ChannelReading channel(100.0);
+    double read_kPa = 0.0;
+    for (int i = 0; i < 2000; ++i) {
+      const double pressure_kPa = 800.0 - 0.12 * i;
+      if (!(stands && i > 1700)) {
+        read_kPa = 10.0 * std::round(0.1 * (pressure_kPa + 5.0 * normal(random)));
+      }
+      channel.follow(read_kPa);
+    }
+    return channel.verdict() == ReadingVerdict::kFrozen;
+  };
+  int of_those_that_stop = 0, of_those_that_fall = 0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    of_those_that_stop += frozen(seed, true);
+    of_those_that_fall += frozen(seed, false);
+  }
+  EXPECT_GE(of_those_that_stop, 98);
+  EXPECT_EQ(of_those_that_fall, 0);
 }
 
 }  // namespace
