@@ -116,9 +116,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     omega_p_.follow(read.omega_p_rad_s);
     omega_s_.follow(read.omega_s_rad_s);
     const Cell cell = cell_of(sample);
-    if (force_step_.step(cell, record_.slip_noise(), record_.force())) {
-      pressure_.take_step(cell.t_s);
-    }
+    watch_force(cell);
     if (record_.step(cell)) decide();
     if (peak_forecast_.step()) expect();
     return out_;
@@ -208,10 +206,18 @@ class RobustEstimator final : public SlipCurveEstimator {
 
   void begin_fit() noexcept { fit_.begin(record_, traction_, inertia_kg_m2_, stop_s_); }
 
+  void watch_force(const Cell& cell) noexcept {
+    if (force_step_.step(cell, record_.slip_noise(), record_.force())) {
+      pressure_.take_step(cell.t_s);
+    }
+  }
+
   // Some of the samples after the stop join the record; after the last one the curve is fitted.
   void join_what_followed() noexcept {
     for (int i = 0; i < kFollowedPerStep && next_after_ < after_stop_.size(); ++i) {
-      record_.step(after_stop_[next_after_++]);
+      const Cell& cell = after_stop_[next_after_++];
+      watch_force(cell);
+      record_.step(cell);
     }
     if (next_after_ < after_stop_.size()) return;
     waiting_ = false;
