@@ -59,13 +59,14 @@ bool ForceStep::steps(std::size_t length, double slip_noise, const Trend& force)
   const double drift_N = before.force_N - earlier.force_N;
   const double drift_after_N = later.force_N - after.force_N;
   const double jump_N = after.force_N - before.force_N - on * (drift_N + drift_after_N);
-  const double force_deviation_N = std::sqrt(force.density(length_s) / length_s);
-  if (std::abs(jump_N) < std::max({kDeviations * spread * force_deviation_N,
-                                   kShare * std::abs(before.force_N), stair_N_})) {
-    return false;
-  }
+  if (std::abs(jump_N) < std::max(kShare * std::abs(before.force_N), stair_N_)) return false;
   // A corner of the force's course, in one of the groups, looks like a step of less than this.
   if (std::abs(jump_N) < std::abs(drift_after_N - drift_N)) return false;
+  // What longer means scatter by beyond white noise, without the corners and steps themselves.
+  const double force_deviation_N = std::sqrt(
+      std::max(force.quiet_density(length_s), force.density(std::min(length_s, kKnownScale_s))) /
+      length_s);
+  if (std::abs(jump_N) < kDeviations * spread * force_deviation_N) return false;
   const double mu_after = after.torque_Nm / after.force_N;
   // Relative to mu*.
   const double rise =

@@ -135,6 +135,17 @@ double Trend::density(double over_s) const noexcept {
   return largest;
 }
 
+double Trend::quiet_density(double over_s) const noexcept {
+  double largest = 0.0;
+  for (int i = 0; i < kScales; ++i) {
+    const Squares& squares = scales_[static_cast<std::size_t>(i)].squares;
+    const double length_s = cell_s_ * (1 << i);
+    if (squares.count < kEnough || (i > 0 && length_s > over_s)) break;
+    largest = std::max(largest, squares.median() / kMedianOfSquare * length_s);
+  }
+  return largest;
+}
+
 double Trend::slow_variance_of(Squares Scale::*squares) const noexcept {
   std::array<Scatter, kScales> scatter;
   std::size_t count = 0;

@@ -44,6 +44,8 @@ class Trend {
   // noise that is correlated from sample to sample (frames slower than samples, rounding) counts
   // for what it is.
   double density(double over_s) const noexcept;
+  // The same by the medians, which know nothing of a few corners and steps; less precise.
+  double quiet_density(double over_s) const noexcept;
   // How many differences of means over this time have been seen.
   double squares(double over_s) const noexcept;
   // Variance of the error that readings close in time share (slow_noise.h): without variation that

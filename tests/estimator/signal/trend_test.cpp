@@ -1,0 +1,63 @@
+// The noise that a channel's course shows, against noise that is drawn here with a known density.
+#include "estimator/signal/trend.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <random>
+
+namespace beltgrip::estimator {
+namespace {
+
+constexpr double kRate_hz = 100.0;
+constexpr double kNoise = 3.0;                           // of one sample
+constexpr double kDensity = kNoise * kNoise / kRate_hz;  // variance of a mean over 1 s
+constexpr double kCorner_s = 2.0, kStep_s = 8.0, kEnd_s = 12.0;
+
+// A course that stands, then falls by this, and steps once on the way.
+Trend course(std::uint64_t seed, double falls_per_s, double step) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  Trend trend(kRate_hz, 4096);
+  for (int i = 0; i < static_cast<int>(kEnd_s * kRate_hz); ++i) {
+    const double t_s = i / kRate_hz;
+    const double course =
+        -falls_per_s * std::max(0.0, t_s - kCorner_s) + (t_s > kStep_s ? step : 0);
+    trend.step(t_s, course + kNoise * normal(random), 0.0);
+  }
+  return trend;
+}
+
+struct Densities {
+  double by_mean = 0.0, by_median = 0.0;  // in the true one; of 40 courses
+};
+Densities densities(double falls_per_s, double step) {
+  Densities out;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    const Trend trend = course(seed, falls_per_s, step);
+    out.by_mean += trend.density(0.4) / kDensity / 40.0;
+    out.by_median += trend.quiet_density(0.4) / kDensity / 40.0;
+  }
+  return out;
+}
+
+// The largest of a few scales: somewhat more than the true one.
+TEST(Trend, OfAStraightCourseBothDensitiesAreThatOfItsNoise) {
+  const Densities both = densities(0.0, 0.0);
+  EXPECT_GT(both.by_mean, 0.9);
+  EXPECT_LT(both.by_mean, 1.6);
+  EXPECT_GT(both.by_median, 0.9);
+  EXPECT_LT(both.by_median, 2.0);
+}
+
+// Of 30 means over 0.4 s a corner and a step are in five differences.
+TEST(Trend, ACornerAndAStepAreInTheMeanAndNotInTheMedian) {
+  const Densities straight = densities(0.0, 0.0);
+  const Densities both = densities(60.0, 30.0);
+  EXPECT_GT(both.by_mean, 2.0 * straight.by_mean);
+  EXPECT_LT(both.by_median, 1.3 * straight.by_median);
+}
+
+}  // namespace
+}  // namespace beltgrip::estimator
