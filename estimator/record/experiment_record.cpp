@@ -39,7 +39,7 @@ void ExperimentRecord::reset() noexcept {
   held_count_ = 0;
   last_held_s_ = 0.0;
   first_force_N_ = 0.0;
-  lowered_ = false;
+  slips_ = lowered_ = false;
   torque_stepped_s_ = std::numeric_limits<double>::infinity();
   smooth_force_N_ = lowest_force_N_ = lowest_force_s_ = 0.0;
   last_t_s_ = 0.0;
@@ -85,8 +85,10 @@ bool ExperimentRecord::step(const Cell& sample) noexcept {
       torque_watch_.step(sample.torque_Nm, slip, slip_noise(), torque_, torque_slow_variance_)) {
     torque_stepped_s_ = std::min(torque_stepped_s_, sample.t_s);
   }
-  omega_p_.step(sample.t_s, sample.omega_p_rad_s, 0.0);
-  slip_speed_.step(sample.t_s, slip * sample.omega_p_rad_s, 0.0);
+  if (!slips_) {
+    omega_p_.step(sample.t_s, sample.omega_p_rad_s, 0.0);
+    slip_speed_.step(sample.t_s, slip * sample.omega_p_rad_s, 0.0);
+  }
   last_omega_rad_s_ = sample.omega_p_rad_s;
   return history_.step(sample);
 }

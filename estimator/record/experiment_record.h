@@ -19,6 +19,8 @@ class ExperimentRecord {
   void reset() noexcept;
   // One sample, t_s since the first. True when a cell of the finest level was completed.
   bool step(const Cell& sample) noexcept;
+  // The belt has begun to slip: the shafts run apart, which is no noise of their speeds.
+  void slips() noexcept { slips_ = true; }
 
   const History& history() const noexcept { return history_; }
   const Trend& force() const noexcept { return force_; }
@@ -75,6 +77,7 @@ class ExperimentRecord {
   double last_held_s_ = 0.0;
   StepWatch torque_watch_;
   double first_force_N_ = 0.0;
+  bool slips_ = false;
   bool lowered_ = false;  // since then the torque is watched
   double torque_stepped_s_ = std::numeric_limits<double>::infinity();
   double smooth_force_N_ = 0.0;

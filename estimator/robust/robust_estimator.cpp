@@ -214,6 +214,7 @@ class RobustEstimator final : public SlipCurveEstimator {
 
   // Some of the samples after the stop join the record; after the last one the curve is fitted.
   void join_what_followed() noexcept {
+    record_.slips();
     for (int i = 0; i < kFollowedPerStep && next_after_ < after_stop_.size(); ++i) {
       const Cell& cell = after_stop_[next_after_++];
       watch_force(cell);
