@@ -1,7 +1,16 @@
-// How late the clamping force answers, measured within a request: while it falls at a rate r the
-// reading is behind the request by r times the lag, and by the sensor's offset. The step from a
-// fast ramp to a slow one tells the two apart; a plain ramp does not. SI. Real-time thread.
+// How late the clamping force answers, measured within a request: the course of the force asked
+// for is laid beside the readings, once for each lag that it may have (the actuator's own answer as
+// configured, later by some more), and the lags whose course lies no further from the readings than
+// noise explains are credible. A sensor that reads too much, and a controller that reckons its
+// force otherwise, only move the whole course: what tells lags apart is that the rate of the fall
+// changes. A plain ramp tells nothing. They do not move it by as much as it has fallen: a
+// force that stays where it was has not answered yet, though it rests as one that has. SI.
+// Real-time thread.
 #pragma once
+
+#include <array>
+#include <cstddef>
+#include <limits>
 
 #include "daemon/core/base/mono_time.h"
 
@@ -9,20 +18,79 @@ namespace beltgrip::daemon {
 
 class AnswerLag {
  public:
-  void begin(MonoTime t, double configured_s) noexcept;
-  // The request's rate of fall, and how far the reading lies above it.
-  void step(MonoTime t, double rate_N_per_s, double behind_N) noexcept;
-  // At least that; 0: nothing is known yet. While the answer to a step of the rate is under way it
-  // may be more than the truth, for the rate is put late by a lag alone: of the configured actuator
-  // up to 1.25 times where a third of its answer is dead time, 1.5 times where all of it is.
-  double least_s() const noexcept;
+  struct Actuator {
+    double dead_time_s = 0.0;
+    double lag_s = 0.0;
+  };
+  // One reading of the force: a standard deviation, and the steps in which it is told.
+  struct Reading {
+    double noise_N = 0.0;
+    double step_N = 0.0;
+  };
+  // What passes beside the actuator, from a request to its reading. Chosen: a frame, the
+  // controller's cycle and a frame back, of 10 ms each.
+  static constexpr double kTransport_s = 0.03;
+
+  struct Setup {
+    double force_N = 0.0;  // asked for so far
+    Actuator configured;
+    Reading reading;
+    Duration sample = 1;  // between two calls of ask()
+  };
+  void begin(MonoTime t, const Setup& setup) noexcept;
+  // Every sample.
+  void ask(MonoTime t, double force_N) noexcept;
+  // From now on readings count: the force has fallen by so much, at this rate, and rests or creeps.
+  void measure(MonoTime t, double fallen_N, double rate_N_per_s) noexcept;
+  // It falls on.
+  void resume() noexcept { rests_ = false; }
+  // Every reading, with its own stamp.
+  void read(MonoTime t, double force_N) noexcept;
+
+  // The least and the most of the credible lags; while nothing is known: 0, and no end.
+  double least_s() const noexcept { return least_s_; }
+  double most_s() const noexcept { return most_s_; }
 
  private:
-  double configured_s_ = 0.0;
-  MonoTime begun_ = 0, last_ = 0;
-  double rate_N_per_s_ = 0.0;  // as the reading shows it, later by about the lag
-  double n_ = 0.0, rate_mean_ = 0.0, behind_mean_ = 0.0;
-  double rate_square_ = 0.0, behind_square_ = 0.0, product_ = 0.0;  // about the means, sums
+  // Of an actuator that answers at once but for dead time, what is quicker than configured; and of
+  // one that answers as configured, later. The longest is some four times what is configured: what
+  // is later still does not follow at all.
+  static constexpr std::size_t kQuick = 4, kLate = 24;
+  static constexpr std::size_t kKept = kLate + 3;
+  struct Course {
+    double now_N = 0.0;
+    std::array<double, kKept> kept_N{};  // every period_
+  };
+  std::size_t lags() const noexcept { return quick_ + kLate; }
+  double lag_s(std::size_t i) const noexcept {
+    return i < quick_ ? static_cast<double>(i + 1) * seconds(period_)
+                      : own_s_ + static_cast<double>(i - quick_ + 1) * seconds(period_);
+  }
+  void compare(const Course& course, std::size_t from, std::size_t count, double share,
+               std::size_t newest, double force_N) noexcept;
+  void bound() noexcept;
+
+  double own_s_ = 0.0;                          // of the answer, what is no dead time
+  double answered_ = 0.0;                       // share of it within a sample
+  double noise_N_ = 0.0;                        // of one reading, with its rounding
+  double rounding_N_ = 0.0, rounding_s_ = 0.0;  // that no mean over readings at rest takes away
+  double step_N_ = 0.0, rests_from_N_ = 0.0;
+  double crept_ = 0.0;  // through so much of a step, at rest
+  bool rests_ = false;
+  Duration enough_ = 0;  // how long readings are taken before they tell
+  Duration period_ = 1;
+  std::size_t quick_ = 0;  // of kQuick, those below the first of the others
+  double offset_most_N_ = 0.0;
+  Course asked_, answered_to_;  // what is asked for; and as answered without dead time
+  std::size_t newest_at_ = 0;   // where the newest is that is kept,
+  MonoTime newest_ = 0;         // and its instant
+  bool measures_ = false;
+  MonoTime measures_since_ = 0;
+  double n_ = 0.0;
+  std::array<double, kQuick + kLate> sums_N_{},
+      squares_N2_{};  // of how far readings lie off each course
+  double least_s_ = 0.0;
+  double most_s_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace beltgrip::daemon

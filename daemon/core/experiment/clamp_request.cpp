@@ -20,8 +20,6 @@ constexpr double kRateDeviations = 4.5;
 constexpr double kRateLeast_1_s = 0.011;
 constexpr double kSlipGrows_1_s = 0.006;  // a belt that holds creeps slower than this
 constexpr double kDecision_s = 0.02;      // to the next frame, and the receiver's cycle
-constexpr double kLagShare = 1.3;         // of the configured: the crossing was planned for less
-constexpr double kTransport_s = 0.03;     // cycle, frame and filters, beside the actuator
 // The floor falls with the square of the secondary's speed, whose noise must not carry the request
 // below it.
 constexpr double kFloorNoise_N = 10.0;
@@ -38,7 +36,9 @@ constexpr double kStuckFriction = 0.8;  // of the friction expected: the belt is
 }  // namespace
 
 ClampRequest::ClampRequest(const Config& config)
-    : settings_(config.experiment), rate_max_N_per_s_(config.estimator.ramp_rate_max_N_per_s) {
+    : settings_(config.experiment),
+      rate_max_N_per_s_(config.estimator.ramp_rate_max_N_per_s),
+      sample_(std::llround(static_cast<double>(kSecond) / config.estimator.sample_rate_hz)) {
   for (const RoleBinding& binding : config.roles) {
     if (binding.role != Role::kVehicleSpeed) continue;
     speed_step_m_s_ =
@@ -46,7 +46,8 @@ ClampRequest::ClampRequest(const Config& config)
   }
 }
 
-void ClampRequest::begin(const Now& now, const RequestPlan& plan, double floor_N) noexcept {
+void ClampRequest::begin(const Now& now, const RequestPlan& plan, double floor_N,
+                         const AnswerLag::Reading& reading) noexcept {
   standing_ = true;
   followed_ = true;
   far_ = true;
@@ -64,7 +65,11 @@ void ClampRequest::begin(const Now& now, const RequestPlan& plan, double floor_N
   start_wheels_ = now.speed_m_s / now.omega_s_rad_s;
   slip_.begin(start_ratio_, start_torque_Nm_);
   damage_.begin(now.t, std::abs(now.mu_star));
-  lag_.begin(now.t, answer_s());
+  proof_.begin(now.t, {.force_N = force_N_,
+                       .follow_band_N = kFollowBand * force_N_ + kFollowBand_N,
+                       .configured = {settings_.actuator_dead_time_s, settings_.actuator_lag_s},
+                       .reading = reading,
+                       .sample = sample_});
   asked_count_ = 1;
   asked_[0] = {now.t, force_N_, 0.0};
 }
@@ -81,7 +86,17 @@ void ClampRequest::follow_belt(const Now& now) noexcept {
                 .power_W = power_W(now),
                 .slip_speed_m_s = slip_.slip() * now.omega_p_rad_s * plan_.primary_radius_m,
                 .grows = rides_ || slip_.rate_1_s() > kSlipGrows_1_s});
-  lag_.step(now.t, rate_N_per_s_, now.clamp_force_N - force_N_);
+  proof_.step({.t = now.t,
+               .asked_N = force_N_,
+               .read_at = now.read_at,
+               .read_N = now.read_N,
+               .near = std::abs(now.mu_star) > law_.mu_far,
+               .on_floor = rides_});
+}
+
+void ClampRequest::hold(MonoTime t) noexcept {
+  last_ = t;
+  proof_.ask(t, force_N_);
 }
 
 Stop ClampRequest::judge_slip(const Now&) const noexcept {
@@ -144,16 +159,28 @@ Stop ClampRequest::judge_room(const Now& now) const noexcept {
              .limit = kPercent * room,
              .unit = "%"}};
   }
-  const double lag_most_s = kLagShare * (answer_s() + kTransport_s);
-  if (!damage_.beyond() && lag_.least_s() > lag_most_s) {
-    return {StopReason::kLag,
-            {.what = "clamping force answers after",
-             .figure = lag_.least_s(),
-             .limit = lag_most_s,
-             .unit = "s",
-             .further = "configured",
-             .further_figure = answer_s(),
-             .further_unit = "s"}};
+  return {};
+}
+
+// Beyond the peak it is too late to ask for less.
+Stop ClampRequest::judge_lag() const noexcept {
+  if (damage_.beyond()) return {};
+  const auto answers = [this](const char* what, double figure_s, double limit_s) {
+    return Stop{StopReason::kLag,
+                {.what = what,
+                 .figure = figure_s,
+                 .limit = limit_s,
+                 .unit = "s",
+                 .further = "configured",
+                 .further_figure = answer_s(),
+                 .further_unit = "s"}};
+  };
+  if (proof_.late()) {
+    return answers("clamping force answers after", proof_.least_s(), proof_.late_s());
+  }
+  if (proof_.unshown()) {
+    return answers("clamping force is not shown to answer before", proof_.most_s(),
+                   proof_.credible_s());
   }
   return {};
 }
@@ -178,6 +205,7 @@ Stop ClampRequest::judge(const Now& now, double floor_N) const noexcept {
   if (const Stop stop = judge_slip(now)) return stop;
   if (const Stop stop = judge_damage(now)) return stop;
   if (const Stop stop = judge_room(now)) return stop;
+  if (const Stop stop = judge_lag()) return stop;
   if (const Stop stop = judge_floor(now, floor_N)) return stop;
   if (now.t - begun_ >= limits::kRequestLongest) {
     return {StopReason::kTime,
@@ -251,13 +279,21 @@ std::optional<Role> ClampRequest::untrue_speed(const Now& now, double drift) con
   return std::nullopt;
 }
 
+// Noise of the slip rate alone may say that the peak is near; the fall to the rest need not be slow
+// for that, for it goes no further until the answer is known.
+double ClampRequest::wanted_rate_N_per_s(double mu_star) const noexcept {
+  if (proof_.rests()) return std::min(proof_.rest_N_per_s(), law_.rate_max_N_per_s);
+  if (far_) return law_.rate_max_N_per_s;
+  RampLaw law = law_;
+  if (proof_.falls()) law.mu_top = law.mu_far;
+  return ramp_near_N_per_s(law, mu_star, slip_.rate_1_s());
+}
+
 // The force that the ramp has come to, not below the floor.
 double ClampRequest::lowered_N(const Now& now, double floor_N) noexcept {
   const double step_s = seconds(now.t - last_);
   far_ = far_ && peak_is_far(law_, std::abs(now.mu_star), slip_.rate_1_s());
-  const double wanted_N_per_s =
-      far_ ? law_.rate_max_N_per_s
-           : ramp_near_N_per_s(law_, std::abs(now.mu_star), slip_.rate_1_s());
+  const double wanted_N_per_s = wanted_rate_N_per_s(std::abs(now.mu_star));
   return std::max(force_N_ - wanted_N_per_s * step_s, std::min(force_N_, floor_N + kFloorNoise_N));
 }
 
@@ -279,6 +315,7 @@ void ClampRequest::go_to(const Now& now, double floor_N, double force_N) noexcep
     ++asked_count_;
   }
   last_ = now.t;
+  proof_.ask(now.t, force_N_);
   off_N_ = std::abs(now.clamp_force_N - force_N_);
   if (off_N_ <= follow_band_N()) off_since_ = now.t;
   followed_ = now.t - off_since_ <= kFollowTime;

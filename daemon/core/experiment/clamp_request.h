@@ -10,7 +10,8 @@
 //   SlipEnergy   beyond the peak, as slip_damage has it: energy with what is still to come, power,
 //                or time at high slip speed
 //   Room         a peak that came now could not be crossed inside the promised limits any more
-//   Lag          the force answers later than the crossing was planned for
+//   Lag          the force answers later than the crossing was planned for, or did not show in the
+//                rest of its fall that it does not
 //   ForceFloor   the request is at its floor, which no longer falls with the speed, or has risen;
 //                or the coast-down is over, or friction larger than was expected
 //   Time         the request has stood for kRequestLongest
@@ -30,7 +31,7 @@
 #include "daemon/core/base/limits.h"
 #include "daemon/core/base/mono_time.h"
 #include "daemon/core/config/options/config.h"
-#include "daemon/core/experiment/answer_lag.h"
+#include "daemon/core/experiment/answer_proof.h"
 #include "daemon/core/experiment/ramp_rate.h"
 #include "daemon/core/experiment/reachability.h"
 #include "daemon/core/experiment/request_plan.h"
@@ -64,14 +65,18 @@ class ClampRequest {
     double mu_star = 0.0;
     double omega_e_rad_s = 0.0;  // engine, lock-up closed; 0: not known
     double speed_m_s = 0.0;      // of the vehicle; 0: not known
+    // The force as the pressure's newest value has it, and when that came.
+    MonoTime read_at = 0;
+    double read_N = 0.0;
   };
-  void begin(const Now& now, const RequestPlan& plan, double floor_N) noexcept;
+  void begin(const Now& now, const RequestPlan& plan, double floor_N,
+             const AnswerLag::Reading& reading) noexcept;
   // Every sample while it stands and the inputs are usable.
   void step(const Now& now, double floor_N) noexcept;
   // Instead, where another has asked: its force.
   void follow(const Now& now, double floor_N, double force_N) noexcept;
   // And while they are not: the force stays.
-  void hold(MonoTime t) noexcept { last_ = t; }
+  void hold(MonoTime t) noexcept;
   // Also without a request: the cool-down begins.
   void end(MonoTime t) noexcept;
 
@@ -108,10 +113,12 @@ class ClampRequest {
   Stop judge_slip(const Now& now) const noexcept;
   Stop judge_damage(const Now& now) const noexcept;
   Stop judge_room(const Now& now) const noexcept;
+  Stop judge_lag() const noexcept;
   Stop judge_floor(const Now& now, double floor_N) const noexcept;
   Stop judge_course(const Now& now) const noexcept;
   std::optional<Role> untrue_speed(const Now& now, double drift) const noexcept;
   void follow_belt(const Now& now) noexcept;
+  double wanted_rate_N_per_s(double mu_star) const noexcept;
   double lowered_N(const Now& now, double floor_N) noexcept;
   void go_to(const Now& now, double floor_N, double force_N) noexcept;
   double answer_s() const noexcept {
@@ -150,7 +157,8 @@ class ClampRequest {
   double floor_first_N_ = 0.0;
   SlipCourse slip_;
   SlipDamage damage_;
-  AnswerLag lag_;
+  AnswerProof proof_;
+  Duration sample_;  // between two
   // The force asked for, every kCoursePeriod; newest at count - 1.
   struct Asked {
     MonoTime t = 0;

@@ -7,6 +7,7 @@
 
 #include "daemon/core/base/limits.h"
 #include "daemon/core/experiment/stop_of.h"
+#include "estimator/physics/clamp_force.h"
 
 namespace beltgrip::daemon {
 
@@ -201,6 +202,7 @@ ClampRequest::Now ExperimentStage::request_now(const Now& now) const noexcept {
   const VariatorSample& sample = now.input.sample();
   const estimator::CurveEstimate& curve = now.estimate.curve();
   const InputMonitor& channels = now.input.channels();
+  const SignalHistory& pressure = channels.history(Role::kSecondaryPressure);
   return {now.t,
           sample.omega_p_rad_s,
           sample.omega_s_rad_s,
@@ -208,7 +210,16 @@ ClampRequest::Now ExperimentStage::request_now(const Now& now) const noexcept {
           now.estimate.measured_force_N(),
           curve.mu_star,
           channels.value_if_known(Role::kEngineSpeed),
-          channels.value_if_known(Role::kVehicleSpeed)};
+          channels.value_if_known(Role::kVehicleSpeed),
+          pressure.newest() - channels.delay(Role::kSecondaryPressure),
+          estimator::secondary_clamp_force_N(config_.variator, pressure.newest_value(),
+                                             sample.omega_s_rad_s)};
+}
+
+AnswerLag::Reading ExperimentStage::force_reading(const Now& now) const noexcept {
+  const ValueCourse& pressure = now.input.channels().course(Role::kSecondaryPressure);
+  const double area_m2 = config_.variator.secondary_piston_area_m2;
+  return {area_m2 * pressure.noise(), area_m2 * pressure.resolution()};
 }
 
 void ExperimentStage::count(const Now& now) noexcept {
@@ -437,7 +448,8 @@ Action ExperimentStage::apply(const Transition& transition, const Now& now) noex
 void ExperimentStage::start(const Now& now) noexcept {
   const VariatorSample& sample = now.input.sample();
   if (commands()) {
-    request_.begin(request_now(now), arming_.plan(), arming_.floor_N(sample.omega_s_rad_s));
+    request_.begin(request_now(now), arming_.plan(), arming_.floor_N(sample.omega_s_rad_s),
+                   force_reading(now));
     if (by_record_) followed_ = recorded_.standing();
   }
   own_force_N_ = now.estimate.measured_force_N();

@@ -104,6 +104,7 @@ class ExperimentStage {
   Stop ended_by(const estimator::VariatorSample& sample) const noexcept;
   bool observed_over(const Now& now) const noexcept;
   ClampRequest::Now request_now(const Now& now) const noexcept;
+  AnswerLag::Reading force_reading(const Now& now) const noexcept;
   bool starved(const Now& now) const noexcept;
   Stop lost(const Now& now) const noexcept;
   void withdraw(const Stop& stop) noexcept;

@@ -17,9 +17,12 @@ Sabotage& sabotage() {
 namespace beltgrip::daemon {
 
 ClampRequest::ClampRequest(const Config& config)
-    : settings_(config.experiment), rate_max_N_per_s_(config.estimator.ramp_rate_max_N_per_s) {}
+    : settings_(config.experiment),
+      rate_max_N_per_s_(config.estimator.ramp_rate_max_N_per_s),
+      sample_(0) {}
 
-void ClampRequest::begin(const Now& now, const RequestPlan&, double) noexcept {
+void ClampRequest::begin(const Now& now, const RequestPlan&, double,
+                         const AnswerLag::Reading&) noexcept {
   standing_ = followed_ = true;
   begun_ = last_ = now.t;
   force_N_ = start_force_N_ = test::sabotage().start_share * now.clamp_force_N;
@@ -43,6 +46,8 @@ void ClampRequest::step(const Now& now, double) noexcept {
 }
 
 void ClampRequest::follow(const Now& now, double floor_N, double) noexcept { step(now, floor_N); }
+
+void ClampRequest::hold(MonoTime t) noexcept { last_ = t; }
 
 void ClampRequest::end(MonoTime t) noexcept {
   standing_ = false;

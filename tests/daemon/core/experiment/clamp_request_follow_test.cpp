@@ -33,7 +33,7 @@ class Followed : public testing::Test {
     now_ = {kSecond, 140.0, 315.0, -30.0, force_N, 0.05};
     told_N_ = force_N;
     request_ = ClampRequest(Config{});
-    request_.begin(now_, plan(), kFloor_N);
+    request_.begin(now_, plan(), kFloor_N, {});
   }
   void sample(double off_N = 0.0) {
     now_.clamp_force_N = told_N_ + off_N;
@@ -275,7 +275,7 @@ TEST(SecondRequest, KnowsNothingOfTheFirst) {
   for (const double floor_N : {kFloor_N, kHighFloor_N}) {
     ClampRequest fresh{Config{}}, second{Config{}};
     ClampRequest::Now now = start;
-    second.begin(now, plan(), kHighFloor_N);
+    second.begin(now, plan(), kHighFloor_N, {});
     for (int i = 0; i < 150; ++i) {
       now.t += kSample;
       now.mu_star = i < 50 ? 0.1 : 0.105;
@@ -287,8 +287,8 @@ TEST(SecondRequest, KnowsNothingOfTheFirst) {
     second.end(now.t);
     now = start;
     now.t += 100 * kSecond;
-    fresh.begin(now, plan(), floor_N);
-    second.begin(now, plan(), floor_N);
+    fresh.begin(now, plan(), floor_N, {});
+    second.begin(now, plan(), floor_N, {});
     EXPECT_TRUE(second.followed());
     EXPECT_EQ(second.follow_band_N(), 280.0);
     EXPECT_EQ(second.rate_least_N_per_s(), 600.0);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 namespace beltgrip::daemon {
 namespace {
@@ -32,14 +33,23 @@ class Request : public testing::Test {
   void SetUp() override {
     request_ = ClampRequest(Config{});
     now_ = {kSecond, 140.0, 315.0, -30.0, 4000.0, 0.05};
-    request_.begin(now_, plan(), kFloor);
+    request_.begin(now_, plan(), kFloor, {});
   }
   // One sample; the controller follows unless told otherwise.
   StopReason sample(double off_N = 0.0) {
     now_.t += kSample;
-    now_.clamp_force_N = request_.force_N() + off_N;
+    now_.clamp_force_N = now_.read_N = request_.force_N() + off_N;
+    now_.read_at = now_.t;
     request_.step(now_, kFloor);
     return request_.backup_stop();
+  }
+  void past_its_rest() {
+    double before_N = 0.0;
+    for (int rested = 0; rested == 0 || request_.force_N() == before_N;) {
+      before_N = request_.force_N();
+      ASSERT_EQ(sample(), StopReason::kNone);
+      rested += request_.force_N() == before_N ? 1 : 0;
+    }
   }
   // Overrun: slip makes the primary slow.
   void slip(double share) { now_.omega_p_rad_s = 140.0 / (1.0 + share); }
@@ -48,16 +58,21 @@ class Request : public testing::Test {
   ClampRequest::Now now_;
 };
 
-// Far from the peak at the largest rate, 600 N/s; near it at the top's; and it rests on a floor
-// that does not fall for a second.
+// Far from the peak at the largest rate, 600 N/s, to the rest after 5 % of the force and 80 N; then
+// near it at the top's; and it rests on a floor that does not fall for a second.
 TEST_F(Request, FallsFastThenSlowlyToTheFloorAndEndsThere) {
   double before = request_.force_N();
   EXPECT_EQ(before, 4000.0);
-  for (int i = 0; i < 100; ++i) {
+  for (int i = 0; i < 94; ++i) {  // 280 N
     ASSERT_EQ(sample(), StopReason::kNone);
-    ASSERT_NEAR(before - request_.force_N(), 3.0, 1e-6);
+    ASSERT_NEAR(before - request_.force_N(), 3.0, 1e-6) << i;
     before = request_.force_N();
   }
+  int rested = 0;
+  while (sample() == StopReason::kNone && request_.force_N() == before) ++rested;
+  EXPECT_NEAR(rested, 72, 1);  // 1.5 times 0.21 s of the actuator and 0.03 s of the bus
+  EXPECT_NEAR(before - request_.force_N(), 3.0, 1e-6);
+  before = request_.force_N();
   now_.mu_star = 0.0936;  // above 0.85 of 0.11
   int at_floor = 0;
   while (sample() == StopReason::kNone) {
@@ -70,8 +85,20 @@ TEST_F(Request, FallsFastThenSlowlyToTheFloorAndEndsThere) {
   EXPECT_NEAR(at_floor, 201, 2);
 }
 
+// Noise of the slip rate may say before that the peak is near.
+TEST_F(Request, FallsFastToItsRestWhateverTheSlipRate) {
+  now_.mu_star = 0.09;  // of no peak's, with 0.8 of 0.085, and below 0.85 of 0.11
+  for (int i = 0; i < 20; ++i) {
+    slip(i % 2 == 0 ? 5e-4 : 0.0);
+    const double before = request_.force_N();
+    ASSERT_EQ(sample(), StopReason::kNone);
+    ASSERT_NEAR(before - request_.force_N(), 3.0, 1e-6) << i;
+  }
+}
+
 // 0.85 of the largest friction expected is near, once for all; below 0.8 of the least none lies.
 TEST_F(Request, IsSlowWhereAPeakMayLie) {
+  past_its_rest();
   const auto fallen_N = [&](double mu_star) {
     const double before_N = request_.force_N();
     now_.mu_star = mu_star;
@@ -144,7 +171,7 @@ class Slipping : public Request {
 TEST_F(Slipping, SlipThatFrictionRisesWithIsNoDamage) {
   now_.torque_Nm = -10.0;  // room for late peaks
   const RequestPlan roomy = roomy_plan();
-  request_.begin(now_, roomy, kFloor);
+  request_.begin(now_, roomy, kFloor, {});
   const Slipped end = until_stop(0.025, 1.0);
   EXPECT_EQ(end.stop, StopReason::kSlip);
   EXPECT_NEAR(end.share, 0.07, 0.001);
@@ -154,7 +181,7 @@ TEST_F(Slipping, SlipThatFrictionRisesWithIsNoDamage) {
 TEST_F(Slipping, SlipPastTheLargestFrictionStops) {
   now_.torque_Nm = -3.0;  // no energy to speak of
   const RequestPlan roomy = roomy_plan();
-  request_.begin(now_, roomy, kFloor);
+  request_.begin(now_, roomy, kFloor, {});
   const Slipped end = until_stop(0.02, 0.02);
   EXPECT_EQ(end.stop, StopReason::kSlip);
   EXPECT_NEAR(end.share, 0.04 + 0.02 * 0.1, 0.003);
@@ -164,7 +191,7 @@ TEST_F(Slipping, SlipPastTheLargestFrictionStops) {
 // is still to come counts, 0.21 + 0.02 s of it: 33 of 55 J.
 TEST_F(Slipping, EnergyBeyondTheLargestFrictionStops) {
   const RequestPlan roomy = roomy_plan();
-  request_.begin(now_, roomy, kFloor);
+  request_.begin(now_, roomy, kFloor, {});
   const Slipped end = until_stop(0.02, 0.02);
   EXPECT_EQ(end.stop, StopReason::kSlipEnergy);
   EXPECT_NEAR(end.since_level_s, (55.0 - 33.0) / 138.0 + 0.1, 0.06);
@@ -173,17 +200,17 @@ TEST_F(Slipping, EnergyBeyondTheLargestFrictionStops) {
 TEST_F(Slipping, ASlipRateAboveWhatIsHeldStopsOnceFrictionIsLevel) {
   const RequestPlan roomy = roomy_plan();
   now_.torque_Nm = -10.0;
-  request_.begin(now_, roomy, kFloor);
+  request_.begin(now_, roomy, kFloor, {});
   const Slipped held = until_stop(0.035, 1.0);  // below 2.5 + 1.1 %/s
   EXPECT_EQ(held.stop, StopReason::kSlip);
   SetUp();
   now_.torque_Nm = -10.0;
-  request_.begin(now_, roomy, kFloor);
+  request_.begin(now_, roomy, kFloor, {});
   const Slipped rises = until_stop(0.06, 1.0);
   EXPECT_EQ(rises.stop, StopReason::kSlip);
   SetUp();
   now_.torque_Nm = -10.0;
-  request_.begin(now_, roomy, kFloor);
+  request_.begin(now_, roomy, kFloor, {});
   const Slipped level = until_stop(0.06, 0.02);
   EXPECT_EQ(level.stop, StopReason::kSlipRate);
   EXPECT_LT(level.since_level_s, 0.25);
@@ -199,29 +226,40 @@ TEST_F(Slipping, ABeltThatRunsAwayStopsWhateverFrictionDoes) {
 TEST_F(Slipping, APeakThatHasNoRoomIsNotWaitedFor) {
   RequestPlan dear = plan();
   dear.crossing.dearest = {0.01, 0.6, 0.001};
-  request_.begin(now_, dear, kFloor);
+  request_.begin(now_, dear, kFloor, {});
   const Slipped end = until_stop(0.02, 1.0);
   EXPECT_EQ(end.stop, StopReason::kRoom);
   EXPECT_NEAR(end.share, 0.024, 0.002);
 }
 
-// The force answers twice as late as configured, 0.06 + 0.15 s: the step from fast to slow shows
-// it, an offset of the reading does not.
+// The force answers later than configured, 0.06 + 0.15 s, or a reading of it says so little that it
+// might: the rest in the fall shows it, an offset of the reading does not.
 TEST_F(Request, AnAnswerThatIsLaterThanConfiguredStops) {
-  for (const double lag_s : {0.21, 0.42}) {
-    for (const double offset_N : {-60.0, 60.0}) {
-      SetUp();
-      double behind_N = 0.0;
-      StopReason stop = StopReason::kNone;
-      for (int i = 0; i < 700 && stop == StopReason::kNone; ++i) {
-        if (i == 250) now_.mu_star = 0.0936;  // near the peak
-        now_.t += kSample;
-        behind_N += 5e-3 / lag_s * (lag_s * request_.rate_N_per_s() - behind_N);
-        now_.clamp_force_N = request_.force_N() + behind_N + offset_N;
-        request_.step(now_, kFloor);
-        stop = request_.backup_stop();
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  for (const double noise_N : {0.0, 20.0, 2000.0}) {
+    for (const double lag_s : {0.21, 0.60}) {
+      for (const double offset_N : {-100.0, 0.0, 100.0}) {
+        now_ = {kSecond, 140.0, 315.0, -30.0, 4000.0, 0.05};
+        request_ = ClampRequest(Config{});
+        request_.begin(now_, plan(), kFloor, {noise_N, 1.0});
+        double given_N = 4000.0;
+        StopReason stop = StopReason::kNone;
+        for (int i = 0; i < 500 && stop == StopReason::kNone; ++i) {
+          if (i == 400) now_.mu_star = 0.0936;  // near the peak
+          now_.t += kSample;
+          given_N += 5e-3 / lag_s * (request_.force_N() - given_N);
+          now_.clamp_force_N = given_N + offset_N;
+          now_.read_N = now_.clamp_force_N + noise_N * normal(random);
+          now_.read_at = now_.t;
+          request_.step(now_, kFloor);
+          stop = request_.backup_stop();
+        }
+        const bool stops = lag_s > 0.3 || noise_N > 100.0;
+        EXPECT_EQ(stop, stops ? StopReason::kLag : StopReason::kNone)
+            << lag_s << ' ' << offset_N << ' ' << noise_N << ' ' << request_.cause().what << ' '
+            << request_.cause().figure;
       }
-      EXPECT_EQ(stop, lag_s > 0.3 ? StopReason::kLag : StopReason::kNone) << lag_s << offset_N;
     }
   }
 }
@@ -230,7 +268,7 @@ TEST_F(Request, TimeStops) {
   RequestPlan still = plan(1e-3);
   still.mu_expected = 0.05;  // near the peak from the first sample on
   still.mu_least = 0.05;
-  request_.begin(now_, still, kFloor);
+  request_.begin(now_, still, kFloor, {});
   while (now_.t < kSecond + limits::kRequestLongest - kSample) {
     ASSERT_EQ(sample(), StopReason::kNone);
   }
@@ -251,7 +289,7 @@ TEST_F(Request, EngineSpeedStopsOnAJumpEitherWay) {
   for (const double factor : {1.07, 0.93}) {
     SetUp();
     now_.torque_Nm = 30.0;
-    request_.begin(now_, plan(), kFloor);
+    request_.begin(now_, plan(), kFloor, {});
     now_.omega_p_rad_s *= factor;
     sample();
     EXPECT_NE(request_.backup_stop(), StopReason::kNone);
@@ -284,7 +322,7 @@ class Course : public Request {
     Request::SetUp();
     now_.omega_e_rad_s = 140.5;
     now_.speed_m_s = 17.5;
-    request_.begin(now_, plan(), kFloor);
+    request_.begin(now_, plan(), kFloor, {});
   }
   std::optional<Role> role() const { return request_.cause().role; }
 };
@@ -348,7 +386,7 @@ TEST_F(Request, NoticesAControllerThatDoesNotFollow) {
     EXPECT_FALSE(request_.followed());
     sample();
     EXPECT_TRUE(request_.followed());
-    for (int i = 0; i < 100; ++i) {
+    for (int i = 0; i < 40; ++i) {
       sample(sign * (0.05 * request_.force_N() + 80.0 + 600.0 * 0.21 - 15.0));
       EXPECT_TRUE(request_.followed()) << i;
     }

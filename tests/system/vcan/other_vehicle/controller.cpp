@@ -72,7 +72,8 @@ double Controller::command_N(double t_s, double secondary_rad_s) {
   if (asked_N_ && !permits) give_back(t_s);
   if (asked_N_ && t_s > heard_s_ + kSilence_s) give_back(t_s);
   if (holds_on) return given_N_;
-  if (!asked_N_ || deaf) return own_N_;
+  if (!asked_N_ || deaf) return has_given_ ? stays_share * own_N_ : own_N_;
+  has_given_ = true;
   const double floor_N = clamp_N(kFloor_Pa, secondary_rad_s);
   const double slowest_N = given_N_ - kOwnRate_N_per_s * kCycle_s;
   given_N_ = std::min(own_N_, std::max({given_share * *asked_N_, floor_N, slowest_N}));

@@ -24,6 +24,7 @@ class Controller {
   bool deaf = false;         // one that does not obey
   bool holds_on = false;     // one that does not take its force back
   double given_share = 1.0;  // one that gives less than was asked for
+  double stays_share = 1.0;  // after a request, one that comes back to less of its own force
 
  private:
   void begin_or_follow(double t_s, double force_N);
@@ -39,6 +40,7 @@ class Controller {
   double ended_s_ = -1e9;
   std::optional<unsigned> counter_;
   bool idle_seen_ = false;
+  bool has_given_ = false;
 };
 
 // Force of the own clamping law for this torque.

@@ -2,11 +2,11 @@
 // them, and those of BeltGrip, read by the published layout.
 #pragma once
 
+#include <linux/can.h>
+
 #include <cstdint>
 #include <string>
 #include <vector>
-
-#include "tests/system/vcan/vcan_fixture.h"
 
 namespace beltgrip::other {
 
