@@ -222,6 +222,16 @@ AnswerLag::Reading ExperimentStage::force_reading(const Now& now) const noexcept
   return {area_m2 * pressure.noise(), area_m2 * pressure.resolution()};
 }
 
+// The torque as it came last, not as the sampler delays it.
+DriveChanges::Now ExperimentStage::drive_now(const Now& now) const noexcept {
+  const Role torque =
+      config_.estimator.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque;
+  const SignalHistory& history = now.input.channels().history(torque);
+  return {.t = now.t,
+          .accelerator = conditions_.accelerator,
+          .torque_Nm = history.empty() ? 0.0 : history.newest_value()};
+}
+
 void ExperimentStage::count(const Now& now) noexcept {
   if (state_ != State::kRamping || !now.input.sample().usable) return;
   ++running_.samples;
@@ -236,6 +246,7 @@ RoleSet ExperimentStage::step_request(const Now& now) noexcept {
   RoleSet still;
   backup_stop_ = withdrawn_ = {};
   if (!commands()) return still;
+  const Stop changed = changes_.step(drive_now(now));
   if (state_ == State::kRamping) {
     if (!conditions_.fresh) withdraw(now.input.missing_condition());
     if (now.input.channels().suspect()) {
@@ -243,6 +254,7 @@ RoleSet ExperimentStage::step_request(const Now& now) noexcept {
     }
     withdraw(arming_.ended_by(conditions_));
     withdraw_for_bus(now);
+    withdraw(changed);
     if (now.input.sample().usable && now.estimate.curve().usable) {
       const double floor_N = arming_.floor_N(now.input.sample().omega_s_rad_s);
       if (!by_record_) {
@@ -259,6 +271,8 @@ RoleSet ExperimentStage::step_request(const Now& now) noexcept {
     } else {
       request_.hold(now.t);
     }
+    const bool stops = backup_stop_ || now.estimate.curve().stop != StopReason::kNone;
+    if (stops) withdraw(changes_.unsettled());
     if (by_record_) go_by_record(now.estimate.curve(), still);
   }
   if (state_ == State::kReleasing && !refused_) judge_release(now, still);

@@ -14,6 +14,7 @@
 #include "daemon/core/estimate/known_friction.h"
 #include "daemon/core/experiment/arming.h"
 #include "daemon/core/experiment/clamp_request.h"
+#include "daemon/core/experiment/drive_changes.h"
 #include "daemon/core/experiment/experiment.h"
 #include "daemon/core/experiment/fall_shown.h"
 #include "daemon/core/experiment/recorded_requests.h"
@@ -105,6 +106,7 @@ class ExperimentStage {
   bool observed_over(const Now& now) const noexcept;
   ClampRequest::Now request_now(const Now& now) const noexcept;
   AnswerLag::Reading force_reading(const Now& now) const noexcept;
+  DriveChanges::Now drive_now(const Now& now) const noexcept;
   bool starved(const Now& now) const noexcept;
   Stop lost(const Now& now) const noexcept;
   void withdraw(const Stop& stop) noexcept;
@@ -126,6 +128,7 @@ class ExperimentStage {
   const Config& config_;
   Arming arming_;
   ClampRequest request_;
+  DriveChanges changes_;
   bool by_record_;
   RecordedRequests recorded_;
   bool would_ask_ = false;                     // were it not for recorded_, since the trigger holds

@@ -104,5 +104,58 @@ TEST(OtherController, OneThatObeysLaterIsNoticedBeforeThePeak) {
   }
 }
 
+// A driver who steps on the pedal while the belt is driven: the request ends in the first sample
+// that knows it, a sample and a frame later at the most, and says nothing of the belt.
+TEST(OtherController, ADriverWhoStepsOnThePedalEndsTheRequest) {
+  constexpr double kAtOnce_s = 0.010;
+  for (const double step_percent : {5.0, 8.0, 10.0, 15.0, 20.0}) {
+    for (const double slip_percent : {1.0, 1.8, 2.4}) {
+      for (std::size_t seed = 1; seed <= kDrives; ++seed) {
+        SCOPED_TRACE(testing::Message() << step_percent << " at " << slip_percent << ", " << seed);
+        VirtualDrive car({kDrive_Nm, 1.0}, seed);
+        ASSERT_TRUE(car.until(
+            [&] { return car.account().request_stands() && car.slip_percent() > slip_percent; },
+            40.0));
+        const double from_s = car.t_s();
+        const std::size_t results = car.account().results().size();
+        const std::size_t ended = car.experiments().size();
+        car.pedal_percent += step_percent;
+        car.drive_on(1.4);
+        EXPECT_LT(car.account().requests().back().last_active_s, from_s + kAtOnce_s);
+        EXPECT_EQ(car.account().results().size(), results);
+        ASSERT_EQ(car.experiments().size(), ended + 1);
+        EXPECT_EQ(car.experiments().back().stop_reason, StopReason::kDriver);
+        EXPECT_EQ(car.experiments().back().outcome, daemon::Outcome::kAborted);
+        expect_no_harm(car.account());
+      }
+    }
+  }
+}
+
+// So little that only the torque shows it. What is told of the belt then is right all the same.
+TEST(OtherController, WhatIsToldOfABeltWhoseTorqueMovesIsRight) {
+  for (const double step_percent : {-2.5, 1.5, 2.0, 2.5}) {
+    for (const double slip_percent : {1.0, 1.4, 1.8, 2.1, 2.4}) {
+      for (std::size_t seed = 1; seed <= kDrives; ++seed) {
+        SCOPED_TRACE(testing::Message() << step_percent << " at " << slip_percent << ", " << seed);
+        VirtualDrive car({kDrive_Nm, 1.0}, seed);
+        ASSERT_TRUE(car.until(
+            [&] { return car.account().request_stands() && car.slip_percent() > slip_percent; },
+            40.0));
+        car.pedal_percent += step_percent;
+        car.drive_on(1.4);
+        for (const Result& each : car.account().results()) {
+          if (each.kind == kValue) {
+            EXPECT_NEAR(each.mu_max, car.mu_max(), 3.0 * each.std);
+          } else {
+            EXPECT_LT(each.mu_max, car.mu_max());
+          }
+        }
+        expect_no_harm(car.account());
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace beltgrip::other
