@@ -31,7 +31,8 @@ enum class Fault : std::uint8_t {
   kHistoryUnwritten,  // the history of experiments cannot be read or written as it should
   kInputRate,         // an input message comes too often or too seldom
   kInputProtection,   // wrong counter or CRC of an input message
-  kClampStuck         // the clamping force did not come back after a request; latched
+  kClampStuck  // the clamping force did not come back after a request; latched where it stays
+               // at what was asked, else until it does
 };
 // Bits 24 to 43 of BeltGripStatus; the gate refuses a status frame with a bit beyond
 // (guard/tx_gate).

@@ -276,6 +276,7 @@ RoleSet ExperimentStage::step_request(const Now& now) noexcept {
     if (by_record_) go_by_record(now.estimate.curve(), still);
   }
   if (state_ == State::kReleasing && !refused_) judge_release(now, still);
+  if (state_ != State::kRamping) judge_own_force(now);
   clamp_refused_ = false;
   return still;
 }
@@ -353,6 +354,19 @@ void ExperimentStage::judge_release(const Now& now, RoleSet& still) noexcept {
   const MonoTime since = now.input.channels().course(Role::kSecondaryPressure).since();
   misread_ = request_.held_again().value_or(since <= request_.ended());
   if (misread_) still.set(static_cast<std::size_t>(Role::kSecondaryPressure));
+}
+
+// After each request the controller has to give once what it gave before, else it is not asked
+// again.
+void ExperimentStage::judge_own_force(const Now& now) noexcept {
+  if (!now.input.sample().usable || !now.estimate.curve().usable) return;
+  returned_.step({.t = now.t,
+                  .force_N = now.estimate.measured_force_N(),
+                  .torque_Nm = now.estimate.curve().torque_p_Nm});
+  const bool in_time = now.t - request_.ended() < ClampRequest::kReleaseTime;
+  if (asks() && !returned_.back() && !in_time && !misread_) {
+    now.faults.raise(Fault::kClampStuck, now.t);
+  }
 }
 
 void ExperimentStage::take(SafetyVerdict verdict, double figure, double limit,
@@ -455,7 +469,10 @@ Action ExperimentStage::apply(const Transition& transition, const Now& now) noex
       break;
   }
   state_ = transition.next;  // after it is said why: what is lost depends on what was going on
-  if (state_ != State::kRamping && request_.standing()) request_.end(now.t);
+  if (state_ != State::kRamping && request_.standing()) {
+    request_.end(now.t);
+    returned_.end();
+  }
   return transition.action;
 }
 
@@ -464,6 +481,7 @@ void ExperimentStage::start(const Now& now) noexcept {
   if (commands()) {
     request_.begin(request_now(now), arming_.plan(), arming_.floor_N(sample.omega_s_rad_s),
                    force_reading(now));
+    returned_.begin();
     if (by_record_) followed_ = recorded_.standing();
   }
   own_force_N_ = now.estimate.measured_force_N();
@@ -583,6 +601,7 @@ void ExperimentStage::go_idle(MonoTime t) noexcept {
 void ExperimentStage::go_on_from(const ExperimentStage& before, bool keeps_results) noexcept {
   // While a fault forbids requests; a controller that kept one is not to be asked again at all.
   if (before.state_ == State::kFault) state_ = State::kFault;
+  returned_ = before.returned_;
   if (!keeps_results) return;
   result_ = before.result_;
   slip_shown_ = before.slip_shown_;

@@ -17,6 +17,7 @@
 #include "daemon/core/experiment/drive_changes.h"
 #include "daemon/core/experiment/experiment.h"
 #include "daemon/core/experiment/fall_shown.h"
+#include "daemon/core/experiment/own_force.h"
 #include "daemon/core/experiment/recorded_requests.h"
 #include "daemon/core/guard/safety_monitor.h"
 #include "daemon/core/input/input_stage.h"
@@ -113,6 +114,7 @@ class ExperimentStage {
   void withdraw_for_bus(const Now& now) noexcept;
   void judge_following(const Now& now, RoleSet& still) noexcept;
   void judge_release(const Now& now, RoleSet& still) noexcept;
+  void judge_own_force(const Now& now) noexcept;
   bool follows_on() const noexcept;
   void go_by_record(const estimator::CurveEstimate& curve, RoleSet& still) noexcept;
   void guard_by_record(Guards& guards) const noexcept;
@@ -129,6 +131,7 @@ class ExperimentStage {
   Arming arming_;
   ClampRequest request_;
   DriveChanges changes_;
+  OwnForce returned_;  // the controller's, after a request
   bool by_record_;
   RecordedRequests recorded_;
   bool would_ask_ = false;                     // were it not for recorded_, since the trigger holds

@@ -131,7 +131,8 @@ constexpr std::array<FaultRow, kFaultCount> kFaultWords{{
      {"wrong counter or CRC", "`[protection]`: data id, profile, signals"}},
     {Fault::kClampStuck,
      {"after a request the clamping force did not come back",
-      "the controller does not keep its contract; a restart is needed"}},
+      "the controller does not keep its contract; where the force stays at what was asked, a "
+      "restart is needed"}},
 }};
 
 // What each means alone stands with its name (daemon/core/input/stop_cause.h).

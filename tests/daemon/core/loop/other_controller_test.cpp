@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -153,6 +154,52 @@ TEST(OtherController, WhatIsToldOfABeltWhoseTorqueMovesIsRight) {
         }
         expect_no_harm(car.account());
       }
+    }
+  }
+}
+
+// A controller whose force stays this much below its own after a request that was cut short.
+std::unique_ptr<VirtualDrive> after_a_request(double stays_share, double torque_Nm,
+                                              std::size_t seed) {
+  auto car = std::make_unique<VirtualDrive>(Kind{torque_Nm, 1.0}, seed);
+  car->controller().stays_share = stays_share;
+  EXPECT_TRUE(car->until(
+      [&] { return car->account().request_stands() && car->slip_percent() > 1.2; }, 40.0));
+  car->refuses = true;
+  car->drive_on(0.3);
+  car->refuses = false;
+  return car;
+}
+
+constexpr int kFaultClampStuck = 43;
+
+TEST(OtherController, OneThatKeepsAPartOfItsForceIsNotAskedAgain) {
+  for (const double torque_Nm : {kDragTorque_Nm, kDrive_Nm}) {
+    for (const double stays_share : {0.93, 0.90, 0.85, 0.81, 0.70}) {
+      for (std::size_t seed = 1; seed <= kDrives; ++seed) {
+        SCOPED_TRACE(testing::Message() << torque_Nm << ", " << stays_share << ", " << seed);
+        const auto car = after_a_request(stays_share, torque_Nm, seed);
+        const std::size_t requests = car->account().requests().size();
+        car->drive_on(12.0);
+        EXPECT_EQ(car->account().requests().size(), requests);
+        EXPECT_TRUE(car->account().fault_seen(kFaultClampStuck));
+        EXPECT_EQ(car->state(), daemon::State::kFault);
+        expect_no_harm(car->account());
+      }
+    }
+  }
+}
+
+// And is asked once it has come back; unless it had stayed at what was asked.
+TEST(OtherController, OneThatGivesItsForceBackIsAskedAgain) {
+  for (const double torque_Nm : {kDragTorque_Nm, kDrive_Nm}) {
+    for (std::size_t seed = 1; seed <= kDrives; ++seed) {
+      SCOPED_TRACE(testing::Message() << torque_Nm << ", " << seed);
+      const auto car = after_a_request(0.90, torque_Nm, seed);
+      car->drive_on(5.0);
+      const std::size_t requests = car->account().requests().size();
+      car->controller().stays_share = 1.0;
+      EXPECT_TRUE(car->until([&] { return car->account().requests().size() > requests; }, 20.0));
     }
   }
 }
