@@ -24,6 +24,10 @@ constexpr double kEnough = 1.5;
 constexpr double kOffsetShare = 0.7;
 // Derived: a line has two unknowns here, offset and lag.
 constexpr double kUnknowns = 2.0;
+// Chosen: so long after the rest each reading is taken, which tells a slow answer from a late one,
+// and then one of so many: what they tell has been told.
+constexpr Duration kRare = kSecond;
+constexpr unsigned kTakenRarely = 16;
 constexpr double kFar_N2 = 1e30;  // of a course that is not possible
 }  // namespace
 
@@ -70,6 +74,7 @@ void AnswerLag::measure(MonoTime t, double fallen_N, double rate_N_per_s) noexce
 
 void AnswerLag::read(MonoTime t, double force_N) noexcept {
   if (!measures_) return;
+  if (!rests_ && t - resumed_ > kRare && ++skipped_ % kTakenRarely != 0) return;
   const double periods = static_cast<double>(t - newest_) / static_cast<double>(period_);
   const double whole = std::floor(periods), share = periods - whole;
   if (whole > 0.0 || whole < -2.0) return;  // its courses are not kept
@@ -77,8 +82,8 @@ void AnswerLag::read(MonoTime t, double force_N) noexcept {
   compare(asked_, 0, quick_, share, newest, force_N);
   compare(answered_to_, quick_, kLate, share, newest, force_N);
   n_ += 1.0;
-  // Before, noise alone looks like an answer that has come.
-  if (n_ > kUnknowns && t - measures_since_ >= enough_) bound();
+  // Before, noise alone looks like an answer that has come. And every second reading is enough.
+  if (n_ > kUnknowns && t - measures_since_ >= enough_ && ++taken_ % 2 == 0) bound();
 }
 
 // With the courses of so many lags, of a dead time of one period and more.
@@ -98,22 +103,24 @@ void AnswerLag::compare(const Course& course, std::size_t from, std::size_t coun
 void AnswerLag::bound() noexcept {
   least_s_ = 0.0;
   most_s_ = std::numeric_limits<double>::infinity();
-  std::array<double, kQuick + kLate> distances_N2{};
-  const auto nearest_N2 = [&] {
-    return *std::min_element(distances_N2.begin(),
-                             distances_N2.begin() + static_cast<std::ptrdiff_t>(lags()));
-  };
+  std::array<double, kQuick + kLate> distances_N2, offsets_N;
+  const double each = 1.0 / n_;
+  double nearest_N2 = kFar_N2;
   for (std::size_t i = 0; i < lags(); ++i) {
-    distances_N2[i] = squares_N2_[i] - sums_N_[i] * sums_N_[i] / n_;
+    offsets_N[i] = each * sums_N_[i];
+    distances_N2[i] = squares_N2_[i] - sums_N_[i] * offsets_N[i];
+    nearest_N2 = std::min(nearest_N2, distances_N2[i]);
   }
   const double variance_N2 =
-      (nearest_N2() + kKnown * noise_N_ * noise_N_) / (n_ - kUnknowns + kKnown);
-  const double offset_most_N = offset_most_N_ + kDeviations * std::sqrt(variance_N2 / n_);
+      (nearest_N2 + kKnown * noise_N_ * noise_N_) / (n_ - kUnknowns + kKnown);
+  const double offset_most_N = offset_most_N_ + kDeviations * std::sqrt(each * variance_N2);
+  nearest_N2 = kFar_N2;
   for (std::size_t i = 0; i < lags(); ++i) {
-    if (std::abs(sums_N_[i] / n_) > offset_most_N) distances_N2[i] = kFar_N2;
+    if (std::abs(offsets_N[i]) > offset_most_N) distances_N2[i] = kFar_N2;
+    nearest_N2 = std::min(nearest_N2, distances_N2[i]);
   }
-  if (nearest_N2() >= kFar_N2) return;
-  const double credible_N2 = nearest_N2() + kDeviations * kDeviations * variance_N2;
+  if (nearest_N2 >= kFar_N2) return;
+  const double credible_N2 = nearest_N2 + kDeviations * kDeviations * variance_N2;
   const auto between_s = [&](std::size_t inside, std::size_t outside) {
     const double share =
         (credible_N2 - distances_N2[inside]) / (distances_N2[outside] - distances_N2[inside]);

@@ -43,7 +43,10 @@ class AnswerLag {
   // From now on readings count: the force has fallen by so much, at this rate, and rests or creeps.
   void measure(MonoTime t, double fallen_N, double rate_N_per_s) noexcept;
   // It falls on.
-  void resume() noexcept { rests_ = false; }
+  void resume(MonoTime t) noexcept {
+    rests_ = false;
+    resumed_ = t;
+  }
   // Every reading, with its own stamp.
   void read(MonoTime t, double force_N) noexcept;
 
@@ -55,8 +58,8 @@ class AnswerLag {
   // Of an actuator that answers at once but for dead time, what is quicker than configured; and of
   // one that answers as configured, later. The longest is some four times what is configured: what
   // is later still does not follow at all.
-  static constexpr std::size_t kQuick = 4, kLate = 24;
-  static constexpr std::size_t kKept = kLate + 3;
+  static constexpr std::size_t kQuick = 4, kLate = 20;
+  static constexpr std::size_t kKept = 32;  // kLate + 3 at the least
   struct Course {
     double now_N = 0.0;
     std::array<double, kKept> kept_N{};  // every period_
@@ -81,9 +84,11 @@ class AnswerLag {
   Duration period_ = 1;
   std::size_t quick_ = 0;  // of kQuick, those below the first of the others
   double offset_most_N_ = 0.0;
-  Course asked_, answered_to_;  // what is asked for; and as answered without dead time
-  std::size_t newest_at_ = 0;   // where the newest is that is kept,
-  MonoTime newest_ = 0;         // and its instant
+  Course asked_, answered_to_;        // what is asked for; and as answered without dead time
+  std::size_t newest_at_ = 0;         // where the newest is that is kept,
+  MonoTime newest_ = 0;               // and its instant
+  unsigned skipped_ = 0, taken_ = 0;  // readings
+  MonoTime resumed_ = 0;
   bool measures_ = false;
   MonoTime measures_since_ = 0;
   double n_ = 0.0;

@@ -53,7 +53,7 @@ void AnswerProof::step(const Now& now) noexcept {
     lag_.measure(now.t, fallen_N, fallen_N / seconds(now.t - begun_));
   } else if (rest_ == Rest::kRests && (in_time_ || now.t - rests_since_ >= kLongest)) {
     rest_ = Rest::kOver;
-    lag_.resume();
+    lag_.resume(now.t);
   }
 }
 

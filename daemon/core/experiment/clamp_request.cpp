@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace beltgrip::daemon {
 
@@ -71,6 +72,8 @@ void ClampRequest::begin(const Now& now, const RequestPlan& plan, double floor_N
                        .reading = reading,
                        .sample = sample_});
   asked_count_ = 1;
+  recent_least_N_per_s_ = std::numeric_limits<double>::infinity();
+  recent_until_ = now.t;
   asked_[0] = {now.t, force_N_, 0.0};
 }
 
@@ -284,8 +287,9 @@ std::optional<Role> ClampRequest::untrue_speed(const Now& now, double drift) con
 double ClampRequest::wanted_rate_N_per_s(double mu_star) const noexcept {
   if (proof_.rests()) return std::min(proof_.rest_N_per_s(), law_.rate_max_N_per_s);
   if (far_) return law_.rate_max_N_per_s;
+  if (!proof_.falls()) return ramp_near_N_per_s(law_, mu_star, slip_.rate_1_s());
   RampLaw law = law_;
-  if (proof_.falls()) law.mu_top = law.mu_far;
+  law.mu_top = law.mu_far;
   return ramp_near_N_per_s(law, mu_star, slip_.rate_1_s());
 }
 
@@ -313,8 +317,10 @@ void ClampRequest::go_to(const Now& now, double floor_N, double force_N) noexcep
     const double over_s = seconds(now.t - before.t);
     asked_[asked_count_ % kAsked] = {now.t, force_N_, (before.force_N - force_N_) / over_s};
     ++asked_count_;
+    recent_until_ = before.t;
   }
   last_ = now.t;
+  if (last_ > recent_until_) look_back();
   proof_.ask(now.t, force_N_);
   off_N_ = std::abs(now.clamp_force_N - force_N_);
   if (off_N_ <= follow_band_N()) off_since_ = now.t;
@@ -345,13 +351,18 @@ double ClampRequest::follow_band_N() const noexcept {
 }
 
 double ClampRequest::rate_least_N_per_s() const noexcept {
-  double least = rate_N_per_s_;
+  return std::min(rate_N_per_s_, recent_least_N_per_s_);
+}
+
+// Of those within kRecent; it holds until the next is kept, or the oldest of them is older.
+void ClampRequest::look_back() noexcept {
+  recent_least_N_per_s_ = std::numeric_limits<double>::infinity();
   for (std::size_t age = 0; age + 1 < std::min(asked_count_, kAsked); ++age) {
     const Asked& each = asked(age);
     if (last_ - each.t > kRecent) break;
-    least = std::min(least, each.rate_N_per_s);
+    recent_least_N_per_s_ = std::min(recent_least_N_per_s_, each.rate_N_per_s);
+    recent_until_ = each.t + kRecent;
   }
-  return least;
 }
 
 bool ClampRequest::changed_since(MonoTime t) const noexcept {

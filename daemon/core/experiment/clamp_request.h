@@ -120,6 +120,7 @@ class ClampRequest {
   void follow_belt(const Now& now) noexcept;
   double wanted_rate_N_per_s(double mu_star) const noexcept;
   double lowered_N(const Now& now, double floor_N) noexcept;
+  void look_back() noexcept;
   void go_to(const Now& now, double floor_N, double force_N) noexcept;
   double answer_s() const noexcept {
     return settings_.actuator_dead_time_s + settings_.actuator_lag_s;
@@ -173,6 +174,8 @@ class ClampRequest {
   }
   std::array<Asked, kAsked> asked_{};
   std::size_t asked_count_ = 0;
+  double recent_least_N_per_s_ = 0.0;
+  MonoTime recent_until_ = 0;
   double slip_after_ = 0.0;  // mean of the last kSlipAfter
 };
 

@@ -16,6 +16,7 @@ class DriveChanges {
     MonoTime t = 0;
     double accelerator = 0.0;  // 0 to 1
     double torque_Nm = 0.0;
+    MonoTime torque_at = 0;  // when it came
   };
   // Every sample, also without a request: what is usual is known then.
   Stop step(const Now& now) noexcept;
@@ -27,10 +28,11 @@ class DriveChanges {
   // Chosen: of the torque. What moves by the first within 0.3 s is off by 0.2 % of it where a stamp
   // is off by 20 ms; the second is what the noise of most engines leaves.
   static constexpr double kMoved = 0.03, kUnsettled = 0.01;
+  void take_torque(const Now& now) noexcept;
   Stop moves_beyond(double share) const noexcept;
 
   bool begun_ = false;
-  MonoTime last_ = 0;
+  MonoTime last_ = 0, torque_at_ = 0;
   double accelerator_ = 0.0;  // as it is held
   double torque_Nm_ = 0.0;    // of the last readings,
   double course_Nm_ = 0.0;    // and of some more

@@ -229,7 +229,8 @@ DriveChanges::Now ExperimentStage::drive_now(const Now& now) const noexcept {
   const SignalHistory& history = now.input.channels().history(torque);
   return {.t = now.t,
           .accelerator = conditions_.accelerator,
-          .torque_Nm = history.empty() ? 0.0 : history.newest_value()};
+          .torque_Nm = history.newest_value(),
+          .torque_at = history.newest()};
 }
 
 void ExperimentStage::count(const Now& now) noexcept {

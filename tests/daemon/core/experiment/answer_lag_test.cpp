@@ -46,6 +46,7 @@ Told told(const Actuator& actuator, const Course& course = {}, unsigned seed = 1
   std::vector<double> asked_N{4000.0};
   const auto dead = static_cast<std::size_t>(std::lround(actuator.dead_s / kSample_s));
   double force_N = asked_N[0];
+  bool fell = true;
   const auto samples = static_cast<std::size_t>(std::lround(course.end_s / kSample_s));
   for (std::size_t i = 1; i <= samples; ++i) {
     const double t_s = static_cast<double>(i) * kSample_s;
@@ -60,7 +61,8 @@ Told told(const Actuator& actuator, const Course& course = {}, unsigned seed = 1
       lag.read(t, read_N);
     }
     const bool falls = t_s <= 0.5 || t_s > 0.5 + course.rests_s;
-    if (falls && i > 100) lag.resume();
+    if (falls && !fell && i > 100) lag.resume(t);
+    fell = falls;
     asked_N.push_back(asked_N.back() -
                       kSample_s * (falls ? course.rate_N_per_s : course.creeps_N_per_s));
     lag.ask(t, asked_N.back());

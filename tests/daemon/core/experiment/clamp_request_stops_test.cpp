@@ -268,7 +268,7 @@ TEST_F(Stops, AForceThatAnswersLate) {
     double given_N = 4000.0;
     for (int i = 0; i < 700 && request_.backup_stop() == StopReason::kNone; ++i) {
       now_.t += kSample;
-      given_N += 5e-3 / (noisy ? 0.21 : 0.45) * (request_.force_N() - given_N);
+      given_N += 5e-3 / (noisy ? 0.21 : 0.60) * (request_.force_N() - given_N);
       now_.clamp_force_N = given_N;
       now_.read_N = given_N + (noisy ? (i / 2 % 2 == 0 ? 400.0 : -400.0) : 0.0);
       now_.read_at = now_.t;
@@ -276,7 +276,7 @@ TEST_F(Stops, AForceThatAnswersLate) {
     }
     if (!noisy) {
       expect(StopReason::kLag, "clamping force answers after", request_.cause().figure, 0.312, "s");
-      EXPECT_LT(request_.cause().figure, 0.46);
+      EXPECT_LT(request_.cause().figure, 0.61);
     } else {
       EXPECT_EQ(request_.backup_stop(), StopReason::kLag);
       EXPECT_STREQ(request_.cause().what, "clamping force is not shown to answer before");

@@ -42,6 +42,7 @@ std::optional<Told> told(const Drive& drive, unsigned seed = 1) {
     if ((i - from) % 2 == 0) {
       now.accelerator = drive.pedal(t_s) + drive.pedal_noise * normal(random);
       now.torque_Nm = drive.torque_Nm(t_s) + drive.torque_noise_Nm * normal(random);
+      now.torque_at = now.t;
     }
     // A request stands no sooner than some seconds after the daemon knows its inputs.
     if (const Stop stop = changes.step(now); stop && i > from + 400) return Told{stop, t_s};
@@ -115,8 +116,8 @@ TEST(DriveChanges, ATorqueIsUnsettledByLess) {
     const auto torque_Nm = rises_by(step_Nm);
     int unsettled = 0;
     for (int i = -800; i < 60; ++i) {
-      const Stop ends = changes.step(
-          {10 * kSecond + i * kSample, 0.2, torque_Nm(5e-3 * i) + 0.05 * normal(random)});
+      const MonoTime t = 10 * kSecond + i * kSample;
+      const Stop ends = changes.step({t, 0.2, torque_Nm(5e-3 * i) + 0.05 * normal(random), t});
       if (i < -400) continue;
       ASSERT_FALSE(ends) << i;
       if (i < 0) {
@@ -144,8 +145,8 @@ TEST(DriveChanges, NoiseIsNoChange) {
 // The first value is where both begin.
 TEST(DriveChanges, BeginsWhereItFindsThem) {
   DriveChanges changes;
-  EXPECT_FALSE(changes.step({kSecond, 0.9, 200.0}));
-  EXPECT_FALSE(changes.step({kSecond + kSample, 0.9, 200.0}));
+  EXPECT_FALSE(changes.step({kSecond, 0.9, 200.0, kSecond}));
+  EXPECT_FALSE(changes.step({kSecond + kSample, 0.9, 200.0, kSecond + kSample}));
 }
 
 }  // namespace

@@ -162,9 +162,9 @@ TEST(OtherController, WhatIsToldOfABeltWhoseTorqueMovesIsRight) {
 std::unique_ptr<VirtualDrive> after_a_request(double stays_share, double torque_Nm,
                                               std::size_t seed) {
   auto car = std::make_unique<VirtualDrive>(Kind{torque_Nm, 1.0}, seed);
-  car->controller().stays_share = stays_share;
   EXPECT_TRUE(car->until(
       [&] { return car->account().request_stands() && car->slip_percent() > 1.2; }, 40.0));
+  car->controller().stays_share = stays_share;
   car->refuses = true;
   car->drive_on(0.3);
   car->refuses = false;
