@@ -27,7 +27,6 @@ constexpr double kDrift = 3.0;
 constexpr double kLongestPoint_s = 1.0;  // time does
 constexpr double kStretchFrom = 0.9;     // of the top of mu*
 constexpr std::size_t kWantedPoints = 16;
-constexpr double kBack = 6.0;  // deviations of slip
 constexpr std::size_t kMostNeighbours = 24;
 constexpr double kCoursePrecision = 0.02;
 constexpr std::size_t kNeighbours = 3;  // to each side, for a first look at the course of mu*
@@ -359,27 +358,16 @@ void PeakFit::find_course() noexcept {
 }
 
 // To the stretch that is fitted, which begins right after it. Where points are few, it reaches
-// further down; but not to where slip still fell because deformation gave way: there mu* is no
-// function of slip.
+// further down.
 bool PeakFit::belongs(std::size_t point) const noexcept {
   const std::size_t count = point_count_ - point - 1;
   if (count < kFewestPoints) return true;
-  if (count >= kWantedPoints && mean_mu(point + 1) < kStretchFrom * mu_top_) return false;
-  const Point& older = points_[point];
-  const double noise = record_->slip_noise() * (1.0 / older.duration_s + 1.0 / slip_low_s_);
-  return older.slip < slip_low_ + kBack * std::sqrt(noise);
+  return count < kWantedPoints || mean_mu(point + 1) >= kStretchFrom * mu_top_;
 }
 
 void PeakFit::find_stretch() noexcept {
   first_ = top_;
-  slip_low_ = points_[first_].slip;
-  slip_low_s_ = points_[first_].duration_s;
-  while (first_ > oldest_ && belongs(first_ - 1)) {
-    --first_;
-    if (points_[first_].slip > slip_low_) continue;
-    slip_low_ = points_[first_].slip;
-    slip_low_s_ = points_[first_].duration_s;
-  }
+  while (first_ > oldest_ && belongs(first_ - 1)) --first_;
   // What the noise in slip does to mu*: by the slope around.
   const double slip_noise = record_->slip_noise();
   for (std::size_t i = first_; i < point_count_; ++i) {

@@ -167,7 +167,6 @@ class PeakFit {
   std::size_t first_ = 0, top_ = 0;  // the stretch that is fitted begins at first
   double mu_top_ = 0.0;
   double slip_low_ = 0.0, slip_high_ = 0.0;  // of the stretch
-  double slip_low_s_ = 0.0;                  // duration of the lowest point
   std::vector<Whitening> whitening_;         // of the points of the stretch
   std::vector<Terms> terms_;                 // likewise
   Terms slow_terms_ = Terms::Zero();         // slow error in them, as expected
