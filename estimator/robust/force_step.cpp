@@ -18,7 +18,8 @@ constexpr double kStudent = 2.0 * (kDeviations * kDeviations + 1.0) / 4.0;
 constexpr double kFewestSquares = 6.0;
 // Chosen: longer means have few squares, and the density is that of the shorter ones as well.
 constexpr double kKnownScale_s = 0.2;
-constexpr double kCorners = 2.0;
+// Chosen: a ramp may change its rate within a second or two, which are four such means.
+constexpr double kStraight_s = 0.4;
 constexpr double kShare = 0.015;  // of the force
 // Chosen: what a lag makes of the reading at the corner of a ramp stays below.
 constexpr double kLargeShare = 0.04;
@@ -61,13 +62,15 @@ bool ForceStep::steps(std::size_t length, double slip_noise, const Trend& force)
   const double drift_after_N = later.force_N - after.force_N;
   const double jump_N = after.force_N - before.force_N - on * (drift_N + drift_after_N);
   if (std::abs(jump_N) < std::max(kShare * std::abs(before.force_N), stair_N_)) return false;
-  // A corner of the force's course, in one of the groups, looks like a step of less than what its
-  // rate changes by; one in each like one of less than twice that.
-  if (std::abs(jump_N) < kCorners * std::abs(drift_after_N - drift_N)) return false;
-  // What longer means scatter by beyond white noise, without the corners and steps themselves.
-  const double force_deviation_N = std::sqrt(
-      std::max(force.quiet_density(length_s), force.density(std::min(length_s, kKnownScale_s))) /
-      length_s);
+  // A corner of the force's course, in one of the groups, looks like a step of less than this.
+  if (std::abs(jump_N) < std::abs(drift_after_N - drift_N)) return false;
+  // What means scatter by without the corners and steps themselves, and at least the white noise;
+  // where they are so long that the true course bends in them, with them.
+  const double density = length_s > kStraight_s
+                             ? force.density(length_s)
+                             : std::max(force.quiet_density(length_s),
+                                        force.density(std::min(length_s, kKnownScale_s)));
+  const double force_deviation_N = std::sqrt(density / length_s);
   if (std::abs(jump_N) < kDeviations * spread * force_deviation_N) return false;
   const double mu_after = after.torque_Nm / after.force_N;
   // Relative to mu*.
