@@ -83,7 +83,7 @@ void AnswerLag::read(MonoTime t, double force_N) noexcept {
   compare(answered_to_, quick_, kLate, share, newest, force_N);
   n_ += 1.0;
   // Before, noise alone looks like an answer that has come. And every second reading is enough.
-  if (n_ > kUnknowns && t - measures_since_ >= enough_ && ++taken_ % 2 == 0) bound();
+  if (t - measures_since_ >= enough_ && ++taken_ % 2 == 0) bound();
 }
 
 // With the courses of so many lags, of a dead time of one period and more.
@@ -103,7 +103,8 @@ void AnswerLag::compare(const Course& course, std::size_t from, std::size_t coun
 void AnswerLag::bound() noexcept {
   least_s_ = 0.0;
   most_s_ = std::numeric_limits<double>::infinity();
-  std::array<double, kQuick + kLate> distances_N2, offsets_N;
+  std::array<double, kQuick + kLate> distances_N2{};
+  std::array<double, kQuick + kLate> offsets_N{};
   const double each = 1.0 / n_;
   double nearest_N2 = kFar_N2;
   for (std::size_t i = 0; i < lags(); ++i) {
@@ -119,14 +120,14 @@ void AnswerLag::bound() noexcept {
     if (std::abs(offsets_N[i]) > offset_most_N) distances_N2[i] = kFar_N2;
     nearest_N2 = std::min(nearest_N2, distances_N2[i]);
   }
-  if (nearest_N2 >= kFar_N2) return;
   const double credible_N2 = nearest_N2 + kDeviations * kDeviations * variance_N2;
   const auto between_s = [&](std::size_t inside, std::size_t outside) {
     const double share =
         (credible_N2 - distances_N2[inside]) / (distances_N2[outside] - distances_N2[inside]);
     return lag_s(inside) + share * (lag_s(outside) - lag_s(inside));
   };
-  std::size_t least = 0, most = lags() - 1;
+  std::size_t least = 0;
+  std::size_t most = lags() - 1;
   while (distances_N2[least] > credible_N2) ++least;
   while (distances_N2[most] > credible_N2) --most;
   // A force that creeps through a whole step is rounded up and down alike.

@@ -32,7 +32,8 @@ constexpr std::array<ReasonRow, estimator::kStopReasonCount> kReasons{
      {StopReason::kForceFloor, "ForceFloor", "the force came to its floor before the peak"},
      {StopReason::kEngineSpeed, "EngineSpeed",
       "the shaft came too near its least speed, or the engine left the primary shaft"},
-     {StopReason::kTorque, "Torque", "the torque went to zero, changed its sign or left its band"},
+     {StopReason::kTorque, "Torque",
+      "the torque went to zero, changed its sign, moved or left its band"},
      {StopReason::kRatio, "Ratio", "speeds and torque do not fit the ratio at the end stop"},
      {StopReason::kInputs, "Inputs", "an input was lost, or read what cannot be"},
      {StopReason::kPermission, "Permission", "permission withdrawn"},
@@ -44,7 +45,8 @@ constexpr std::array<ReasonRow, estimator::kStopReasonCount> kReasons{
       "the clamping force does not follow the request"},
      {StopReason::kInputFrozen, "InputFrozen", "an input stands still where a live one moves"},
      {StopReason::kRoom, "Room", "the slip that is left is too little for the worst case"},
-     {StopReason::kLag, "Lag", "the clamping force answers later than configured"}}};
+     {StopReason::kLag, "Lag",
+      "the clamping force answers later than configured, or did not show that it does not"}}};
 static_assert(in_wire_order(kReasons));
 
 const ReasonRow& row_of(StopReason reason) { return kReasons.at(static_cast<std::size_t>(reason)); }

@@ -166,7 +166,8 @@ constexpr std::array<StopRow, estimator::kStopReasonCount> kStopRemedies{{
      "the controller obey?"},
     {StopReason::kInputFrozen, "the role stands in `reason`: sensor, gateway"},
     {StopReason::kRoom, "a late peak: lower speed"},
-    {StopReason::kLag, "measure `actuator_lag_s` at the coldest permitted oil"},
+    {StopReason::kLag,
+     "measure `actuator_lag_s` at the coldest permitted oil; a quieter pressure, a faster ramp"},
 }};
 
 // With a bound the data are good: what lacks is the way to the top.

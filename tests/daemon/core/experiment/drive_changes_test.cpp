@@ -142,6 +142,63 @@ TEST(DriveChanges, NoiseIsNoChange) {
   EXPECT_EQ(alarms, 0);
 }
 
+// One mean that follows, by hand.
+void follow(double& mean, double value, double share) {
+  mean += std::min(1.0, share) * (value - mean);
+}
+
+// What it says, sample for sample: readings every 10 ms and once after 100, with outliers; means
+// over 20 ms and 0.3 s, six and a half times the scatter of those before, of which none counts for
+// more than four times it or 0.2 % of the torque; the pedal's over a second.
+TEST(DriveChanges, GoesByItsMeans) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  DriveChanges changes;
+  double torque_Nm = 40.0, course_Nm = 40.0, scatter_Nm2 = 0.0, scatter_Nm = 0.0, pedal = 0.1;
+  double read_Nm = 40.0;
+  MonoTime t = kSecond, read_at = t;
+  EXPECT_FALSE(changes.step({t, pedal, read_Nm, read_at}));
+  int moves = 0, steps = 0;
+  for (int i = 1; i < 4000; ++i) {
+    t += kSample;
+    const double accelerator = 0.1 + 0.1 * std::sin(2e-3 * i) * std::sin(2e-3 * i);
+    const bool comes = i % 2 == 0 && (i % 1000 == 0 || i % 1000 > 20);
+    if (comes) {
+      read_Nm = 40.0 + 15.0 * std::sin(0.02 * i) + (i > 2000 ? 0.3 : 0.02) * normal(random);
+      if (i % 300 == 0) read_Nm += 8.0;
+      const double over_s = 1e-9 * static_cast<double>(t - read_at);
+      read_at = t;
+      scatter_Nm = std::sqrt(scatter_Nm2);
+      follow(torque_Nm, read_Nm, over_s / 0.02);
+      follow(course_Nm, read_Nm, over_s / 0.3);
+      const double off_Nm = std::min(std::abs(read_Nm - torque_Nm),
+                                     4.0 * std::max(scatter_Nm, 0.002 * std::abs(course_Nm)));
+      follow(scatter_Nm2, off_Nm * off_Nm, over_s / 3.0);
+    }
+    follow(pedal, accelerator, 5e-3 / 1.0);
+    const double pedal_percent = 100.0 * std::abs(accelerator - pedal);
+    const double moved_Nm = std::abs(torque_Nm - course_Nm), noise_Nm = 6.5 * scatter_Nm;
+    const Stop stop = changes.step({t, accelerator, read_Nm, read_at});
+    const Stop unsettled = changes.unsettled();
+    if (pedal_percent > 3.0) {
+      ASSERT_EQ(stop.reason, StopReason::kDriver) << i;
+      ASSERT_NEAR(stop.cause.figure, pedal_percent, 1e-9) << i;
+      ++steps;
+    } else {
+      ASSERT_EQ(stop.reason, moved_Nm > 0.03 * std::abs(course_Nm) + noise_Nm ? StopReason::kTorque
+                                                                              : StopReason::kNone)
+          << i;
+    }
+    ASSERT_EQ(static_cast<bool>(unsettled), moved_Nm > 0.01 * std::abs(course_Nm) + noise_Nm) << i;
+    if (!unsettled) continue;
+    ASSERT_NEAR(unsettled.cause.figure, moved_Nm, 1e-9) << i;
+    ASSERT_NEAR(unsettled.cause.limit, 0.01 * std::abs(course_Nm) + noise_Nm, 1e-9) << i;
+    ++moves;
+  }
+  EXPECT_GT(moves, 500);
+  EXPECT_GT(steps, 100);
+}
+
 // The first value is where both begin.
 TEST(DriveChanges, BeginsWhereItFindsThem) {
   DriveChanges changes;

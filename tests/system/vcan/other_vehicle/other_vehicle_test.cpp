@@ -222,7 +222,19 @@ TEST_F(OtherVehicle, TheDriver) {
     drive.refuses = true;
     expect_ends_within(drive, kAtOnce_s);
   };
+  // So little that it slips the belt late; in the drive that a steady request stands in.
+  const auto steps = [](double percent) {
+    return [percent](Drive& drive) {
+      if (!begin_and_slip(drive, 1.8)) return;
+      const std::size_t results = drive.account().results().size();
+      drive.pedal_percent += percent;
+      expect_ends_within(drive, kAtOnce_s);
+      EXPECT_EQ(drive.account().results().size(), results);
+    };
+  };
   drive({{"tip_in", {}, tip_in},
+         {"steps_5", {45.0, 1.0}, steps(5.0)},
+         {"steps_12", {45.0, 1.0}, steps(12.0)},
          {"brake", {}, brake},
          {"brake_driving", {45.0, 1.0}, brake},
          {"refusal", {}, refusal}});
@@ -239,6 +251,14 @@ TEST_F(OtherVehicle, TheController) {
   const auto late = [](Drive& drive) {
     drive.car().late_s = 0.10;
     until_it_ends(drive);
+  };
+  // And 0.44 s: long before the peak.
+  const auto later = [](Drive& drive) {
+    drive.car().late_s = 0.30;
+    until_it_ends(drive);
+    EXPECT_TRUE(drive.account().stop_reason_seen(kLag) ||
+                drive.account().stop_reason_seen(kClampNotFollowed));
+    EXPECT_EQ(drive.account().requests().back().harm.beyond_peak_J, 0.0);
   };
   const auto deaf = [](Drive& drive) {
     drive.controller().deaf = true;
@@ -263,7 +283,20 @@ TEST_F(OtherVehicle, TheController) {
     EXPECT_EQ(drive.account().status().state, kStateFault);
     EXPECT_EQ(drive.account().requests().size(), requests);
   };
+  const auto keeps_some = [](Drive& drive) {
+    if (!begin_and_slip(drive, 1.2)) return;
+    drive.controller().stays_share = 0.93;
+    const std::size_t requests = drive.account().requests().size();
+    drive.refuses = true;
+    drive.drive_on(0.3);
+    drive.refuses = false;
+    drive.drive_on(8.0);
+    EXPECT_TRUE(drive.account().fault_seen(kFaultClampStuck));
+    EXPECT_EQ(drive.account().requests().size(), requests);
+  };
   drive({{"late", {}, late},
+         {"later", {}, later},
+         {"keeps_some", {}, keeps_some},
          {"deaf", {}, deaf},
          {"gives_less", {}, gives_less},
          {"holds_on", {}, holds_on}});
