@@ -107,6 +107,75 @@ TEST(AnswerProof, WhatIsNotShownCountsAsLate) {
   EXPECT_NEAR(now.rested_s, 1.0, 0.006);
 }
 
+// The rules beside a lag that is measured the same: rest after the band or half of it, or on the
+// floor; at least 0.48 s of it until something is late, a second until nothing is shown; 0.312 s is
+// late, 0.45 s is not in time.
+TEST(AnswerProof, IsTheSameByHand) {
+  std::mt19937 random(17);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
+  AnswerProof proof;
+  int late = 0, unshown = 0, in_time = 0;
+  for (int request = 0; request < 400; ++request) {
+    const MonoTime begin = request * 20 * kSecond;
+    const double noise_N = 60.0 * uniform(random), step_N = request % 3 == 0 ? 60.0 : 0.0;
+    const double lag_s = 0.05 + 0.6 * uniform(random), above_N = 60.0 * normal(random);
+    const bool near = request % 5 == 0;
+    const int floor_from = request % 7 == 0 ? 30 : 10'000;
+    proof.begin(begin, {kStart_N, kBand_N, {0.06, 0.15}, {noise_N, step_N}, kSample});
+    EXPECT_NEAR(proof.late_s(), 1.3 * 0.24, 1e-12);
+    EXPECT_NEAR(proof.credible_s(), 2.0 * 0.21 + 0.03, 1e-12);
+    EXPECT_NEAR(proof.rest_N_per_s(), step_N / 1.0, 1e-9);
+    AnswerLag lag;
+    lag.begin(begin, {kStart_N, {0.06, 0.15}, {noise_N, step_N}, kSample});
+    double asked_N = kStart_N, given_N = kStart_N;
+    int rests_since = -1, over_since = -1;
+    bool is_late = false, is_in_time = false;
+    MonoTime read_at = begin;
+    double read_N = kStart_N;
+    for (int i = 1; i <= 600; ++i) {
+      const MonoTime t = begin + i * kSample;
+      given_N -= std::expm1(-5e-3 / lag_s) * (asked_N - given_N);
+      const bool comes = i % 2 == 0;
+      if (comes) {
+        read_at = t - (i % 12 == 0 ? 1 : 0) * kSample;
+        read_N = given_N + above_N + noise_N * normal(random);
+        lag.read(read_at, read_N);
+      }
+      is_in_time = is_in_time || lag.most_s() < 0.45;
+      const bool waited = rests_since >= 0 && over_since < 0 && i - rests_since >= 96;
+      is_late = is_late || (lag.least_s() > 0.312 && (waited || over_since >= 0));
+      if (rests_since < 0) {
+        const double fallen_N = kStart_N - asked_N;
+        if (fallen_N >= (near ? 140.0 : 280.0) || i >= floor_from) {
+          rests_since = i;
+          lag.measure(t, fallen_N, fallen_N / (5e-3 * i));
+        }
+      } else if (over_since < 0 && (is_in_time || i - rests_since >= 200)) {
+        over_since = i;
+        lag.resume(t);
+      }
+      proof.step({t, asked_N, read_at, read_N, near, i >= floor_from});
+      ASSERT_EQ(proof.falls(), rests_since < 0) << request << ' ' << i;
+      ASSERT_EQ(proof.rests(), rests_since >= 0 && over_since < 0) << request << ' ' << i;
+      ASSERT_EQ(proof.late(), is_late) << request << ' ' << i;
+      ASSERT_EQ(proof.unshown(), over_since >= 0 && !is_in_time) << request << ' ' << i;
+      ASSERT_NEAR(proof.least_s(), lag.least_s(), 1e-9) << request << ' ' << i;
+      ASSERT_NEAR(1.0 / proof.most_s(), 1.0 / lag.most_s(), 1e-9) << request << ' ' << i;
+      const double rate_N_per_s = !proof.rests() ? kRate_N_per_s : proof.rest_N_per_s();
+      asked_N -= i < floor_from ? 5e-3 * rate_N_per_s : 0.0;
+      lag.ask(t, asked_N);
+      proof.ask(t, asked_N);
+    }
+    late += is_late ? 1 : 0;
+    unshown += proof.unshown() ? 1 : 0;
+    in_time += is_in_time ? 1 : 0;
+  }
+  EXPECT_GT(late, 50);
+  EXPECT_GT(unshown, 10);
+  EXPECT_GT(in_time, 50);
+}
+
 TEST(AnswerProof, NothingIsKnownOfTheRequestBefore) {
   AnswerProof proof;
   for (int request = 0; request < 2; ++request) {
