@@ -268,14 +268,18 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
   q.capacity = lever_m * c.force_N.max(50.0);
   if (!is_zero(c.ln_friction)) q.capacity *= c.ln_friction.exp();
   if (run.torque_s.present) {
-    // From the slow copies of all three channels: the inertia's share would else be fitted to the
-    // noise of the speed's slope.
+    // From the slow copies of all channels, the inertia's share of the engine's torque among them:
+    // by the fast slope it would stand against a torque that no longer has what is fast, and what
+    // stands behind the belt would be fitted to the noise of the speed's slope.
     c.secondary_loss_Nm =
         nuisance[kSecondaryLoss_Nm] + nuisance[kSecondaryLossPerSpeed_Nms] * c.omega_s;
     apply(Stage::kSecondaryShaft);
     q.balance = c.belt_torque + run.torque.slow - read.torque_Nm -
                 ratio * (run.torque_s.slow + nuisance[kSecondaryInertia_kgm2] * c.slope_s +
                          c.secondary_loss_Nm);
+    if (run.torque_is_engine) {
+      q.balance += variator.primary_inertia_kg_m2 * (run.omega_p.slope - run.omega_p.slow_slope);
+    }
     q.secondary_loss_Nm = std::move(c.secondary_loss_Nm);
   }
   if (run.command.present) {
