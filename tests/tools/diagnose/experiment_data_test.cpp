@@ -115,8 +115,8 @@ TEST(Rounding, StaysWhereNoNoiseCarriesTheSamplesFromStepToStep) {
   EXPECT_LT(shafts(1e-4, 0.02).rounding_slip, 0.001 * held);
 }
 
-// A pressure that is held, then falls, and is held again; steps of 40 kPa, as one of 8 bits has.
-SignalTable held_pressure(double from_Pa, double to_Pa) {
+// A pressure that is held, then falls, and is held again; in steps of step_Pa.
+SignalTable held_pressure(double from_Pa, double to_Pa, double step_Pa) {
   SignalTable table;
   Noise noise;
   for (int i = 0; i < 2000; ++i) {
@@ -129,22 +129,38 @@ SignalTable held_pressure(double from_Pa, double to_Pa) {
     add(Role::kPrimarySpeed, 100.0 + 0.01 * noise());
     add(Role::kSecondarySpeed, 222.0 + 0.01 * noise());
     add(Role::kSecondaryPressure,
-        std::round((from_Pa + share * (to_Pa - from_Pa) + 6e3 * noise()) / 4e4) * 4e4);
+        std::round((from_Pa + share * (to_Pa - from_Pa) + 6e3 * noise()) / step_Pa) * step_Pa);
     add(Role::kPrimaryTorque, 50.0);
   }
   return table;
 }
 
+// What a sensor says that cannot go beyond.
+SignalTable clipped_pressure(double low_Pa, double high_Pa) {
+  SignalTable table = held_pressure(6e5, 3.2e5, 1e3);
+  for (double& value : table[Role::kSecondaryPressure].value) {
+    value = std::clamp(value, low_Pa, high_Pa);
+  }
+  return table;
+}
+
 TEST(Saturation, IsALevelThatNoExperimentGoesBeyond) {
-  const SignalTable table = held_pressure(5.2e5, 4.0e5);
+  const SignalTable table = clipped_pressure(4e5, 5.2e5);
   const ExperimentData alone = prepare(table, {});
   EXPECT_TRUE(alone.saturated_pressure);
   Reaches reached;
-  widen(reached, held_pressure(6.4e5, 2.8e5));
+  widen(reached, held_pressure(6.4e5, 2.8e5, 1e3));
   const ExperimentData among_others = prepare(table, {}, reached);
   EXPECT_FALSE(among_others.saturated_pressure);
   EXPECT_GT(among_others.valid_count, 180);  // of 200, less the ends
   EXPECT_LT(alone.valid_count, 100);
+}
+
+// Steps of 40 kPa, as a pressure of 8 bits has: it rests on all of them, on the outer ones too.
+TEST(Saturation, IsNotWhereAPressureIsHeldOnOneOfItsSteps) {
+  const ExperimentData data = prepare(held_pressure(5.2e5, 4.0e5, 4e4), {});
+  EXPECT_FALSE(data.saturated_pressure);
+  EXPECT_GT(data.valid_count, 150);  // of 200, less the ends and the steps
 }
 
 // A pressure that comes down in steps, each a tenth of a second long.

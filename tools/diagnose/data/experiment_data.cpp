@@ -79,9 +79,45 @@ GridSignal to_grid(const Channel& channel, double start_s, int n, double dt_s) {
   return out;
 }
 
+// How a channel's samples repeat the one before: on its bounds and elsewhere.
+struct Repeats {
+  struct Place {
+    double samples = 0.0, repeats = 0.0;
+    double share() const { return samples > 0.0 ? repeats / samples : 0.0; }
+  } on_low, on_high, elsewhere;
+};
+Repeats repeats_of(const Channel& channel) {
+  Repeats out;
+  const auto [low, high] = std::minmax_element(channel.value.begin(), channel.value.end());
+  for (std::size_t i = 1; i < channel.value.size(); ++i) {
+    const double here = channel.value[i];
+    Repeats::Place& place = here == *low ? out.on_low : here == *high ? out.on_high : out.elsewhere;
+    place.samples += 1.0;
+    if (here == channel.value[i - 1]) place.repeats += 1.0;
+  }
+  return out;
+}
+
+// On steps that no noise carries it over, also where it is not on a bound. What is repeated until
+// its next value comes moves by many steps then.
+bool rests_on_steps(const Channel& channel) {
+  constexpr double kHeld = 0.6;  // derived: of samples on steps of three sigmas of their noise
+  constexpr double kManySteps = 2.5;
+  if (repeats_of(channel).elsewhere.share() <= kHeld) return false;
+  std::vector<double> changes;
+  for (std::size_t i = 1; i < channel.value.size(); ++i) {
+    const double change = std::abs(channel.value[i] - channel.value[i - 1]);
+    if (change > 0.0) changes.push_back(change);
+  }
+  if (changes.empty()) return false;
+  const double least = *std::min_element(changes.begin(), changes.end());
+  return estimator::median(changes) < kManySteps * least;
+}
+
 // Where a third and more of the channel's samples sit on the largest or smallest value that it
 // reaches for half a second while the channel moves elsewhere: noise takes a clipped signal off its
-// bound now and then.
+// bound now and then. Where the channel rests on its steps elsewhere as well, to rest on the last
+// one says nothing.
 std::vector<bool> saturated_samples(const Channel& channel, const Reach& reach, double start_s,
                                     int n, double dt_s) {
   constexpr double kWindow_s = 0.5, kAround_s = 0.5, kShare = 0.33;
@@ -90,6 +126,7 @@ std::vector<bool> saturated_samples(const Channel& channel, const Reach& reach, 
   if (channel.value.size() < 10) return out;
   const auto [low, high] = std::minmax_element(channel.value.begin(), channel.value.end());
   if (*low == *high) return out;
+  if (rests_on_steps(channel)) return out;
   for (const double bound : {reach.lowest, reach.highest}) {
     std::size_t begin = 0, hits = 0;
     for (std::size_t end = 0; end < channel.value.size(); ++end) {
@@ -114,19 +151,12 @@ std::vector<bool> saturated_samples(const Channel& channel, const Reach& reach, 
 bool clipped(const Channel& channel) {
   constexpr double kOften = 0.7, kHardly = 0.1, kFew = 10.0;
   if (channel.value.size() < 10) return false;
-  const auto [low, high] = std::minmax_element(channel.value.begin(), channel.value.end());
-  struct Place {
-    double samples = 0.0, repeats = 0.0;
-    bool is_held() const { return samples > kFew && repeats > kOften * samples; }
-  } on_low, on_high, elsewhere;
-  for (std::size_t i = 1; i < channel.value.size(); ++i) {
-    const double here = channel.value[i];
-    Place& place = here == *low ? on_low : here == *high ? on_high : elsewhere;
-    place.samples += 1.0;
-    if (here == channel.value[i - 1]) place.repeats += 1.0;
-  }
-  return on_low.is_held() != on_high.is_held() && elsewhere.samples > kFew &&
-         elsewhere.repeats < kHardly * elsewhere.samples;
+  const Repeats all = repeats_of(channel);
+  const auto is_held = [](const Repeats::Place& place) {
+    return place.samples > kFew && place.share() > kOften;
+  };
+  return is_held(all.on_low) != is_held(all.on_high) && all.elsewhere.samples > kFew &&
+         all.elsewhere.share() < kHardly;
 }
 
 // One sigma of a rounding that no noise carries from step to step, so that no averaging removes it:
