@@ -30,6 +30,11 @@ constexpr double kForceMin_N = 200.0;
 // what a lag, a shift or play is computed from.
 constexpr double kForceStepMax = 0.02;
 
+// One sigma of the weights that a sample of the grid is the mean by.
+double kernel_s(double dt_s) {
+  return std::max(kKernelSigma_s, 0.7 * (dt_s - kGrid_s + kKernelSigma_s));
+}
+
 // Value and slope at each grid instant: local linear fit; between the samples of a slow channel
 // linear interpolation; nothing across a gap.
 GridSignal to_grid(const Channel& channel, double start_s, int n, double dt_s) {
@@ -39,7 +44,7 @@ GridSignal to_grid(const Channel& channel, double start_s, int n, double dt_s) {
   if (channel.t_s.size() < 3) return out;
   const double period_s = median_period_s(channel);
   out.period_s = period_s;
-  const double sigma_s = std::max(kKernelSigma_s, 0.7 * (dt_s - kGrid_s + kKernelSigma_s));
+  const double sigma_s = kernel_s(dt_s);
   const double half_s = 3.0 * sigma_s;
   const double gap_s = std::max(0.25, 3.5 * period_s);
   std::size_t first = 0;
@@ -160,20 +165,26 @@ bool clipped(const Channel& channel) {
 }
 
 // One sigma of a rounding that no noise carries from step to step, so that no averaging removes it:
-// there the samples repeat their neighbours. Relative to the mean value.
+// there the samples repeat their neighbours.
 double held_rounding(const Channel& channel) {
   std::vector<double> steps;
-  double held = 0.0, sum = 0.0;
+  double held = 0.0;
   const std::vector<double>& x = channel.value;
   for (std::size_t i = 1; i + 1 < x.size(); ++i) {
     held += x[i - 1] == x[i] && x[i] == x[i + 1] ? 1.0 : 0.0;
-    sum += std::abs(x[i]);
     if (x[i] != x[i - 1]) steps.push_back(std::abs(x[i] - x[i - 1]));
   }
-  if (steps.empty() || sum == 0.0) return 0.0;
+  if (steps.empty()) return 0.0;
   const double step = estimator::at_rank(steps, steps.size() / 100);
-  const auto count = static_cast<double>(x.size() - 2);
-  return step / std::sqrt(12.0) * std::sqrt(held / count) / (sum / count);
+  return step / std::sqrt(12.0) * std::sqrt(held / static_cast<double>(x.size() - 2));
+}
+
+// The same of its mean size.
+double held_rounding_share(const Channel& channel) {
+  double sum = 0.0;
+  for (const double each : channel.value) sum += std::abs(each);
+  if (sum == 0.0) return 0.0;
+  return held_rounding(channel) / (sum / static_cast<double>(channel.value.size()));
 }
 
 struct LocalFit {
@@ -450,7 +461,11 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
   data.temperature = on_grid(Role::kOilTemperature);
 
   data.rounding_slip =
-      std::hypot(held_rounding(speed), held_rounding(table[Role::kSecondarySpeed]));
+      std::hypot(held_rounding_share(speed), held_rounding_share(table[Role::kSecondarySpeed]));
+  data.rounding_pressure_Pa = held_rounding(table[Role::kSecondaryPressure]);
+  data.rounding_torque_Nm =
+      held_rounding(table[data.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque]);
+  data.rounding_torque_s_Nm = held_rounding(table[Role::kSecondaryTorque]);
 
   data.line_p = order_line(speed);
   data.line_s = order_line(table[Role::kSecondarySpeed]);
@@ -478,6 +493,7 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
   }
   data.stop.assign(static_cast<std::size_t>(n), kNoStop);
   data.valid.assign(static_cast<std::size_t>(n), false);
+  data.slip_spread = ArrayXd::Zero(n);
   std::vector<bool> too_fast(static_cast<std::size_t>(n), false);
   const auto usable = [](const GridSignal& signal, int k) {
     return !signal.present || std::isfinite(signal.value[k]);
@@ -496,6 +512,7 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
                                   (data.omega_p.value[k] * data.omega_p.value[k]) -
                               data.omega_s.slope[k] / data.omega_p.value[k]) /
                              ratio;
+    data.slip_spread[k] = std::pow(kernel_s(data.dt_s) * slip_rate, 2.0);
     const double step_N =
         variator.secondary_piston_area_m2 * (data.pressure.value[k] - data.pressure.slow[k]);
     data.valid[i] = std::abs(slip) < kSlipMax + kSoftness_1_N * force_N &&

@@ -55,10 +55,22 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
   const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
   const std::array<double, kStops> peak_slip{std::exp(q.ln_peak_slip[0]),
                                              std::exp(q.ln_peak_slip[1])};
+  // What the mean of the curve over a sample is more than the curve at the mean slip, Nm.
+  const auto bend_Nm = [&](int k, const CurveShape& shape, double per_peak) {
+    constexpr double kStep = 0.05;    // in slips at the peak
+    constexpr double kLeast = 1e-10;  // squared shares: less is nothing on the steepest curve
+    const double spread = data.slip_spread[k];
+    if (spread < kLeast) return 0.0;
+    const double x = q.slip[k] * per_peak;
+    const double bend =
+        (shape.evaluate(x + kStep).slope - shape.evaluate(x - kStep).slope) / (2.0 * kStep);
+    return 0.5 * q.capacity[k] * bend * spread * per_peak * per_peak;
+  };
   const auto find_foot = [&](int k) {
     const auto stop = static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)]);
     const double peak = peak_slip[stop], per_peak = 1.0 / peak;
     const double capacity = q.capacity[k];
+    const double torque_Nm = q.belt_torque[k] - bend_Nm(k, curve[stop], per_peak);
     const double carried_Nm = q.belt_torque[k] * campaign.noise.force_N / q.force_N[k];
     const double torque_variance = sensor_variance + carried_Nm * carried_Nm;
     const double torque_weight = 1.0 / torque_variance;
@@ -70,19 +82,19 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
       const CurveShape::Point point = curve[stop].evaluate(x);
       const double model_Nm = capacity * point.value;
       const double gap_slip = q.slip[k] - x * peak;
-      const double gap_Nm = q.belt_torque[k] - model_Nm;
+      const double gap_Nm = torque_Nm - model_Nm;
       return {x, model_Nm, capacity * point.slope * per_peak,
               gap_slip * gap_slip * slip_weight + gap_Nm * gap_Nm * torque_weight};
     };
     Place foot = at(q.slip[k] * per_peak);
     // Right of the rising branch the next point of the curve may lie on it, at the same torque:
     // from beyond the peak no small steps lead there.
-    if (const double rising = nominal_inverse(q.belt_torque[k] / capacity); std::isfinite(rising)) {
+    if (const double rising = nominal_inverse(torque_Nm / capacity); std::isfinite(rising)) {
       if (const Place there = at(rising); there.distance < foot.distance) foot = there;
     }
     for (int i = 0; i < 12; ++i) {
       const double gap_slip = q.slip[k] - foot.x * peak;
-      const double gap_Nm = q.belt_torque[k] - foot.model_Nm;
+      const double gap_Nm = torque_Nm - foot.model_Nm;
       double step = (gap_slip * slip_weight + foot.slope * gap_Nm * torque_weight) /
                     ((slip_weight + foot.slope * foot.slope * torque_weight) * peak);
       step = std::clamp(step, -0.5, 0.5);
@@ -100,8 +112,7 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
     out.model_Nm[k] = foot.model_Nm;
     out.weight[k] = 1.0 / std::sqrt(torque_variance + foot.slope * foot.slope * slip_variance);
     out.value[kFrictionResidual][k] =
-        (q.belt_torque[k] - foot.model_Nm - foot.slope * (q.slip[k] - foot.x * peak)) *
-        out.weight[k];
+        (torque_Nm - foot.model_Nm - foot.slope * (q.slip[k] - foot.x * peak)) * out.weight[k];
   };
   for (const auto& [begin, end] : data.stretches) {
     for (int k = begin; k < end; ++k) find_foot(k);
@@ -391,13 +402,32 @@ NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& st
     collect(q.tracking, tracking);
     collect(q.force_N, force);
   }
+  // What rests on a step differs from its neighbours by nothing, and from the truth by the
+  // rounding.
+  const auto rounding = [&](double ExperimentData::*of) {
+    double squares = 0.0, runs = 0.0;
+    for (const ExperimentData& data : campaign.runs) {
+      if (data.valid_count == 0) continue;
+      squares += data.*of * data.*of;
+      runs += 1.0;
+    }
+    return std::sqrt(squares / std::max(runs, 1.0));
+  };
+  const double torque_Nm = rounding(&ExperimentData::rounding_torque_Nm);
+  const double torque_s_Nm = rounding(&ExperimentData::rounding_torque_s_Nm);
+  const std::array<double, kStops> ratio{campaign.variator.ratio_overdrive,
+                                         campaign.variator.ratio_low};
+  static_assert(kOverdriveStop == 0 && kLowStop == 1);
   NoiseLevels out;
   out.slip = std::max(robust_sigma(slip), 2e-6);
-  out.torque_Nm = std::max(robust_sigma(torque), 2e-3);
+  out.torque_Nm = std::max({robust_sigma(torque), 2e-3, torque_Nm});
   for (std::size_t stop = 0; stop < kStops; ++stop) {
-    out.balance_Nm[stop] = std::max(robust_sigma(balance[stop]), 2e-3);
+    out.balance_Nm[stop] = std::max(
+        {robust_sigma(balance[stop]), 2e-3, std::hypot(torque_Nm, ratio[stop] * torque_s_Nm)});
   }
-  out.force_N = std::max(robust_sigma(force), 0.2);
+  out.force_N = std::max({robust_sigma(force), 0.2,
+                          campaign.variator.secondary_piston_area_m2 *
+                              rounding(&ExperimentData::rounding_pressure_Pa)});
   out.tracking_Pa = std::max(robust_sigma(tracking), 20.0);
   return out;
 }
