@@ -68,10 +68,10 @@ TEST(CheckTorques, ATorqueThatIsNotRecordedSaysNothing) {
   EXPECT_EQ(doubt_of(run), "");
 }
 
-// A pressure that rests, with noise of 1 kPa, in steps; held: each value twice.
-Steps steps_at(double step_kPa, bool held) {
+// A channel that rests, with noise of 1 of 400, in steps; held: each value twice.
+Steps steps_at(double step_kPa, bool held, Role role = Role::kSecondaryPressure) {
   SignalTable table;
-  Channel& pressure = table[Role::kSecondaryPressure];
+  Channel& pressure = table[role];
   double noise_kPa = 0.0;
   for (int i = 0; i < 2000; ++i) {
     if (!held || i % 2 == 0) {
@@ -91,8 +91,15 @@ TEST(StepsOf, AreThoseBeyondTheNoise) {
   EXPECT_EQ(steps_at(0.1, false), Steps::kFine);
   EXPECT_EQ(steps_at(1.0, false), Steps::kFine);
   EXPECT_EQ(steps_at(2.2, false), Steps::kLeak);
-  EXPECT_EQ(steps_at(5.0, false), Steps::kCoarse);
+  EXPECT_EQ(steps_at(5.0, false), Steps::kLeak);
   EXPECT_EQ(steps_at(0.1, true), Steps::kFine);  // repeated, not rounded
+}
+
+// A line where it sweeps.
+TEST(StepsOf, OfASpeedLeaveLines) {
+  EXPECT_EQ(steps_at(1.0, false, Role::kPrimarySpeed), Steps::kFine);
+  EXPECT_EQ(steps_at(5.0, false, Role::kPrimarySpeed), Steps::kLeak);
+  EXPECT_EQ(steps_at(5.0, false, Role::kSecondarySpeed), Steps::kLeak);
 }
 
 }  // namespace

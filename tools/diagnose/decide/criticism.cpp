@@ -105,11 +105,10 @@ Criticism criticise(const Engine& engine, Steps steps) {
   const ScatterRatios ratio = scatter_ratios(engine, out.base.scatter);
   const ScatterRatios unusual = scatter_ratios(engine, default_scatter());
   using namespace thresholds;
-  const double times = steps == Steps::kCoarse ? kCoarse : 1.0;
   const bool fine = steps == Steps::kFine;
   out.tests = {
-      {"law_cell", law, times * kLawCell},
-      {"smooth_cell", smooth, times * kSmoothCell},
+      {"law_cell", law, kLawCell},
+      {"smooth_cell", smooth, kSmoothCell},
       {"line", fine ? out.line.excess : 0.0, kLine},
       {"channel_line", out.channel_line.excess, kChannelLine},
       {"belt_passage", belt_line(engine.campaign(), out.belt_Hz), kBeltLine},

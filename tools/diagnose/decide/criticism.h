@@ -31,7 +31,7 @@ struct Criticism {
 };
 
 // At the engine's state. Where channels move in steps, these leave lines and slow courses of their
-// own: those tests are left out, and where they are coarse a function has to explain more.
+// own: those tests are left out.
 Criticism criticise(const Engine& engine, Steps steps);
 
 // Where the scatter between experiments fails: the cell may be what it is, for it acts where they

@@ -234,28 +234,26 @@ void check_friction(const std::vector<ExperimentData>& runs,
 }
 
 Steps steps_of(const SignalTable& table) {
-  // Chosen: at a step of three sigmas of the noise. Derived: at one of 1.6, from where on means of
-  // many samples keep something of the steps.
-  constexpr double kCoarseHeld = 0.6, kLeakHeld = 0.41;
-  constexpr std::size_t kSamplesMin = 100;  // chosen: a share of 0.6 is then known to 0.05
-  Steps out = Steps::kFine;
+  // Derived: at a step of 1.6 sigmas of the noise, from where on means of many samples keep
+  // something of the steps.
+  constexpr double kLeakHeld = 0.41;
+  constexpr std::size_t kSamplesMin = 100;  // chosen: the share is then known to 0.05
   for (const Role role : {Role::kSecondaryPressure, Role::kPrimaryTorque, Role::kEngineTorque,
-                          Role::kSecondaryTorque}) {
+                          Role::kSecondaryTorque, Role::kPrimarySpeed, Role::kSecondarySpeed}) {
     const std::vector<double>& value = table[role].value;
     if (value.size() < kSamplesMin) continue;
     std::vector<double> changes;
     for (std::size_t i = 1; i < value.size(); ++i) {
       if (value[i] != value[i - 1]) changes.push_back(std::abs(value[i] - value[i - 1]));
     }
-    const auto all = static_cast<double>(value.size() - 1);
-    const double held = 1.0 - static_cast<double>(changes.size()) / all;
-    if (held > kCoarseHeld) return Steps::kCoarse;
+    const double held =
+        1.0 - static_cast<double>(changes.size()) / static_cast<double>(value.size() - 1);
     if (held <= kLeakHeld || changes.empty()) continue;
     // A channel that is repeated until its next value comes moves by many steps then.
     const double least = *std::min_element(changes.begin(), changes.end());
-    if (estimator::median(changes) < 2.5 * least) out = Steps::kLeak;
+    if (estimator::median(changes) < 2.5 * least) return Steps::kLeak;
   }
-  return out;
+  return Steps::kFine;
 }
 
 void check_fitted_friction(const std::map<std::string, Interval>& machine, Doubts& doubts) {

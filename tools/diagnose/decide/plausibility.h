@@ -33,9 +33,9 @@ void check_friction(const std::vector<ExperimentData>& runs,
 // By the fit of the machine's constants.
 void check_fitted_friction(const std::map<std::string, Interval>& machine, Doubts& doubts);
 
-// Steps of pressure and torque against their noise: means smooth fine ones; something of those that
-// leak stays in means, and coarse ones stay as they are.
-enum class Steps { kFine, kLeak, kCoarse };
+// Steps of pressure, torque and speed against their noise: means smooth fine ones; of those that
+// leak something stays in means.
+enum class Steps { kFine, kLeak };
 Steps steps_of(const SignalTable& table);
 
 }  // namespace beltgrip::diagnose

@@ -12,8 +12,6 @@ inline constexpr double kLawCell = 35.0;
 inline constexpr double kSmoothBeside = 10.0;
 // The same of a smooth function: the largest of those was 30.
 inline constexpr double kSmoothCell = 35.0;
-// Times both limits where channels move in steps beyond their noise.
-inline constexpr double kCoarse = 5.0;
 // Of the best cell, where the scatter between experiments is more than it should be.
 inline constexpr double kCellBesideScatter = 9.0;
 // The order of the experiments is scatter by another name: it has to beat all others by so much.

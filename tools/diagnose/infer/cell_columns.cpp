@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace beltgrip::diagnose {
@@ -13,9 +14,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kAnyConstant = 1e-3;  // precision: of a constant that is not known at all
-constexpr double kOwnShareMin = 0.02;  // of a direction: less is the machine's constants
-constexpr int kScatterSteps = 6;       // from the fitted scatter to the usual
+constexpr double kAnyConstant = 1e-3;           // precision: of a constant that is not known at all
+constexpr double kOwnShareMin = 0.02;           // of a direction: less is the machine's constants
+constexpr int kScatterSteps = 6;                // from the fitted scatter to the usual
+constexpr std::array kLessScatter{0.25, 0.06};  // chosen, of the variance
 
 // What a unit of the row changes at each sample.
 QuantityChange unit_change(const ModelState& state, const Residuals& at, const InjectionRow& row,
@@ -83,6 +85,14 @@ CellBase cell_base(const Engine& engine) {
         if (ratio < 1.0) between.variance[j] *= std::pow(ratio, share);
       }
       out.scatter.push_back(between);
+    }
+  }
+  // What repeats may be all that they scatter by: of level, seat and zero each for itself less.
+  for (const int each : {0, 1, 2}) {
+    for (const double share : kLessScatter) {
+      Scatter less = engine.scatter();
+      less.variance[each] *= share;
+      out.scatter.push_back(less);
     }
   }
   return out;
@@ -168,7 +178,6 @@ CellScore score_of(const std::vector<const Summary*>& used, const Prior& prior,
                    const Scatter& scatter) {
   const Index n = prior.pull.size();
   const Index all = n + kCellKnots + 1;
-  const Scatter usual = default_scatter();
   const Total sum = total_of(used, all, scatter);
   const MatrixXd& total = sum.all;
   MatrixXd information = total.topLeftCorner(n, n);
@@ -184,11 +193,10 @@ CellScore score_of(const std::vector<const Summary*>& used, const Prior& prior,
   const VectorXd off = step - prior.pull;
   const double misfit = total(all - 1, all - 1) + 2.0 * step.dot(total.col(all - 1).head(n)) +
                         step.dot(total.topLeftCorner(n, n) * step);
-  const double scatter_prior =
-      kScatterPriorRuns * (scatter.variance.log() + usual.variance / scatter.variance).sum();
   out.misfit = misfit;
-  out.log_likelihood = -0.5 * (misfit + off.dot(prior.precision.cwiseProduct(off)) + sum.ln_det +
-                               scatter_prior + ldlt.vectorD().array().max(1e-300).log().sum());
+  out.log_likelihood =
+      -0.5 * (misfit + off.dot(prior.precision.cwiseProduct(off)) + sum.ln_det +
+              scatter_penalty(scatter.variance) + ldlt.vectorD().array().max(1e-300).log().sum());
   return out;
 }
 

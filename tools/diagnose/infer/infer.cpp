@@ -122,6 +122,30 @@ Scatter default_scatter() {
   return out;
 }
 
+namespace {
+RandomVector prior_runs(const RandomVector& variance) {
+  return (variance < default_scatter().variance)
+      .select(RandomVector::Constant(kScatterPriorRunsBelow),
+              RandomVector::Constant(kScatterPriorRuns));
+}
+}  // namespace
+
+RandomVector scatter_variance(const RandomVector& mean_square, double runs) {
+  const RandomVector strength = prior_runs(mean_square);
+  return (runs * mean_square + strength * default_scatter().variance) / (runs + strength);
+}
+
+RandomVector mean_square_of(const RandomVector& variance, double runs) {
+  const RandomVector strength = prior_runs(variance);
+  return ((runs + strength) * variance - strength * default_scatter().variance) /
+         std::max(runs, 1.0);
+}
+
+double scatter_penalty(const RandomVector& variance) {
+  const RandomVector share = variance / default_scatter().variance;
+  return (prior_runs(variance) * (share.log() + 1.0 / share - 1.0)).sum();
+}
+
 bool parts_experiments(const Scatter& without, const Scatter& with) {
   constexpr double kMore = 4.0;  // of the variance, on balance of all kinds
   return (with.variance / without.variance).prod() > kMore;
@@ -372,12 +396,7 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
     full << fit.step, 1.0;
     fit.misfit = full.dot(total * full);
     const double quadratic = fit.misfit + off.dot(prior.precision.cwiseProduct(off));
-    double scatter_prior = 0.0;
-    for (int i = 0; i < kRandomEffects; ++i) {
-      scatter_prior += kScatterPriorRuns * (std::log(fit.scatter.variance[i]) +
-                                            usual.variance[i] / fit.scatter.variance[i]);
-    }
-    fit.log_likelihood = -0.5 * (quadratic + ln_det + scatter_prior);
+    fit.log_likelihood = -0.5 * (quadratic + ln_det + scatter_penalty(fit.scatter.variance));
     if (is_last) break;
     Eigen::Array<double, kRandomEffects, 1> square =
         Eigen::Array<double, kRandomEffects, 1>::Zero();
@@ -388,8 +407,8 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
       square += u.array().square() + posterior[e].diagonal().array() +
                 spread.cwiseProduct(lever).rowwise().sum().array();
     }
-    fit.scatter.variance = (square + kScatterPriorRuns * usual.variance) /
-                           (static_cast<double>(runs) + kScatterPriorRuns);
+    const double count = std::max(1.0, static_cast<double>(runs));
+    fit.scatter.variance = scatter_variance(square / count, static_cast<double>(runs));
     fit.scatter.variance = fit.scatter.variance.min(kScatterCap * kScatterCap * usual.variance);
   }
   return fit;

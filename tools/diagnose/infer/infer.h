@@ -93,7 +93,14 @@ struct Information {
 Information information_on(const std::vector<Summary>& summaries, const std::vector<int>& others,
                            const Prior& prior, int column, const Scatter& scatter);
 
-inline constexpr double kScatterPriorRuns = 4.0;
+// Experiments that what rigs usually scatter by counts for: where the data scatter by more, and
+// where by less, for a good rig scatters by a tenth of a bad one.
+inline constexpr double kScatterPriorRuns = 4.0, kScatterPriorRunsBelow = 1.0;
+// The variance that is most probable of so many experiments whose squares have this mean, and its
+// inverse; minus twice the log of the prior, 0 at the usual scatter.
+RandomVector scatter_variance(const RandomVector& mean_square, double runs);
+RandomVector mean_square_of(const RandomVector& scatter_variance, double runs);
+double scatter_penalty(const RandomVector& variance);
 
 Whitening identity_whitening(const Campaign& campaign);
 

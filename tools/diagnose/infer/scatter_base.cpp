@@ -81,9 +81,7 @@ ScatterRatios scatter_ratios(const Engine& engine, const Scatter& base) {
   if (engine.summaries().size() < kRunsMin) return {};
   const auto runs = static_cast<double>(engine.summaries().size());
   // The fit's estimate leans on the usual scatter as on that many experiments.
-  const RandomVector own = ((runs + kScatterPriorRuns) * engine.scatter().variance -
-                            kScatterPriorRuns * default_scatter().variance) /
-                           std::max(runs, 1.0);
+  const RandomVector own = mean_square_of(engine.scatter().variance, runs);
   const RandomVector ratio = (own / base.variance).max(0.0).sqrt();
   return {ratio[0], ratio[1], ratio[2]};
 }

@@ -395,10 +395,8 @@ class Run {
     }
     if (steps_ != Steps::kFine) {
       out().notes.emplace_back(
-          std::string(
-              "a pressure or torque moves in steps beyond its noise: lines and slow courses "
-              "are not judged") +
-          (steps_ == Steps::kCoarse ? ", and only what is large is seen" : ""));
+          "a pressure, torque or speed moves in steps beyond its noise: lines and slow courses are "
+          "not judged");
     }
     out().scatter_from_replicates = criticism.base.from_replicates;
     for (const JudgedTest& test : criticism.tests) out().left[test.name] = {test.value, test.limit};
