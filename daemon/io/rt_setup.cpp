@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <cstdint>
-#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <string_view>
+#include <system_error>
 
 namespace beltgrip::daemon {
 
@@ -38,18 +39,28 @@ struct Mapping {
   bool held = false;  // by the loop
 };
 
+// Behind the number, or nullptr.
+const char* read_address(const char* from, const char* end, std::uintptr_t& address) {
+  const auto [behind, error] = std::from_chars(from, end, address, 16);
+  return error == std::errc{} ? behind : nullptr;
+}
+
 bool read_mapping(const std::string& line, Mapping& mapping) {
-  std::array<char, 5> may{};
-  unsigned long begin = 0, end = 0;
-  if (std::sscanf(line.c_str(), "%lx-%lx %4s", &begin, &end, may.data()) != 3) return false;
-  const bool none = may[0] == '-' && may[1] == '-';  // a guard page
+  const char* const end = line.data() + line.size();
+  const char* at = read_address(line.data(), end, mapping.begin);
+  if (at == nullptr || at == end || *at != '-') return false;
+  at = read_address(at + 1, end, mapping.end);
+  constexpr std::ptrdiff_t kMay = 5;  // " r-xp"
+  if (at == nullptr || end - at < kMay) return false;
+  const bool readable = at[1] == 'r', writable = at[2] == 'w';
   const bool kernels = line.ends_with("[vvar]") || line.ends_with("[vvar_vclock]") ||
                        line.ends_with("[vdso]") || line.ends_with("[vsyscall]");
   const bool of_others =
-      may[1] != 'w' && std::any_of(kOfOthers.begin(), kOfOthers.end(), [&](std::string_view each) {
+      !writable && std::any_of(kOfOthers.begin(), kOfOthers.end(), [&](std::string_view each) {
         return line.find(each) != std::string::npos;
       });
-  mapping = {begin, end, !none && !kernels && !of_others};
+  // What may neither be read nor written is a guard page.
+  mapping.held = (readable || writable) && !kernels && !of_others;
   return true;
 }
 

@@ -120,10 +120,11 @@ TEST_F(ReplayAsRecorded, SameExperimentsSameStopsSameValues) {
         for (const char* key : {"outcome", "stop_reason", "direction", "ratio"}) {
           EXPECT_EQ(now.at(key), then.at(key)) << drive << config << i << key;
         }
-        // Frames leave up to 1 ms after their sample, and the samples here lie between those there.
-        for (const char* key : {"start_s", "stop_s"}) {
-          EXPECT_NEAR(now.at(key).get<double>(), then.at(key).get<double>(), 0.0061) << key;
-        }
+        // Frames leave up to 1 ms after their sample, and the samples here lie between those there:
+        // the request begins one sample apart at the most, and what stops it, seen with other
+        // samples, two.
+        EXPECT_NEAR(now.at("start_s").get<double>(), then.at("start_s").get<double>(), 0.0061);
+        EXPECT_NEAR(now.at("stop_s").get<double>(), then.at("stop_s").get<double>(), 0.0111);
         if (then.at("outcome") == "completed") {
           EXPECT_NEAR(now.at("mu_max").get<double>(), then.at("mu_max").get<double>(),
                       0.2 * then.at("mu_max_std").get<double>());

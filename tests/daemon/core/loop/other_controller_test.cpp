@@ -79,10 +79,10 @@ TEST(OtherController, OneThatObeysAsConfiguredIsNotTakenForLate) {
       // Measured: of 96 requests 0, of those whose force is read otherwise than the controller
       // reckons it, or in steps, 2 of 288.
       EXPECT_LE(count(all, StopReason::kLag), 1) << torque_Nm;
-      EXPECT_GE(std::ranges::count_if(all,
-                                      [](const ExperimentResult& each) {
-                                        return each.outcome == daemon::Outcome::kCompleted;
-                                      }),
+      // The others come to the top; whether they bring a value or a bound is the estimator's
+      // matter.
+      EXPECT_GE(count(all, StopReason::kSlope) + count(all, StopReason::kSlipRate) +
+                    count(all, StopReason::kSlipEnergy),
                 10)
           << torque_Nm;
     }
