@@ -86,11 +86,6 @@ TEST(Loss, ThatDrivesIsNone) {
     named |= slot.row->id == "torque_bias";
   }
   EXPECT_TRUE(named);
-  // Nor does the machine take it for a drag of its own: the zero of a torque scatters by 0.1 Nm.
-  const Eigen::VectorXd& constants = d.naming.hypothesis.state.nuisance;
-  EXPECT_GE(constants[kLossConstant_Nm], -0.2);
-  EXPECT_GE(constants[kLossPerSpeed_Nms], 0.0);
-  EXPECT_GE(constants[kLossPerkN_Nm], 0.0);
 }
 
 TEST(SecondaryLoss, IsNothingToFitWithoutThatTorque) {

@@ -49,9 +49,9 @@ constexpr double kLeftOutMin = 0.0;      // of the log predictive density
 constexpr double kLeftOutPlain = 200.0;  // the same: beyond doubt, however few experiments show it
 constexpr double kRippleMin = 1e-4;      // of the speed: less is of no consequence for slip
 
-constexpr std::array kConstants{kLnMuMax,          kDeformationPerkN, kLossConstant_Nm,
-                                kLossPerSpeed_Nms, kLossPerkN_Nm,     kLnRatioOverdrive,
-                                kLnRatioLow,       kSecondaryLoss_Nm, kSecondaryLossPerSpeed_Nms};
+constexpr std::array kConstants{kDeformationPerkN, kLossConstant_Nm,          kLossPerSpeed_Nms,
+                                kLossPerkN_Nm,     kLnRatioOverdrive,         kLnRatioLow,
+                                kSecondaryLoss_Nm, kSecondaryLossPerSpeed_Nms};
 
 std::string_view id_of(const Engine& engine, int slot) {
   return engine.campaign().slots[static_cast<std::size_t>(slot)].row->id;
@@ -266,34 +266,17 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
   return promoted;
 }
 
-// The machine as it was before anything was named, by the noise that it leaves: not by that which
-// something else had left, in which a fit can hang far away.
-void back_to_machine(Engine& engine, const ModelState& machine) {
-  for (const int steps : {0, kSettling}) {
-    engine.accept(engine.refine_from(machine, {}, steps));
-    engine.update_noise();
-  }
-}
-
 // Takes a slot out again. Where it had carried the machine's constants away, the way back leads
-// from the machine alone.
+// from the nominal machine.
 void drop(Engine& engine, const Naming& naming, int slot) {
   std::vector<int> fewer = engine.accepted();
   std::erase(fewer, slot);
-  const std::vector<estimator::LearnedTerm>& learned = engine.state().learned;
-  if (fewer.empty() && learned.empty()) {
-    back_to_machine(engine, naming.sharp.state);
-    return;
-  }
-  Hypothesis best = engine.refine(fewer);
-  for (const ModelState& machine : {naming.nominal.state, naming.sharp.state}) {
-    ModelState start = machine;
-    start.learned = learned;
-    for (const int kept : fewer) start.effects[kept] = engine.state().effects[kept];
-    Hypothesis other = engine.refine_from(start, fewer, kSettling);
-    if (is_better(other, best)) best = std::move(other);
-  }
-  engine.accept(best);
+  ModelState start = naming.nominal.state;
+  start.learned = engine.state().learned;
+  for (const int kept : fewer) start.effects[kept] = engine.state().effects[kept];
+  const Hypothesis from_here = engine.refine(fewer);
+  const Hypothesis from_nominal = engine.refine_from(start, fewer);
+  engine.accept(from_here.log_likelihood > from_nominal.log_likelihood ? from_here : from_nominal);
   engine.update_noise();
 }
 
@@ -341,35 +324,16 @@ void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& 
   }
 }
 
-// An effect that is a constant of the machine under another name: the constant's usual values alone
-// tell it. What the data gain by it lies in the thousandth of it that is none, where equations err.
-bool is_unusual_constant(const Engine& engine, const Naming& naming, int slot) {
-  const Hypothesis with = engine.refine(engine.accepted(), 3);
-  std::vector<int> fewer = engine.accepted();
-  std::erase(fewer, slot);
-  const Hypothesis without = engine.refine(fewer, kSettling);
-  return engine.departure(without.state) - engine.departure(with.state) > naming.threshold;
-}
-
 // An effect that does not help to predict experiments left out of the fit is none. One that is a
-// constant of the machine under another name cannot help there.
+// constant of the machine under another name cannot help there: the constant's usual values alone
+// tell it.
 void drop_unconfirmed(Engine& engine, Naming& naming) {
   if (engine.summaries().size() < 3) return;
   for (;;) {
     const std::vector<int>& set = engine.accepted();
     std::vector<std::pair<double, int>> judged;  // gain of the log predictive density, slot
-    std::optional<int> shadow;
     for (const int slot : set) {
-      if (!engine.is_constant(slot, naming.sharp.state)) {
-        judged.emplace_back(engine.left_out_gain(slot), slot);
-      } else if (!is_unusual_constant(engine, naming, slot)) {
-        shadow = slot;
-      }
-    }
-    if (shadow) {
-      naming.not_confirmed.push_back(*shadow);
-      drop(engine, naming, *shadow);
-      continue;
+      if (!engine.is_constant(slot)) judged.emplace_back(engine.left_out_gain(slot), slot);
     }
     if (judged.empty()) return;
     const auto [density, slot] = *std::min_element(judged.begin(), judged.end());
@@ -579,7 +543,8 @@ double find_effects(Engine& engine, Naming& out, const std::function<bool()>& st
 }  // namespace
 
 void forget_names(Engine& engine, Naming& naming) {
-  back_to_machine(engine, naming.sharp.state);
+  engine.accept(engine.refine_from(naming.sharp.state, {}, kSettling));
+  engine.update_noise();
   naming.accepted.clear();
   naming.unknown.reset();
   naming.hypothesis = engine.refine({}, 3);
@@ -599,9 +564,7 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop) {
   engine.fit_machine();
   engine.update_noise();
   for (int i = 0; i < 2; ++i) {
-    // A curve that no friction has: the fit hangs.
-    const bool hangs = i > 0 && !Engine::curve_is_possible(engine.state());
-    engine.accept(hangs ? engine.refine_from_other_peaks() : engine.refine({}, kSettling));
+    engine.accept(engine.refine({}, kSettling));
     engine.update_noise();
   }
   out.sharp = {engine.state(), engine.campaign().noise, true};

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 #include "estimator/statistics/order.h"
 #include "tools/diagnose/infer/parallel.h"
@@ -29,8 +28,7 @@ constexpr double kNothingMore = 0.02;  // of the same, for a step: the end
 constexpr double kSameStep = 1e-3;     // apart by less of their length: both fail
 constexpr double kCurveFault = 0.1;    // one sigma of curve_faults()
 constexpr int kSettled = 20;           // steps, where all else stays
-constexpr double kHeld = 1e9;          // precision of what rests on a bound
-constexpr double kOnBound = 1e-9;      // tolerances
+constexpr double kReach = 3.0;         // chosen, tolerances: no healthy machine is farther off
 constexpr double kSizePrior = 3.0;     // one sigma of an effect's size, in usual sizes
 
 bool stop_used(const Campaign& campaign, int stop) {
@@ -99,12 +97,6 @@ double leaves(const Campaign& campaign, const ModelState& state) {
 
 }  // namespace
 
-bool is_better(const Hypothesis& one, const Hypothesis& other) {
-  if (parts_experiments(other.fit.scatter, one.fit.scatter)) return false;
-  if (parts_experiments(one.fit.scatter, other.fit.scatter)) return true;
-  return one.log_likelihood > other.log_likelihood;
-}
-
 Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model) {
   Campaign out;
   out.runs = std::move(runs);
@@ -156,42 +148,6 @@ double Engine::scale(int parameter) const {
 }
 
 Prior Engine::prior(const std::vector<int>& parameters, const ModelState& at) const {
-  Prior out = usual(parameters, at);
-  for (std::size_t j = 0; j < parameters.size(); ++j) {
-    const int p = parameters[j];
-    if (p >= kNuisanceCount || !is_on_bound(p, at)) continue;
-    out.pull[static_cast<Index>(j)] = 0.0;
-    out.precision[static_cast<Index>(j)] = kHeld;
-  }
-  return out;
-}
-
-VectorXd Engine::bounded_step(const std::vector<Summary>& summaries,
-                              const std::vector<int>& parameters, Prior prior,
-                              const Scatter& scatter, const ModelState& from) const {
-  constexpr int kBoundsMost = 5;  // on which a step may end
-  std::vector<int> columns(parameters.size());
-  std::iota(columns.begin(), columns.end(), 0);
-  for (int i = 0;; ++i) {
-    VectorXd step = fit_linear(summaries, columns, prior, scatter, 0, Wanted::kStep).step;
-    bool is_within = true;
-    for (std::size_t j = 0; j < parameters.size(); ++j) {
-      const int p = parameters[j];
-      const auto k = static_cast<Index>(j);
-      if (p >= kNuisanceCount || prior.precision[k] == kHeld) continue;
-      const NuisanceRow& row = campaign_.nuisances[static_cast<std::size_t>(p)];
-      const double to = from.nuisance[p] + step[k] * scale(p);
-      const double bound = std::clamp(to, row.least, row.most);
-      if (std::abs(to - bound) <= kOnBound * row.tolerance) continue;
-      prior.pull[k] = (bound - from.nuisance[p]) / scale(p);
-      prior.precision[k] = kHeld;
-      is_within = false;
-    }
-    if (is_within || i == kBoundsMost) return step;
-  }
-}
-
-Prior Engine::usual(const std::vector<int>& parameters, const ModelState& at) const {
   const auto n = static_cast<Index>(parameters.size());
   Prior out{VectorXd::Zero(n), VectorXd::Ones(n)};
   for (Index j = 0; j < n; ++j) {
@@ -259,7 +215,7 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
                             const Scatter& with) {
     const Fit none =
         fit_linear(summaries, {}, Prior{VectorXd(0), VectorXd(0)}, with, 0, Wanted::kStep);
-    const Prior here = usual(parameters, state);
+    const Prior here = prior(parameters, state);
     return none.log_likelihood - 0.5 * here.pull.cwiseAbs2().dot(here.precision);
   };
   Optimum best;
@@ -279,7 +235,7 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
     for (const Summary& each : best.summaries) {
       diagonal += each.aa.diagonal().head(scales.size());
     }
-    const Prior here = usual(parameters, best.state);
+    const Prior here = prior(parameters, best.state);
     double gained = 0.0;
     bool moved = false;
     VectorXd failed = VectorXd::Zero(scales.size());  // the last step that did
@@ -287,9 +243,9 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
       Prior damped = here;
       damped.precision += damping * diagonal;
       damped.pull = here.pull.cwiseProduct(here.precision).cwiseQuotient(damped.precision);
-      const VectorXd step =
-          bounded_step(best.summaries, parameters, damped, best.fit.scatter, best.state);
-      if ((step - failed).norm() < kSameStep * failed.norm()) {
+      const Fit step =
+          fit_linear(best.summaries, columns, damped, best.fit.scatter, 0, Wanted::kStep);
+      if ((step.step - failed).norm() < kSameStep * failed.norm()) {
         damping = std::clamp(10.0 * damping, 1e-5, 1e6);
         continue;
       }
@@ -297,10 +253,10 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
       gained = 0.0;
       double share = 1.0;
       // A long step for next to nothing has gone past what it was made for.
-      const bool is_long = step.cwiseAbs().maxCoeff() > kLongStep;
+      const bool is_long = step.step.cwiseAbs().maxCoeff() > kLongStep;
       for (double tried = 1.0; tried > 0.1; tried *= 0.5) {
         ModelState next = from;
-        move(parameters, step, tried, next);
+        move(parameters, step.step, tried, next);
         std::vector<Residuals> there = residuals_at(next);
         const double gain =
             standing(next, summaries_at(next, there, {}), best.fit.scatter) - best.objective;
@@ -312,7 +268,7 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
         if (gained > kWorthwhile || !is_long) break;
       }
       moved = gained > 0.0;
-      failed = step;
+      failed = step.step;
       damping = std::clamp(moved && share == 1.0 ? 0.1 * damping : 10.0 * damping, 1e-5, 1e6);
     }
     const bool is_last = !moved || gained < kNothingMore || i + 1 == iterations;
@@ -548,23 +504,10 @@ std::vector<Score> Engine::screen(const Fit& from, int scatter_steps) const {
   return out;
 }
 
-double Engine::departure(const ModelState& state) const {
-  const Prior away = usual(nuisances_, state);
-  return away.pull.cwiseAbs2().dot(away.precision);
-}
-
-bool Engine::is_on_bound(int constant, const ModelState& at) const {
-  const NuisanceRow& row = campaign_.nuisances[static_cast<std::size_t>(constant)];
-  const double room = kOnBound * row.tolerance;
-  return at.nuisance[constant] <= row.least + room || at.nuisance[constant] >= row.most - room;
-}
-
-bool Engine::is_constant(int slot, const ModelState& at) const {
+bool Engine::is_constant(int slot) const {
   constexpr double kSame = 1.0 - 1e-3;  // of the column's energy
   const int column = columns_of({kNuisanceCount + slot}).front();
-  std::vector<int> free = nuisances_;
-  std::erase_if(free, [&](int constant) { return is_on_bound(constant, at); });
-  const std::vector<int> constants = columns_of(free);
+  const std::vector<int> constants = columns_of(nuisances_);
   const auto n = static_cast<Eigen::Index>(constants.size());
   MatrixXd gram = MatrixXd::Zero(n, n);
   VectorXd along = VectorXd::Zero(n);
@@ -662,8 +605,13 @@ void Engine::move(const std::vector<int>& parameters, const VectorXd& step, doub
     } else if (parameters[j] < kNuisanceCount) {
       double& value = state.nuisance[parameters[j]];
       value += by;
-      const NuisanceRow& row = campaign_.nuisances[static_cast<std::size_t>(parameters[j])];
-      value = std::clamp(value, row.least, row.most);
+      // The data hold it far better than the usual values do: without a bound any drag would be the
+      // machine's own, and what it explains would be no gain.
+      if (parameters[j] == kLossPerkN_Nm) {
+        const NuisanceRow& row = campaign_.nuisances[kLossPerkN_Nm];
+        value = std::clamp(value, row.nominal - kReach * row.tolerance,
+                           row.nominal + kReach * row.tolerance);
+      }
     } else {
       const int slot = parameters[j] - kNuisanceCount;
       const EffectRow& row = *campaign_.slots[static_cast<std::size_t>(slot)].row;
@@ -672,19 +620,6 @@ void Engine::move(const std::vector<int>& parameters, const VectorXd& step, doub
                                        std::max(0.0, row.high - on));
     }
   }
-}
-
-Hypothesis Engine::refine_from_other_peaks() const {
-  constexpr std::array kOf{0.6, 0.8, 1.25, 1.6};  // chosen, of the present slip at the peak
-  Hypothesis best = refine(accepted_, kSettled);
-  for (const double factor : kOf) {
-    ModelState start = state_;
-    start.nuisance[kLnPeakSlipOverdrive] += std::log(factor);
-    start.nuisance[kLnPeakSlipLow] += std::log(factor);
-    Hypothesis other = refine_from(start, accepted_, kSettled);
-    if (is_better(other, best)) best = std::move(other);
-  }
-  return best;
 }
 
 Hypothesis Engine::refine(const std::vector<int>& slots, int iterations) const {

@@ -20,10 +20,6 @@ struct Hypothesis {
   std::vector<double> degrees;  // per slot: of freedom
 };
 
-// Of two fits of the same set. A fit that hangs far away books what it misses on experiments that
-// differ wildly: it is none, however likely.
-bool is_better(const Hypothesis& one, const Hypothesis& other);
-
 // Of Score::in_curve. More: in these experiments the effect is no other thing than a friction curve
 // that runs otherwise.
 inline constexpr double kInCurveMax = 0.998;
@@ -77,9 +73,6 @@ class Engine {
   // that may be the effect that is looked for, and with so much scatter nothing of it is seen.
   std::vector<Score> screen_with_usual_scatter() const;
   bool scatters_unusually() const;
-  // The accepted set once more from other slips at the peak: where the knots of the friction curve
-  // lie badly a fit hangs. The best of all.
-  Hypothesis refine_from_other_peaks() const;
   // Full non-linear fit of a set of slots (all of them, accepted or not).
   Hypothesis refine(const std::vector<int>& slots, int iterations = 5) const;
   Hypothesis refine_from(const ModelState& start, const std::vector<int>& slots,
@@ -110,14 +103,10 @@ class Engine {
   // The same of the whole set over none, per experiment.
   std::vector<double> left_out_gains() const;
 
-  // An effect that does what a constant of the machine does, or some together, by another name; of
-  // constants that are free to at the given state.
-  bool is_constant(int slot, const ModelState& at) const;
-  // How far the machine's constants are from the usual ones, squared tolerances.
-  double departure(const ModelState& state) const;
+  // An effect that does what a constant of the machine does, or some together, by another name.
+  bool is_constant(int slot) const;
 
   double scale(int parameter) const;
-  // For steps from a state: constants of the machine that rest on a bound there stay on it.
   Prior prior(const std::vector<int>& parameters, const ModelState& at) const;
   std::vector<int> with_nuisances(const std::vector<int>& slots) const;  // parameter numbers
   double degrees(double with_scatter, double without_scatter) const;
@@ -147,14 +136,6 @@ class Engine {
   // from: the fit without the slot; scatter_steps 0: by its scatter.
   std::vector<Score> screen(const Fit& from, int scatter_steps) const;
   std::vector<int> columns_of(const std::vector<int>& parameters) const;
-  bool is_on_bound(int constant, const ModelState& at) const;
-  // Of the usual machine, bounds left aside.
-  Prior usual(const std::vector<int>& parameters, const ModelState& at) const;
-  // The step that a fit takes; constants that it would lead beyond a bound end on it, and the
-  // others are chosen beside that.
-  Eigen::VectorXd bounded_step(const std::vector<Summary>& summaries,
-                               const std::vector<int>& parameters, Prior prior,
-                               const Scatter& scatter, const ModelState& from) const;
   // The matrices with the sizes of some accepted effects put back to zero.
   std::vector<Summary> summaries_without(const std::vector<int>& slots) const;
   double ln_mu_reached() const;

@@ -32,29 +32,6 @@ Named to_file(int index, double value) {
   }
 }
 
-// What the model file says of it, if anything.
-void set_nominal(const ModelFile& model, int index, NuisanceRow& row) {
-  const std::string name = to_file(index, row.nominal).name;
-  const auto& section = daemon::is_friction_key(name) ? model.friction : model.driveline;
-  const auto found = section.find(name);
-  if (found == section.end()) return;
-  switch (index) {
-    case kLnMuMax:
-      row.nominal = std::log(found->second);
-      break;
-    case kLnPeakSlipOverdrive:
-    case kLnPeakSlipLow:
-      row.nominal = std::log(0.01 * found->second);
-      break;
-    case kLnRatioOverdrive:
-    case kLnRatioLow:
-      row.nominal = std::log1p(found->second);
-      break;
-    default:
-      row.nominal = found->second;
-  }
-}
-
 }  // namespace
 
 ModelFile nominal_model(const estimator::VariatorParameters& variator) {
@@ -69,18 +46,29 @@ ModelFile nominal_model(const estimator::VariatorParameters& variator) {
 }
 
 NuisanceTable nuisances_of(const ModelFile& model) {
-  constexpr double kReach = 3.0;  // chosen, tolerances: no healthy machine is farther off
   NuisanceTable table = default_nuisances();
-  for (int i = 0; i < kNuisanceCount; ++i)
-    set_nominal(model, i, table[static_cast<std::size_t>(i)]);
-  // The data hold them far better than the usual values do: without a bound any drag would be the
-  // machine's own, and what it explains would be no gain.
-  for (const int drag : {kLossConstant_Nm, kLossPerSpeed_Nms, kLossPerkN_Nm}) {
-    NuisanceRow& row = table[static_cast<std::size_t>(drag)];
-    row.least = std::max(row.least, row.nominal - kReach * row.tolerance);
-    row.most = row.nominal + kReach * row.tolerance;
+  for (int i = 0; i < kNuisanceCount; ++i) {
+    auto& row = table[static_cast<std::size_t>(i)];
+    const std::string name = to_file(i, row.nominal).name;
+    const auto& section = daemon::is_friction_key(name) ? model.friction : model.driveline;
+    const auto found = section.find(name);
+    if (found == section.end()) continue;
+    switch (i) {
+      case kLnMuMax:
+        row.nominal = std::log(found->second);
+        break;
+      case kLnPeakSlipOverdrive:
+      case kLnPeakSlipLow:
+        row.nominal = std::log(0.01 * found->second);
+        break;
+      case kLnRatioOverdrive:
+      case kLnRatioLow:
+        row.nominal = std::log1p(found->second);
+        break;
+      default:
+        row.nominal = found->second;
+    }
   }
-  for (NuisanceRow& row : table) row.least = std::min(row.least, row.nominal);  // as it is believed
   return table;
 }
 

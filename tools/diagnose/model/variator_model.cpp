@@ -14,11 +14,6 @@ namespace beltgrip::diagnose {
 
 using Eigen::ArrayXd;
 
-namespace {
-// Chosen, two sigmas of what the zero of a torque scatters by: no drag drives by more.
-constexpr double kTorqueZero_Nm = 0.2;
-}  // namespace
-
 // Tolerances: what differs between two healthy machines of one type (ranges of the literature for
 // pushbelt variators), so that only what lies beyond is called wrong.
 NuisanceTable default_nuisances() {
@@ -53,14 +48,14 @@ NuisanceTable default_nuisances() {
       {"shape_12_low", 0.0, 1.0, 1e-3},
       {"shape_13_low", 0.0, 1.0, 1e-3},
       {"deformation_per_kN", 1.0e-3, 0.7e-3, 1e-5},
-      {"loss_constant_Nm", 0.5, 0.6, 1e-2, -kTorqueZero_Nm},
-      {"loss_per_rad_s_Nm", 5e-3, 4e-3, 1e-4, 0.0},
-      {"loss_per_kN_Nm", 0.05, 0.04, 1e-3, 0.0},
+      {"loss_constant_Nm", 0.5, 0.6, 1e-2},
+      {"loss_per_rad_s_Nm", 5e-3, 4e-3, 1e-4},
+      {"loss_per_kN_Nm", 0.05, 0.04, 1e-3},
       {"ln_ratio_overdrive", 0.0, 6e-4, 1e-5},
       {"ln_ratio_low", 0.0, 6e-4, 1e-5},
       {"secondary_inertia_kg_m2", 0.1, 0.3, 1e-3},
-      {"secondary_loss_constant_Nm", 0.5, 0.6, 1e-2, -kTorqueZero_Nm},
-      {"secondary_loss_per_rad_s_Nm", 2e-3, 4e-3, 1e-4, 0.0},
+      {"secondary_loss_constant_Nm", 0.5, 0.6, 1e-2},
+      {"secondary_loss_per_rad_s_Nm", 2e-3, 4e-3, 1e-4},
       {"command_offset_Pa", 0.0, 1e5, 10.0},
       {"command_gain", 0.0, 0.1, 1e-4},
   }};

@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -57,10 +56,8 @@ enum Nuisance : int {
 struct NuisanceRow {
   std::string_view name;
   double nominal;
-  double tolerance;                                         // one sigma
-  double step;                                              // for derivatives
-  double least = -std::numeric_limits<double>::infinity();  // that a machine can have
-  double most = std::numeric_limits<double>::infinity();
+  double tolerance;  // one sigma
+  double step;       // for derivatives
 };
 using NuisanceTable = std::array<NuisanceRow, kNuisanceCount>;
 NuisanceTable default_nuisances();
