@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cerrno>
 #include <charconv>
 #include <cstdint>
@@ -71,7 +72,7 @@ bool lock_mappings() {
   Mapping mapping;
   for (std::string line; std::getline(maps, line);) {
     if (!read_mapping(line, mapping) || !mapping.held) continue;
-    if (mlock(reinterpret_cast<const void*>(mapping.begin), mapping.end - mapping.begin) != 0) {
+    if (mlock(std::bit_cast<const void*>(mapping.begin), mapping.end - mapping.begin) != 0) {
       return false;
     }
   }

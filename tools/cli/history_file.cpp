@@ -24,7 +24,6 @@ using daemon::end_stop_name;
 using daemon::HistoryRow;
 using estimator::Direction;
 using estimator::EndStop;
-using estimator::PeakKind;
 using text::snake_case;
 
 constexpr std::array<const char*, estimator::kNoteCount> kNoteNames{

@@ -83,7 +83,6 @@ int run(std::vector<char*> words) {
   try {
     switch (app.parse(argc, argv)) {
       case command_line::Parsed::kGoOn:
-        break;
       case command_line::Parsed::kShown:
         break;
       case command_line::Parsed::kWrong: {
