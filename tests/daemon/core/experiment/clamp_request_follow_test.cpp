@@ -121,6 +121,14 @@ TEST_F(Followed, TheSlowestRateOfLate) {
   EXPECT_NEAR(request_.rate_least_N_per_s(), 100.0, 1e-6);
 }
 
+// Also where it was slow for a moment, a short while after the start.
+TEST_F(Followed, TheSlowestRateSinceTheStart) {
+  fall(100 * kMillisecond, 600.0);
+  fall(60 * kMillisecond, 200.0);
+  fall(60 * kMillisecond, 600.0);
+  EXPECT_NEAR(request_.rate_least_N_per_s(), 200.0, 1e-6);
+}
+
 // Since when has it changed by more than the band, 376 N? 600 N/s and a force every 20 ms.
 TEST_F(Followed, HasChangedByMoreThanTheBand) {
   const MonoTime begun = now_.t;

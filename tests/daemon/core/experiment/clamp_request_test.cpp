@@ -96,6 +96,35 @@ TEST_F(Request, FallsFastToItsRestWhateverTheSlipRate) {
   }
 }
 
+// Slip that grows by 0.8 % a second, a third of what is held, says so truly: slow it is for that
+// alone (583 N/s), not for where peaks lie (200 N/s).
+TEST_F(Request, NorDoesAPeakThatIsNearSlowTheFallToItsRest) {
+  now_.mu_star = 0.09;
+  for (int i = 0; i < 60; ++i) {
+    slip(4e-5 * i);
+    const double before = request_.force_N();
+    ASSERT_EQ(sample(), StopReason::kNone);
+    ASSERT_GT(before - request_.force_N(), 2.7) << i;
+  }
+}
+
+// The first request came near its peak; the second is far from it, beyond its rest as well.
+TEST_F(Request, TheSecondIsFarFromItsPeak) {
+  past_its_rest();
+  now_.mu_star = 0.1;
+  sample();
+  request_.end(now_.t);
+  now_.t += 100 * kSecond;
+  now_.mu_star = 0.05;
+  now_.clamp_force_N = 4000.0;
+  request_.begin(now_, plan(), kFloor, {});
+  past_its_rest();
+  now_.mu_star = 0.08;
+  const double before = request_.force_N();
+  sample();
+  EXPECT_NEAR(before - request_.force_N(), 3.0, 1e-6);
+}
+
 // 0.85 of the largest friction expected is near, once for all; below 0.8 of the least none lies.
 TEST_F(Request, IsSlowWhereAPeakMayLie) {
   past_its_rest();
