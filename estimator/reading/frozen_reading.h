@@ -47,9 +47,9 @@ class FrozenReading {
   static constexpr long kFewest = 20, kTimesLongest = 5;
   // Of neighbouring steps. Derived: more than one apart, less than two.
   static constexpr double kNeighbours = 1.5;
-  // Chosen: where a signal that moves has rested so often, it has left two steps; also one of 10 kPa
-  // a step on a ramp of 12 kPa/s. Measured on 125 traces of other make with a reading that stops:
-  // with 10 rests five wrong values under a pressure that stood still, with 30 or 60 two.
+  // Chosen: where a signal that moves has rested so often, it has left two steps; also one of 10
+  // kPa a step on a ramp of 12 kPa/s. Measured on 125 traces of other make with a reading that
+  // stops: with 10 rests five wrong values under a pressure that stood still, with 30 or 60 two.
   static constexpr std::size_t kRests = 30;
 
   // A value that came twice or more is one of the signal's steps; others may lie between two.
