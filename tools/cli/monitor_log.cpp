@@ -99,7 +99,10 @@ class Pace {
   }
 
  private:
-  void seek(double position_s) { player_.play_to(std::clamp(position_s, 0.0, end_s_)); }
+  void seek(double position_s) {
+    player_.play_to(std::clamp(position_s, 0.0, end_s_));
+    playing_.duration_over = position_s >= end_s_;
+  }
 
   monitor::LogPlayer& player_;
   monitor::Playing& playing_;

@@ -79,6 +79,7 @@ std::string mode_text(const View& view) {
   if (!view.playing) return "live";
   const Playing& play = *view.playing;
   std::string text = play.paused ? "paused" : format("%gx", play.speed);
+  if (play.duration_over) text = "end of --duration";
   if (play.ended) text = "end of the log";
   return text + format(", at %.1f s", play.position_s) +
          (view.computed_here ? ", replayed here" : "");

@@ -64,8 +64,10 @@ struct Distrust {
 
 struct Playing {
   double speed = 1.0;
-  bool paused = false, ended = false;
-  double position_s = 0.0;  // since the first frame
+  bool paused = false;
+  bool ended = false;          // the log has no further frame
+  bool duration_over = false;  // what --duration asked for was shown
+  double position_s = 0.0;     // since the first frame
 };
 
 struct View {
