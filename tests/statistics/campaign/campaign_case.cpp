@@ -184,7 +184,31 @@ std::string coasts_text(Drawer& draw, int coasts, double next_s) {
   return text;
 }
 
-std::string vehicle_text(Drawer& draw, const std::string& base, Surprise surprise, int coasts) {
+// Noise of slip of the classes, in percent at the speeds of a crossing: those of the panel
+// (tests/statistics/panel/drawing.cpp).
+constexpr std::array kClassNoise_percent{0.023, 0.058, 0.142};
+constexpr double kCrossingPrimary_rad_s = 105.0, kCrossingSecondary_rad_s = 236.0;
+
+std::string speed_noise_text(Drawer& draw, std::optional<NoiseBand> noise) {
+  double primary_rad_s = draw.between(0.02, 0.15), secondary_rad_s = draw.between(0.04, 0.3);
+  double primary_ripple = draw.between(0.0, 1e-3), secondary_ripple = draw.between(0.0, 1e-3);
+  if (noise) {
+    const double percent =
+        100.0 * slip_noise({primary_rad_s, primary_ripple}, {secondary_rad_s, secondary_ripple},
+                           kCrossingPrimary_rad_s, kCrossingSecondary_rad_s);
+    const double factor = kClassNoise_percent.at(static_cast<std::size_t>(*noise)) / percent;
+    for (double* each : {&primary_rad_s, &secondary_rad_s, &primary_ripple, &secondary_ripple}) {
+      *each *= factor;
+    }
+  }
+  return row("primary_speed_noise_rad_s", primary_rad_s) +
+         row("secondary_speed_noise_rad_s", secondary_rad_s) +
+         row("primary_speed_ripple", primary_ripple) +
+         row("secondary_speed_ripple", secondary_ripple);
+}
+
+std::string vehicle_text(Drawer& draw, const std::string& base, Surprise surprise, int coasts,
+                         std::optional<NoiseBand> noise) {
   const bool drive = base == "cruise-drive-torque";
   // Until a coast-down is over; under drive torque a request comes later and takes longer.
   std::string text = "[run]\n" +
@@ -213,10 +237,7 @@ std::string vehicle_text(Drawer& draw, const std::string& base, Surprise surpris
   text += row("pressure_floor_Pa", draw.between(5e3, 2e4));
   text += "\n[vehicle]\n" + row("grade_percent", draw.between(-2.0, 1.0));
   text += "\n[sensors]\n";
-  text += row("primary_speed_noise_rad_s", draw.between(0.02, 0.15));
-  text += row("secondary_speed_noise_rad_s", draw.between(0.04, 0.3));
-  text += row("primary_speed_ripple", draw.between(0.0, 1e-3));
-  text += row("secondary_speed_ripple", draw.between(0.0, 1e-3));
+  text += speed_noise_text(draw, noise);
   text += row("torque_bias_Nm", draw.between(-2.6, 2.6));
   text += row("torque_gain", draw.between(-0.035, 0.035));
   text += row("torque_delay_s", draw.between(0.01, 0.04));
@@ -288,14 +309,14 @@ void complete(CampaignCase& out) {
 
 }  // namespace
 
-CampaignCase draw_case(std::uint64_t seed) {
+CampaignCase draw_case(std::uint64_t seed, std::optional<NoiseBand> noise) {
   sim::Random campaign(seed, "campaign"), surprise(seed, "surprise");
   return draw_case(
-      seed, [&] { return campaign.uniform(); }, [&] { return surprise.uniform(); });
+      seed, [&] { return campaign.uniform(); }, [&] { return surprise.uniform(); }, noise);
 }
 
 CampaignCase draw_case(std::uint64_t seed, const Uniform& uniform,
-                       const Uniform& uniform_of_surprise) {
+                       const Uniform& uniform_of_surprise, std::optional<NoiseBand> noise) {
   Drawer draw(uniform);
   CampaignCase out;
   out.seed = seed;
@@ -309,7 +330,7 @@ CampaignCase draw_case(std::uint64_t seed, const Uniform& uniform,
   const int coasts = out.base == "coast-overdrive" && draw.chance(0.2)
                          ? 2 + static_cast<int>(draw.index(kMostCoasts - 1))
                          : 1;
-  out.toml = vehicle_text(draw, out.base, surprise, coasts);
+  out.toml = vehicle_text(draw, out.base, surprise, coasts, noise);
   const double how_many = draw.between(0.0, 1.0);
   const int faults = how_many < 0.2 ? 0 : how_many < 0.8 ? 1 : how_many < 0.95 ? 2 : 3;
   for (int i = 0; i < faults; ++i) out.toml += fault_text(draw, draw.one_of(fault_rows()));

@@ -5,9 +5,11 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "tests/statistics/campaign/reach.h"
 #include "tools/sim/vehicle_parameters.h"
 
 namespace beltgrip::test {
@@ -22,11 +24,14 @@ struct CampaignCase {
   bool guaranteed = true;
 };
 
-CampaignCase draw_case(std::uint64_t seed);
+// With a class of noise: the speeds' noise and ripple of the same case, made larger or smaller
+// alike until slip has the noise of that class. Without: as drawn, nearly always harsh.
+CampaignCase draw_case(std::uint64_t seed, std::optional<NoiseBand> noise = std::nullopt);
 // The same from any source of numbers in [0, 1); the seed is that of the vehicle's noise.
 using Uniform = std::function<double()>;
 CampaignCase draw_case(std::uint64_t seed, const Uniform& uniform,
-                       const Uniform& uniform_of_surprise);
+                       const Uniform& uniform_of_surprise,
+                       std::optional<NoiseBand> noise = std::nullopt);
 // A long drive: one car that coasts down every 34 s for so many hours, and in each coast-down, but
 // for the last tenth, a fault; none that leaves the controller or the daemon beyond help.
 CampaignCase draw_soak(double hours, std::uint64_t seed);

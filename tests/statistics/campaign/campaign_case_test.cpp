@@ -84,6 +84,24 @@ TEST(CampaignDrawing, SomeRunsCoastSeveralTimes) {
   EXPECT_GT(coasts[3], 50);
 }
 
+// Read off the scenario by the equation of the noise of a ratio of two speeds.
+TEST(CampaignDrawing, AClassOfNoiseIsThatOfItsName) {
+  constexpr std::array percent{0.023, 0.058, 0.142};
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    for (std::size_t i = 0; i < percent.size(); ++i) {
+      const CampaignCase each = draw_case(seed, static_cast<NoiseBand>(i));
+      const sim::SensorParameters& s = each.scenario.sensors;
+      const double primary = s.primary_speed.noise / 105.0,
+                   secondary = s.secondary_speed.noise / 236.0;
+      const double square =
+          primary * primary + secondary * secondary +
+          0.5 * (s.primary_ripple * s.primary_ripple + s.secondary_ripple * s.secondary_ripple);
+      EXPECT_NEAR(100.0 * std::sqrt(square), percent[i], 1e-9) << seed;
+      EXPECT_EQ(each.faults, draw_case(seed).faults) << seed << ": the same case but for that";
+    }
+  }
+}
+
 TEST(CampaignDrawing, AFallBeyondWhatIsReckonedWithIsShownAndNotPromised) {
   int promised = 0;
   for (const CampaignCase& each : drawn()) {

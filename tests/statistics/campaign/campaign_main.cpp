@@ -1,4 +1,5 @@
 // campaign --seeds N [--from S] [--out FILE] [--jobs N] [--worst FOLDER] [--nothing-wrong]
+//          [--noise lab|production|harsh]
 // campaign --case FILE... | --show SEED | --silence | --soak HOURS [--from SEED]
 //
 // The first runs seeded cases, one line of JSON each into FILE; a second call goes on where the
@@ -12,6 +13,7 @@
 #include <fstream>
 #include <iostream>
 #include <mutex>
+#include <optional>
 #include <sstream>
 #include <thread>
 
@@ -19,6 +21,7 @@
 #include "tests/loop/silence.h"
 #include "tests/statistics/campaign/campaign_run.h"
 #include "tests/statistics/campaign/campaign_summary.h"
+#include "tests/statistics/campaign/reach.h"
 #include "tools/sim/vehicle_scenario.h"
 
 namespace beltgrip::test {
@@ -37,6 +40,12 @@ struct Options {
   bool silence = false;
   double soak_h = 0.0;
   bool nothing_wrong = false;
+  std::string noise;  // empty: as drawn
+  std::optional<NoiseBand> band() const {
+    const auto at = std::find(kNoiseBandNames.begin(), kNoiseBandNames.end(), noise);
+    if (at == kNoiseBandNames.end()) return std::nullopt;
+    return static_cast<NoiseBand>(at - kNoiseBandNames.begin());
+  }
 };
 
 CampaignResults read_results(const std::string& path) {
@@ -133,7 +142,7 @@ void run_open(const Options& options, std::ostream& out, CampaignResults& result
     for (unsigned i = 0; i < options.jobs; ++i) {
       workers.emplace_back([&] {
         for (std::size_t k = next++; k < open.size(); k = next++) {
-          const CampaignCase given = draw_case(open[k]);
+          const CampaignCase given = draw_case(open[k], options.band());
           if (options.nothing_wrong && !given.faults.empty()) continue;
           const std::string line = to_json(run_case(given));
           const std::lock_guard lock(mutex);
@@ -153,7 +162,7 @@ void run_open(const Options& options, std::ostream& out, CampaignResults& result
 
 int run(const Options& options) {
   if (options.show != 0) {
-    std::printf("%s", file_text(draw_case(options.show)).c_str());
+    std::printf("%s", file_text(draw_case(options.show, options.band())).c_str());
     return 0;
   }
   if (!options.files.empty()) return run_files(options.files);
@@ -176,7 +185,7 @@ int run(const Options& options) {
   if (!options.worst.empty()) {
     for (const std::uint64_t seed : worst_seeds(results, 10)) {
       std::ofstream(options.worst + "/seed_" + std::to_string(seed) + ".toml")
-          << file_text(draw_case(seed));
+          << file_text(draw_case(seed, options.band()));
     }
   }
   return summarise(results) > 0 ? 1 : 0;
@@ -196,6 +205,8 @@ int main(int argc, char** argv) {
   app.add_option("--show", options.show, "Print the case of a seed as a file");
   app.add_option("--worst", options.worst, "Folder for the ten worst cases, as files");
   app.add_flag("--nothing-wrong", options.nothing_wrong, "Leave out cases with a fault");
+  app.add_option("--noise", options.noise, "Noise of slip of this class")
+      .one_of({beltgrip::test::kNoiseBandNames.begin(), beltgrip::test::kNoiseBandNames.end()});
   app.add_option("--soak", options.soak_h, "Hours of one drive, a fault in every coast-down");
   app.add_flag("--silence", options.silence, "Silence at every 5 ms of a ramp");
   switch (app.parse(argc, argv)) {

@@ -143,6 +143,13 @@ double crossing_energy_J(const ReachPoint& point) {
   return point.torque_Nm * point.omega_p_rad_s * point.peak_slip * lasts_s;
 }
 
+double slip_noise(const SpeedNoise& primary, const SpeedNoise& secondary, double omega_p_rad_s,
+                  double omega_s_rad_s) {
+  const double white =
+      std::hypot(primary.white_rad_s / omega_p_rad_s, secondary.white_rad_s / omega_s_rad_s);
+  return std::hypot(white, std::hypot(primary.ripple, secondary.ripple) / std::sqrt(2.0));
+}
+
 Wall wall_at(const ReachPoint& point) {
   if (point.floor_N >= reach_peak_force_N(point)) return Wall::kFloor;
   const double slip_most = kSlipSpeed_m_s / (point.omega_p_rad_s * point.primary_radius_m);
@@ -177,10 +184,9 @@ Reach reach_of(const sim::VehicleScenario& scenario, const RequestKeys& keys, st
   if (reach.wall == Wall::kNone && falls) reach.wall = Wall::kFall;
   const sim::SensorParameters& s = scenario.sensors;
   if (omega_p_rad_s > 0.0) {
-    const double white =
-        std::hypot(s.primary_speed.noise / omega_p_rad_s, s.secondary_speed.noise / omega_s_rad_s);
-    const double ripple = std::hypot(s.primary_ripple, s.secondary_ripple) / std::sqrt(2.0);
-    reach.slip_noise_percent = kPercent * std::hypot(white, ripple);
+    reach.slip_noise_percent = kPercent * slip_noise({s.primary_speed.noise, s.primary_ripple},
+                                                     {s.secondary_speed.noise, s.secondary_ripple},
+                                                     omega_p_rad_s, omega_s_rad_s);
   }
   reach.noise = reach.slip_noise_percent < kLabMost_percent          ? NoiseBand::kLab
                 : reach.slip_noise_percent < kProductionMost_percent ? NoiseBand::kProduction

@@ -56,6 +56,14 @@ Wall wall_at(const ReachPoint& point);
 enum class NoiseBand : std::uint8_t { kLab, kProduction, kHarsh };
 inline constexpr std::array<std::string_view, 3> kNoiseBandNames{"lab", "production", "harsh"};
 
+// White noise in rad/s and ripple as a share, of one speed.
+struct SpeedNoise {
+  double white_rad_s = 0.0, ripple = 0.0;
+};
+// Of slip, read from one sample of both.
+double slip_noise(const SpeedNoise& primary, const SpeedNoise& secondary, double omega_p_rad_s,
+                  double omega_s_rad_s);
+
 struct Reach {
   Wall wall = Wall::kNoPeak;        // of the instant that comes furthest
   double from_s = 0.0, to_s = 0.0;  // in reach: the longest time on end
