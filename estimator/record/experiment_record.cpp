@@ -20,7 +20,7 @@ constexpr double kRaisedDeviations = 5.0;
 
 ExperimentRecord::ExperimentRecord(double sample_rate_hz)
     : history_(sample_rate_hz, kFinestCell_s),
-      force_(sample_rate_hz, kTrendCells),
+      force_(sample_rate_hz, kTrendCells, Course::kBends),
       torque_(sample_rate_hz, kTrendCells),
       omega_p_(sample_rate_hz, kTrendCells),
       slip_speed_(sample_rate_hz, kTrendCells),

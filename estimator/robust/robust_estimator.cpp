@@ -374,8 +374,10 @@ class RobustEstimator final : public SlipCurveEstimator {
     const PeakFitResult& fit = fit_.result();
     peak_ = {};
     // Torque that fades is no friction that falls.
-    const bool slips_on = out_.stop == StopReason::kSlip || out_.stop == StopReason::kSlipRate ||
-                          (at_the_top_ && fit.passed);
+    // Ended at the top from outside: whether it was passed or not, what the curve may still rise
+    // by is in the interval.
+    const bool slips_on =
+        out_.stop == StopReason::kSlip || out_.stop == StopReason::kSlipRate || at_the_top_;
     const bool seen = out_.stop == StopReason::kSlope ||
                       (slips_on && first_mu_ < kRisenFrom * fit.mu) ||
                       (out_.stop != StopReason::kTorque && fit.inside >= kInsideWithoutStop &&

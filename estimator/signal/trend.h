@@ -9,11 +9,14 @@
 // allows.
 //
 // The noise is read off second differences of neighbouring means, which a straight line does not
-// reach, for means of 1, 2, 4, ... cells.
+// reach, for means of 1, 2, 4, ... cells. Of noise, longer means scatter less, or as much where it
+// is rounding; where they scatter more, the course bends: then no line is longer than three of the
+// means that do not show it yet, and they alone say what is noise.
 #pragma once
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace beltgrip::estimator {
@@ -32,9 +35,14 @@ struct Line {  // y = value + slope (t - t_s)
   }
 };
 
+// Straight but for corners and steps; or it bends, as a force that is lowered more slowly near the
+// top of friction.
+enum class Course : std::uint8_t { kStraight, kBends };
+
 class Trend {
  public:
-  Trend(double sample_rate_hz, std::size_t cells);  // cells: how many are kept
+  // cells: how many are kept.
+  Trend(double sample_rate_hz, std::size_t cells, Course course = Course::kStraight);
   void reset() noexcept;
   // One sample. Where slip moves, the value may follow it: such stretches teach nothing about
   // noise. True when a cell was completed.
@@ -89,11 +97,13 @@ class Trend {
   Line through(std::size_t begin, std::size_t end, double cell_variance) const noexcept;
   bool fits(const Line& line, std::size_t begin, std::size_t end,
             double cell_variance) const noexcept;
+  int first_bent_scale() const noexcept;  // kScales: none
   double mean_deviation(const Line& line, std::size_t begin, std::size_t end) const noexcept;
 
   std::vector<Sums> sums_;
   std::size_t cells_ = 0;  // so far
   double origin_t_ = 0.0, origin_y_ = 0.0;
+  Course course_;
   int per_cell_;
   double cell_s_;
   int filled_ = 0;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <random>
 
@@ -57,6 +58,42 @@ TEST(Trend, ACornerAndAStepAreInTheMeanAndNotInTheMedian) {
   const Densities both = densities(60.0, 30.0);
   EXPECT_GT(both.by_mean, 2.0 * straight.by_mean);
   EXPECT_LT(both.by_median, 1.3 * straight.by_median);
+}
+
+// A force that is lowered by 600 N/s, and more and more slowly from 2 s on: toward 100 N/s with a
+// time constant of 1 s. How far its line is off now, root mean square.
+double end_error_N(Course kind, double noise_N, double rounded_to_N, bool bent) {
+  double squares = 0.0;
+  int count = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    Trend trend(kRate_hz, 4096, kind);
+    double force_N = 6000.0;
+    for (int i = 0; i < 600; ++i) {
+      const double t_s = i / kRate_hz;
+      const double rate_N_s = bent ? 100.0 + 500.0 * std::exp(-std::max(0.0, t_s - 2.0)) : 400.0;
+      force_N -= rate_N_s / kRate_hz;
+      double read_N = force_N + noise_N * normal(random);
+      if (rounded_to_N > 0.0) read_N = rounded_to_N * std::round(read_N / rounded_to_N);
+      if (!trend.step(t_s, read_N, 0.0) || t_s < 3.0) continue;
+      const double error_N = trend.line().at(t_s) - force_N;
+      squares += error_N * error_N;
+      ++count;
+    }
+  }
+  return std::sqrt(squares / count);
+}
+
+TEST(Trend, ALineFollowsACourseThatBends) {
+  const double straight_N = end_error_N(Course::kStraight, 10.0, 0.0, true);
+  EXPECT_LT(end_error_N(Course::kBends, 10.0, 0.0, true), 0.5 * straight_N);
+}
+
+// Rounding does not grow from shorter means to longer ones: no bend is seen in it.
+TEST(Trend, ACoarseStraightCourseKeepsItsLongLine) {
+  const double straight_N = end_error_N(Course::kStraight, 10.0, 80.0, false);
+  EXPECT_LT(end_error_N(Course::kBends, 10.0, 80.0, false), 1.3 * straight_N);
 }
 
 }  // namespace
