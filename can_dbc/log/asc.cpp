@@ -7,6 +7,7 @@
 #include "can_dbc/log/format.h"
 #include "can_dbc/log/frame_bits.h"
 #include "can_dbc/log/text.h"
+#include "can_dbc/log/usual_columns.h"
 
 namespace beltgrip::can {
 
@@ -39,13 +40,7 @@ class AscParser : public LineParser {
 
     const auto stamp_ns = time_ns(take_word(line));
     if (!stamp_ns) return bad("unreadable time stamp");
-    // Relative stamps count from the event before, whatever it was.
-    std::int64_t sum_ns = 0;
-    if (__builtin_add_overflow(relative_ ? last_ns_ : 0, *stamp_ns, &sum_ns)) {
-      return bad("time stamp beyond the range");
-    }
-    last_ns_ = sum_ns;
-    record.t_ns = sum_ns;
+    if (!take_stamp(*stamp_ns, record)) return bad("time stamp beyond the range");
     record.frame = CanFrame{};
     const std::string_view first = take_word(line);
     if (first == "CANFD") {
@@ -59,7 +54,22 @@ class AscParser : public LineParser {
     return LineKind::kNothing;
   }
 
+  const char* quick_frame(std::string_view text, LogRecord& record) override {
+    if (base_ != 16 || text.size() < kUsualColumnsMost) return nullptr;
+    const char* const end = read_usual_asc(text, record);
+    return end != nullptr && take_stamp(record.t_ns, record) ? end : nullptr;
+  }
+
  private:
+  // Relative stamps count from the event before, whatever it was. False: beyond the range.
+  bool take_stamp(std::int64_t stamp_ns, LogRecord& record) {
+    std::int64_t sum_ns = 0;
+    if (__builtin_add_overflow(relative_ ? last_ns_ : 0, stamp_ns, &sum_ns)) return false;
+    last_ns_ = sum_ns;
+    record.t_ns = sum_ns;
+    return true;
+  }
+
   LineKind header(std::string_view line) {
     if (starts_with_word(line, "base")) {
       std::string_view rest = line;

@@ -6,6 +6,7 @@
 #include "can_dbc/log/format.h"
 #include "can_dbc/log/frame_bits.h"
 #include "can_dbc/log/text.h"
+#include "can_dbc/log/usual_columns.h"
 
 namespace beltgrip::can {
 
@@ -122,6 +123,12 @@ class TrcParser : public LineParser {
       frame.data[i] = static_cast<std::uint8_t>(*byte);
     }
     return LineKind::kFrame;
+  }
+
+  const char* quick_frame(std::string_view text, LogRecord& record) override {
+    if (text.size() < kUsualColumnsMost) return nullptr;
+    record.interface = kDefaultInterface;
+    return read_usual_trc(text, columns_, record);
   }
 
  private:

@@ -10,7 +10,9 @@
 #include <iterator>
 #include <random>
 
+#include "can_dbc/log/format.h"
 #include "can_dbc/log/text.h"
+#include "tests/can_dbc/log/both_ways.h"
 
 namespace beltgrip::can {
 namespace {
@@ -651,6 +653,68 @@ TEST(LogText, BytesAreReadAlikeBothWays) {
       ASSERT_EQ(rewritten(once), rewritten(twice)) << line;
       ASSERT_EQ(once.stats.lines_bad, twice.stats.lines_bad) << line;
     }
+  }
+}
+
+// Lines as the formats' tools write them, read by the short way whole and changed by both alike.
+std::string changed_lines(const std::vector<std::string>& lines, std::mt19937& random) {
+  constexpr int kRounds = 20'000;
+  const std::string pool = std::string("0189afFxgRTdr.:,-; \t\r\x7F\xE9") + '\0';
+  std::string log;
+  for (int round = 0; round < kRounds; ++round) {
+    for (const std::string& line : lines) log += changed(line, pool, random) + '\n';
+  }
+  return log;
+}
+
+TEST(AscLog, UsualLinesAreReadAlikeBothWays) {
+  std::mt19937 random(7);
+  const std::vector<std::string> lines{
+      "   1.234567 1  123             Rx   d 8 64 00 0A ff 77 12 34 56  Length = 228000 ID = 291",
+      "  17.1 12 18EBFF00x Tx d 3 01 A0 0F", "0.000001234 1  7ff  Rx  d 0  Length = 0\r",
+      "12345678.123456 99999999 1FFFFFFFx Rx d 1 00",
+      "  1.5 1  0  Rx  d 8  01 02 03 04 05 06 07 08 09"};
+  for (const char* head : {"base hex  timestamps absolute", "base hex  timestamps relative",
+                           "base dec  timestamps absolute"}) {
+    const auto quick = make_asc_parser();
+    const auto plain = make_asc_parser();
+    LogRecord record;
+    for (const auto* parser : {&quick, &plain}) (*parser)->parse(head, record);
+    const test::BothWays read = test::read_both_ways(*quick, *plain, changed_lines(lines, random));
+    EXPECT_TRUE(read.alike) << head << '\n' << read.different;
+    const bool is_hexadecimal = std::string_view(head).starts_with("base hex");
+    EXPECT_EQ(read.quick_frames > 10'000, is_hexadecimal) << read.quick_frames;
+  }
+}
+
+TEST(TrcLog, UsualLinesAreReadAlikeBothWays) {
+  struct Version {
+    std::string head;
+    std::vector<std::string> lines;
+  };
+  const Version versions[] = {
+      {";$FILEVERSION=1.0",
+       {"     1)      1841  0001  8  00 11 22 33 44 55 66 77", "2) 1842 00000123 2 AA BB",
+        "  3)  1843  0123  0  RTR", "4) 1844 0123 8 01 02 03 04 05 06 07 08 09"}},
+      {";$FILEVERSION=1.1",
+       {"     1)      1059.9  Rx     0300  2  00 01", "     4)      1062.9  Tx     09F11201  0  "}},
+      {";$FILEVERSION=1.3", {"     1)      1059.900 2  Rx     0300 -  2  00 01 \r"}},
+      {";$COLUMNS=N,O,T,I,d,l,D", {"      1      1059.900 DT     0300 Rx 2  00 01"}},
+      {";$COLUMNS=N,O,T,B,I,d,R,L,D",
+       {"      2      1064.160 DT 1      0123 Rx -  8    64 00 0A FF 77 12 34 56 ",
+        "1234567 12345678.123456 DT 12345678 1FFFFFFF Tx - 7 00 11 22 33 44 55 66"}},
+      {";$COLUMNS=l,I,N,N,N,N,N,N,N,N,N,N",
+       {"8 0001 1 2 3 4 5 6 7 8 9 0 01 02 03 04 05 06 07 08"}}};
+  std::mt19937 random(8);
+  for (const Version& version : versions) {
+    const auto quick = make_trc_parser();
+    const auto plain = make_trc_parser();
+    LogRecord record;
+    for (const auto* parser : {&quick, &plain}) (*parser)->parse(version.head, record);
+    const test::BothWays read =
+        test::read_both_ways(*quick, *plain, changed_lines(version.lines, random));
+    EXPECT_TRUE(read.alike) << version.head << '\n' << read.different;
+    EXPECT_GT(read.quick_frames, 5'000U) << version.head;
   }
 }
 
