@@ -39,6 +39,26 @@ class Text : public std::string_view {
   friend std::string operator+(char left, Text right) { return std::string(1, left).append(right); }
 };
 
+// The same in one word instead of two, for text that is seldom there or that many have alike.
+class ShortText {
+ public:
+  constexpr ShortText() = default;
+  operator Text() const noexcept { return text_ == nullptr ? Text() : *text_; }
+  operator std::string() const { return Text(*this); }
+  std::size_t size() const noexcept { return text_ == nullptr ? 0 : text_->size(); }
+  bool empty() const noexcept { return size() == 0; }
+  friend bool operator==(ShortText left, std::string_view right) { return Text(left) == right; }
+  friend std::string operator+(std::string left, ShortText right) {
+    return std::move(left) + Text(right);
+  }
+  friend std::string operator+(char left, ShortText right) { return left + Text(right); }
+
+ private:
+  friend class Arena;
+  explicit ShortText(const Text* text) : text_(text) {}
+  const Text* text_ = nullptr;
+};
+
 // A list that an arena keeps: it is not changed, and a copy of it is the same list.
 template <typename T>
 class List {
@@ -56,6 +76,9 @@ class List {
   const T* end() const noexcept { return begin() + size(); }
   const T& operator[](std::size_t i) const noexcept { return begin()[i]; }
   const T& back() const noexcept { return end()[-1]; }
+  friend bool operator==(List a, List b) {
+    return a.block_ == b.block_ || a == std::span<const T>(b.begin(), b.end());
+  }
   friend bool operator==(List a, std::span<const T> b) {
     return std::equal(a.begin(), a.end(), b.begin(), b.end());
   }
@@ -122,6 +145,7 @@ class Arena {
   Table<Key, Value> table(const std::vector<std::pair<Key, Value>>& entries) {
     return Table<Key, Value>(list(entries));
   }
+  ShortText shorten(Text kept) { return kept.empty() ? ShortText() : ShortText(one(kept)); }
   template <typename T>
   const T* one(const T& value) {
     static_assert(std::is_trivially_destructible_v<T> && alignof(T) <= kAlignment);

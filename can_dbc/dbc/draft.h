@@ -17,15 +17,20 @@ namespace beltgrip::can::dbc {
 // Longer ones are refused: every further mention would be a copy.
 inline constexpr std::size_t kNameLengthMax = 1024;
 
-struct SignalSource {
-  std::size_t offset = 0;                       // of the name
-  std::optional<std::uint32_t> selector_value;  // of "m3": its place in Draft::selector_values
+// Of "m3": the signal's place in its message and the number, in the order of the signals.
+struct SelectorValue {
+  std::uint32_t signal = 0;
+  std::uint64_t value = 0;
 };
 
 struct MessageSource {
   std::size_t offset = 0;    // of the statement
   std::uint32_t raw_id = 0;  // as written, with the flag bits; other statements refer by it
-  std::vector<SignalSource> signals;
+  // Of each signal, how far behind `offset` its name stands; UINT32_MAX: further than that.
+  List<std::uint32_t> names;
+  List<SelectorValue> selector_values;
+
+  std::size_t name_offset(std::size_t signal) const { return offset + names[signal]; }
 };
 
 enum class Object : std::uint8_t { kNetwork, kNode, kMessage, kSignal, kVariable, kDefault };
@@ -79,7 +84,7 @@ struct Draft {
   Database database;
   std::string_view text;  // of the file; what is read of it stays there
   bool text_is_utf8 = true;
-  std::vector<std::uint64_t> selector_values;
+  Arena sources;                          // of what stands in `messages`
   std::vector<MessageSource> messages;    // beside database.messages
   std::vector<std::size_t> node_offsets;  // beside database.nodes
   std::deque<CommentRef> comments;

@@ -183,7 +183,7 @@ void OverlapCheck::run() {
       place.signal = i;
     });
     if (overlaps) {
-      problems_.warn(source_.signals[i].offset, "overlap",
+      problems_.warn(source_.name_offset(i), "overlap",
                      "signal \"" + clip(signal.name) + "\" shares bits with \"" +
                          clip(message_.signals[other].name) + "\"");
     }
@@ -208,7 +208,7 @@ void check_signal(const MessageDef& message, const SignalDef& signal, std::size_
     problems.warn(offset, "not-finite",
                   "factor or offset of signal \"" + clip(signal.name) + "\" is not finite");
   }
-  if (signal.minimum > signal.maximum) {
+  if (signal.usage->minimum > signal.usage->maximum) {
     problems.warn(offset, "range-reversed",
                   "the minimum of signal \"" + clip(signal.name) + "\" is above its maximum");
   }
@@ -231,7 +231,7 @@ void check_circles(const MessageDef& message, const MessageSource& source, Probl
       if (above == by_name.end()) break;
       at = above->second;
       if (visited[at] == i + 1) {
-        problems.warn(source.signals[at].offset, "mux-circle",
+        problems.warn(source.name_offset(at), "mux-circle",
                       "signal \"" + clip(message.signals[at].name) +
                           "\" is selected through itself; it is never decoded");
       }
@@ -287,7 +287,7 @@ void check_message(const MessageDef& message, const MessageSource& source, Probl
   std::vector<std::pair<std::size_t, std::size_t>> names;  // hash, signal
   names.reserve(message.signals.size());
   for (std::size_t i = 0; i < message.signals.size(); ++i) {
-    check_signal(message, message.signals[i], source.signals[i].offset, problems);
+    check_signal(message, message.signals[i], source.name_offset(i), problems);
     names.emplace_back(std::hash<std::string_view>()(message.signals[i].name), i);
   }
   std::sort(names.begin(), names.end());
@@ -298,7 +298,7 @@ void check_message(const MessageDef& message, const MessageSource& source, Probl
       continue;
     }
     problems.warn(
-        source.signals[names[i].second].offset, "duplicate-signal",
+        source.name_offset(names[i].second), "duplicate-signal",
         "message \"" + clip(message.name) + "\" has a second signal \"" + clip(signal.name) + "\"");
   }
   const bool multiplexed =
@@ -371,8 +371,8 @@ void check_nodes(Draft& draft) {
     used(message.transmitter, draft.messages[i].offset);
     for (const Text node : message.senders) used(node, draft.messages[i].offset);
     for (std::size_t k = 0; k < message.signals.size(); ++k) {
-      for (const Text node : message.signals[k].receivers) {
-        used(node, draft.messages[i].signals[k].offset);
+      for (const Text node : message.signals[k].usage->receivers) {
+        used(node, draft.messages[i].name_offset(k));
       }
     }
   }

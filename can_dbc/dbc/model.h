@@ -32,6 +32,15 @@ struct MuxRule {
 using ValueTable = Table<std::int64_t, Text>;
 using Attributes = Table<Text, Text>;  // enumerations as the text chosen
 
+// What signals that stand together mostly have alike: the range their values are meant to have, and
+// who receives them.
+struct SignalUsage {
+  double minimum = 0.0;
+  double maximum = 0.0;
+  List<Text> receivers;
+};
+inline constexpr SignalUsage kNoUsage;
+
 struct SignalDef {
   Text name;
   std::uint32_t start_bit = 0;  // as written in the DBC (big endian: the most significant bit)
@@ -41,15 +50,13 @@ struct SignalDef {
   bool is_multiplexer = false;  // marked so (M) in the file
   double scale = 1.0;           // physical = raw * scale + offset, each operation rounded
   double offset = 0.0;
-  double minimum = 0.0;
-  double maximum = 0.0;
-  Text unit;  // UTF-8, as written
-  Text comment;
-  List<Text> receivers;
+  ShortText unit;  // UTF-8, as written
+  ShortText comment;
+  const SignalUsage* usage = &kNoUsage;
   const MuxRule* multiplexed_by = nullptr;
   ValueTable values;
   Attributes attributes;
-  Text short_name;  // the name before a long one by attribute replaced it; else empty
+  ShortText short_name;  // the name before a long one by attribute replaced it; else empty
 };
 
 struct SignalGroup {
@@ -66,10 +73,10 @@ struct MessageDef {
   bool j1939 = false;  // matched by parameter group, not by the full identifier
   std::optional<double> cycle_ms;
   Text transmitter;
-  Text comment;
+  ShortText comment;
   std::vector<SignalDef> signals;
   Attributes attributes;
-  Text short_name;            // as in SignalDef
+  ShortText short_name;       // as in SignalDef
   std::vector<Text> senders;  // further transmitters (BO_TX_BU_)
   std::vector<SignalGroup> groups;
 
@@ -77,9 +84,9 @@ struct MessageDef {
 };
 
 struct NodeDef {
-  Text comment;
+  ShortText comment;
   Attributes attributes;
-  Text short_name;  // as in SignalDef
+  ShortText short_name;  // as in SignalDef
 };
 
 struct EnvironmentVariable {
@@ -93,7 +100,7 @@ struct EnvironmentVariable {
   Text access_type;  // DUMMY_NODE_VECTOR0 ...
   std::vector<Text> access_nodes;
   std::optional<std::uint64_t> data_bytes;  // ENVVAR_DATA_
-  Text comment;
+  ShortText comment;
   ValueTable values;
   Attributes attributes;
 };
@@ -129,7 +136,7 @@ struct Database {
   std::vector<MessageDef> messages;  // in file order
   std::map<Text, ValueTable> value_tables;
   Attributes attributes;  // of the network
-  Text comment;
+  ShortText comment;
   std::map<Text, NodeDef> node_details;  // by the name in `nodes`; only where there are any
   std::vector<EnvironmentVariable> environment_variables;
   std::vector<AttributeDef> attribute_definitions;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -64,9 +65,15 @@ class StatementReader {
 
   void check_order(std::string_view word);
   void unknown_statement();
-  void signal_tail(SignalDef& signal);
+  void signal_tail(SignalDef& signal, SignalUsage& usage);
+  ShortText unit_of(Text unit);
+  const SignalUsage* usage_of(const SignalUsage& usage);
   List<Text> receiver_list();
   void end_message();
+  void add_signal(const SignalDef& signal, std::size_t name_offset,
+                  std::optional<std::uint64_t> selector_value);
+  template <typename T>
+  void make_room(std::vector<T>& messages) const;
   bool value_list(ValueTable& table);
   bool read_labels();
   ValueTable table_of_labels();
@@ -91,10 +98,13 @@ class StatementReader {
   Scanner scan_;
   std::size_t start_ = 0;  // of the statement
   enum class Within : std::uint8_t { kNothing, kMessage, kRefusedMessage };
-  Within within_ = Within::kNothing;   // what SG_ lines belong to
-  std::vector<SignalSource> sources_;  // of the message that is read
+  Within within_ = Within::kNothing;  // what SG_ lines belong to
+  std::vector<std::uint32_t> names_;  // of the message that is read; see MessageSource
+  std::vector<SelectorValue> selector_values_;
   std::vector<SignalDef> signals_;
-  std::vector<Text> receivers_;  // of the signal that is read
+  std::array<ShortText, 64> units_;  // chosen: lately used ones, each where its characters say
+  std::array<const SignalUsage*, 64> usages_{};  // in the same way
+  std::vector<Text> receivers_;                  // of the signal that is read
   List<Text> last_receivers_;
   List<Text> usual_receivers_;  // of the last usual signal, and as it has them
   std::string_view last_receivers_text_;
@@ -555,7 +565,9 @@ bool StatementReader::message() {
   }
   within_ = Within::kMessage;
   end_message();
-  draft_.messages.push_back(std::move(source));
+  make_room(draft_.messages);
+  make_room(draft_.database.messages);
+  draft_.messages.push_back(source);
   draft_.database.messages.push_back(std::move(message));
   return true;
 }
@@ -569,15 +581,15 @@ bool StatementReader::signal() {
   if (usual_signal()) return true;
 
   SignalDef signal;
-  SignalSource source;
   scan_.skip_blank();
-  source.offset = scan_.position();
+  const std::size_t name_offset = scan_.position();
+  std::optional<std::uint64_t> selector;
   std::string_view name;
   if (!expect_name(name, "a signal name")) return false;
   scan_.skip_blank();
   if (scan_.peek() != ':') {
     // "name m3 :"; whatever else stands there belongs to the name.
-    std::size_t name_end = source.offset + name.size();
+    std::size_t name_end = name_offset + name.size();
     std::string_view indicator;
     std::size_t indicator_offset = 0;
     while (scan_.peek() != ':') {
@@ -585,7 +597,7 @@ bool StatementReader::signal() {
       indicator_offset = scan_.position();
       if (scan_.keyword_at(indicator_offset)) return fail("\":\" after the signal name");
       indicator = scan_.name();
-      if (indicator.empty() || name_end - source.offset > kNameLengthMax) {
+      if (indicator.empty() || name_end - name_offset > kNameLengthMax) {
         return fail("\":\" after the signal name");
       }
       scan_.skip_blank();
@@ -609,16 +621,15 @@ bool StatementReader::signal() {
         signal.is_multiplexer = both;
       } else if (whole && status == std::errc{}) {
         is_indicator = true;
-        source.selector_value = static_cast<std::uint32_t>(draft_.selector_values.size());
-        draft_.selector_values.push_back(selector_value);
+        selector = selector_value;
         signal.is_multiplexer = both;
       }
     }
     if (!is_indicator) name_end = indicator_offset + indicator.size();
-    name = scan_.slice(source.offset, name_end);
+    name = scan_.slice(name_offset, name_end);
   }
   scan_.accept(':');
-  check_name(name, source.offset);
+  check_name(name, name_offset);
   signal.name = draft_.utf8(name);
 
   std::uint64_t start = 0;
@@ -651,11 +662,36 @@ bool StatementReader::signal() {
   signal.scale = scale.value;
   signal.offset = offset.value;
   receivers_.clear();
-  signal_tail(signal);
-  signal.receivers = receiver_list();
-  sources_.push_back(source);
-  signals_.push_back(signal);
+  SignalUsage usage;
+  signal_tail(signal, usage);
+  usage.receivers = receiver_list();
+  signal.usage = usage_of(usage);
+  add_signal(signal, name_offset, selector);
   return true;
+}
+
+// A file has few of them, many times.
+ShortText StatementReader::unit_of(Text unit) {
+  if (unit.empty()) return {};
+  const auto character = [](char c) {
+    return static_cast<std::size_t>(static_cast<unsigned char>(c));
+  };
+  const std::size_t sum = unit.size() + 3 * character(unit.front()) + 5 * character(unit.back());
+  ShortText& known = units_[sum % units_.size()];
+  if (!(known == unit)) known = draft_.arena().shorten(unit);
+  return known;
+}
+
+const SignalUsage* StatementReader::usage_of(const SignalUsage& usage) {
+  const auto bits = [](double value) { return std::bit_cast<std::uint64_t>(value); };
+  constexpr std::uint64_t kSpread = 0x9E37'79B9'7F4A'7C15U;  // 2^64 by the golden ratio
+  const std::uint64_t mixed = (bits(usage.minimum) * 3 + bits(usage.maximum)) * kSpread;
+  const SignalUsage*& known = usages_[mixed >> 58U];
+  const bool is_known = known != nullptr && bits(known->minimum) == bits(usage.minimum) &&
+                        bits(known->maximum) == bits(usage.maximum) &&
+                        known->receivers == usage.receivers;
+  if (!is_known) known = draft_.arena().one(usage);
+  return known;
 }
 
 // Signals that follow each other have the same receivers, most of them.
@@ -667,23 +703,43 @@ List<Text> StatementReader::receiver_list() {
 // The signals of the last message are complete: they get just the room that they need.
 void StatementReader::end_message() {
   if (signals_.empty()) return;
-  draft_.messages.back().signals.assign(sources_.begin(), sources_.end());
+  draft_.messages.back().names = draft_.sources.list(names_);
+  draft_.messages.back().selector_values = draft_.sources.list(selector_values_);
   draft_.database.messages.back().signals.assign(signals_.begin(), signals_.end());
-  sources_.clear();
+  names_.clear();
+  selector_values_.clear();
   signals_.clear();
+}
+
+// For as many as there will be if the rest of the file is like what has been read: a vector that
+// grows by doubling is there one and a half times while it does. Four times as many at most, since
+// a file may be of another opinion at its beginning.
+template <typename T>
+void StatementReader::make_room(std::vector<T>& messages) const {
+  constexpr std::size_t kFirst = 16;
+  constexpr std::size_t kMostTimes = 4;
+  const std::size_t count = messages.size();
+  if (count < messages.capacity()) return;
+  const double read = static_cast<double>(start_) / static_cast<double>(draft_.text.size());
+  const double expected = static_cast<double>(count) / std::max(read, 1.0 / kMostTimes);
+  messages.reserve(std::max(static_cast<std::size_t>(expected), count + count / 8) + kFirst);
+}
+
+void StatementReader::add_signal(const SignalDef& signal, std::size_t name_offset,
+                                 std::optional<std::uint64_t> selector_value) {
+  const std::size_t behind = name_offset - draft_.messages.back().offset;
+  if (selector_value) {
+    selector_values_.push_back({static_cast<std::uint32_t>(signals_.size()), *selector_value});
+  }
+  names_.push_back(static_cast<std::uint32_t>(std::min<std::size_t>(behind, UINT32_MAX)));
+  signals_.push_back(signal);
 }
 
 bool StatementReader::usual_signal() {
   UsualSignal usual;
   const char* const end = read_usual_signal(scan_.rest(), usual);
   if (end == nullptr) return false;
-  SignalSource& source = sources_.emplace_back();
-  source.offset = static_cast<std::size_t>(usual.name.data() - draft_.text.data());
-  if (usual.selector_value) {
-    source.selector_value = static_cast<std::uint32_t>(draft_.selector_values.size());
-    draft_.selector_values.push_back(*usual.selector_value);
-  }
-  SignalDef& signal = signals_.emplace_back();
+  SignalDef signal;
   signal.name = Text(usual.name);
   signal.start_bit = usual.start_bit;
   signal.length = usual.length;
@@ -692,9 +748,7 @@ bool StatementReader::usual_signal() {
   signal.is_multiplexer = usual.is_multiplexer;
   signal.scale = usual.scale;
   signal.offset = usual.offset;
-  signal.minimum = usual.minimum;
-  signal.maximum = usual.maximum;
-  signal.unit = draft_.utf8(usual.unit);
+  signal.unit = unit_of(draft_.utf8(usual.unit));
   if (last_receivers_text_.empty() || usual.receivers != last_receivers_text_) {
     receivers_.clear();
     last_receivers_text_ = usual.receivers;
@@ -704,13 +758,15 @@ bool StatementReader::usual_signal() {
     }
     usual_receivers_ = receiver_list();
   }
-  signal.receivers = usual_receivers_;
+  signal.usage = usage_of({usual.minimum, usual.maximum, usual_receivers_});
+  add_signal(signal, static_cast<std::size_t>(usual.name.data() - draft_.text.data()),
+             usual.selector_value);
   scan_.seek(static_cast<std::size_t>(end - draft_.text.data()));
   return true;
 }
 
 // Range, unit, receivers: the values can be read without them, so what is missing is a warning.
-void StatementReader::signal_tail(SignalDef& signal) {
+void StatementReader::signal_tail(SignalDef& signal, SignalUsage& usage) {
   const auto incomplete = [&](const char* what) {
     draft_.problems.warn(
         scan_.position(), "signal-incomplete",
@@ -730,15 +786,15 @@ void StatementReader::signal_tail(SignalDef& signal) {
   const auto maximum = scan_.number();
   if (!maximum) return incomplete("the maximum");
   if (!scan_.accept(']')) return incomplete("\"]\" after the maximum");
-  signal.minimum = minimum->value;
-  signal.maximum = maximum->value;
+  usage.minimum = minimum->value;
+  usage.maximum = maximum->value;
 
   const std::size_t behind_range = scan_.position();
   scan_.skip_blank();
   if (scan_.peek() != '"') scan_.seek(behind_range);
   const auto unit = scan_.string(StringContext::kUnit);
   if (!unit) return incomplete("the unit in quotes");
-  signal.unit = take_text(*unit);
+  signal.unit = unit_of(take_text(*unit));
   if (!unit->closed) return;
 
   bool comma = false;

@@ -2,6 +2,7 @@
 // find them, wherever they stand in the file; attributes take effect (long names, frame format,
 // cycle time); multiplexing becomes one rule per signal.
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <map>
@@ -28,6 +29,21 @@ constexpr std::uint32_t kIndependentId = 0xC000'0000U;
 
 using Indices = std::span<const std::uint32_t>;
 
+// What is looked for by name in one message.
+class FoundSignals {
+ public:
+  void add(std::uint32_t signal) { signals_[count_++] = signal; }
+  bool is_full() const { return count_ == signals_.size(); }
+  bool empty() const { return count_ == 0; }
+  std::uint32_t operator[](std::size_t i) const { return signals_[i]; }
+  const std::uint32_t* begin() const { return signals_.data(); }
+  const std::uint32_t* end() const { return signals_.data() + count_; }
+
+ private:
+  std::array<std::uint32_t, kDuplicatesMax> signals_{};
+  std::size_t count_ = 0;
+};
+
 class Resolver {
  public:
   explicit Resolver(Draft& draft) : draft_(draft), db_(draft.database) {}
@@ -36,7 +52,7 @@ class Resolver {
  private:
   void index_messages();
   Indices find_messages(std::uint32_t raw_id);
-  Indices find_signals(std::uint32_t message, std::string_view name);
+  FoundSignals find_signals(std::uint32_t message, std::string_view name);
   // Calls action(signal, its source) for each signal referred to; warns and keeps the statement if
   // there is none.
   template <typename Action>
@@ -77,8 +93,8 @@ class Resolver {
 
   Draft& draft_;
   Database& db_;
-  std::vector<std::uint32_t> by_id_;                 // messages by raw identifier, then file order
-  std::vector<std::vector<std::uint32_t>> by_name_;  // of each message: signals by name, on demand
+  std::vector<std::uint32_t> by_id_;  // messages by raw identifier, then file order
+  std::map<std::uint32_t, std::vector<std::uint32_t>> by_name_;  // of large messages: their signals
   std::map<std::string_view, std::size_t> variables_;
   std::set<std::string_view> nodes_;
   std::map<std::string_view, std::size_t> definitions_;
@@ -92,7 +108,6 @@ void Resolver::index_messages() {
   std::stable_sort(by_id_.begin(), by_id_.end(), [&](std::uint32_t a, std::uint32_t b) {
     return draft_.messages[a].raw_id < draft_.messages[b].raw_id;
   });
-  by_name_.resize(db_.messages.size());
   for (std::size_t i = 0; i < db_.environment_variables.size(); ++i) {
     variables_.emplace(db_.environment_variables[i].name, i);
   }
@@ -120,8 +135,17 @@ Indices Resolver::find_messages(std::uint32_t raw_id) {
   return last_messages_;
 }
 
-Indices Resolver::find_signals(std::uint32_t message, std::string_view name) {
+FoundSignals Resolver::find_signals(std::uint32_t message, std::string_view name) {
   const std::vector<SignalDef>& signals = db_.messages[message].signals;
+  FoundSignals found;
+  constexpr std::size_t kLookedThrough =
+      32;  // chosen: no dearer than an index, which would be kept
+  if (signals.size() <= kLookedThrough) {
+    for (std::uint32_t i = 0; i < signals.size() && !found.is_full(); ++i) {
+      if (signals[i].name == name) found.add(i);
+    }
+    return found;
+  }
   std::vector<std::uint32_t>& order = by_name_[message];
   if (order.size() != signals.size()) {
     order.resize(signals.size());
@@ -133,13 +157,11 @@ Indices Resolver::find_signals(std::uint32_t message, std::string_view name) {
   const auto less = [&](std::uint32_t signal, std::string_view wanted) {
     return signals[signal].name < wanted;
   };
-  const auto first = std::lower_bound(order.begin(), order.end(), name, less);
-  auto last = first;
-  while (last != order.end() && last - first < static_cast<std::ptrdiff_t>(kDuplicatesMax) &&
-         signals[*last].name == name) {
-    ++last;
+  for (auto at = std::lower_bound(order.begin(), order.end(), name, less);
+       at != order.end() && !found.is_full() && signals[*at].name == name; ++at) {
+    found.add(*at);
   }
-  return first == last ? Indices{} : Indices(&*first, static_cast<std::size_t>(last - first));
+  return found;
 }
 
 void Resolver::unresolved(const Reference& reference, const char* code, const std::string& what) {
@@ -188,9 +210,9 @@ EnvironmentVariable* Resolver::find_variable(std::string_view name) {
 }
 
 void Resolver::comments() {
-  Gathered<Text, const CommentRef*> said(draft_.comments.size());
+  Gathered<ShortText, const CommentRef*> said(draft_.comments.size());
   for (const CommentRef& reference : draft_.comments) {
-    const auto take = [&](Text& comment) { said.add(&comment, &reference); };
+    const auto take = [&](ShortText& comment) { said.add(&comment, &reference); };
     if (reference.object == Object::kNetwork) {
       take(db_.comment);
     } else if (reference.object == Object::kMessage) {
@@ -213,8 +235,8 @@ void Resolver::comments() {
                  "no environment variable is named \"" + clip(reference.name) + "\"");
     }
   }
-  said.give([&](Text& comment, const std::vector<const CommentRef*>& references) {
-    comment = joined(references, &comment == &db_.comment);
+  said.give([&](ShortText& comment, const std::vector<const CommentRef*>& references) {
+    comment = draft_.arena().shorten(joined(references, &comment == &db_.comment));
   });
 }
 
@@ -486,7 +508,7 @@ void Resolver::groups() {
 void Resolver::multiplex_message(std::uint32_t message,
                                  std::span<const MultiplexRef* const> rules) {
   MessageDef& definition = db_.messages[message];
-  MessageSource& source = draft_.messages[message];
+  const MessageSource& source = draft_.messages[message];
   std::vector<SignalDef>& signals = definition.signals;
 
   struct RuleRead {
@@ -495,8 +517,8 @@ void Resolver::multiplex_message(std::uint32_t message,
   };
   std::map<std::uint32_t, RuleRead> rules_of;  // by signal
   for (const MultiplexRef* rule : rules) {
-    const Indices targets = find_signals(message, draft_.utf8(rule->name));
-    const Indices selectors = find_signals(message, draft_.utf8(rule->selector));
+    const FoundSignals targets = find_signals(message, draft_.utf8(rule->name));
+    const FoundSignals selectors = find_signals(message, draft_.utf8(rule->selector));
     if (targets.empty() || selectors.empty()) {
       unresolved(*rule, "unknown-signal",
                  "message \"" + clip(definition.name) + "\" has no signal \"" +
@@ -533,24 +555,23 @@ void Resolver::multiplex_message(std::uint32_t message,
     ++multiplexers;
     only = i;
   }
-  for (std::size_t i = 0; i < signals.size(); ++i) {
-    const std::optional<std::uint32_t> selected_at = source.signals[i].selector_value;
-    if (!selected_at || signals[i].multiplexed_by != nullptr) continue;
+  for (const SelectorValue& selected : source.selector_values) {
+    const std::size_t i = selected.signal;
+    if (signals[i].multiplexed_by != nullptr) continue;
     if (multiplexers == 1 && only != i) {
-      const std::uint64_t value = draft_.selector_values[*selected_at];
-      const std::vector<ValueRange> range{{value, value}};
+      const std::vector<ValueRange> range{{selected.value, selected.value}};
       signals[i].multiplexed_by =
           draft_.arena().one(MuxRule{signals[only].name, draft_.arena().list(range)});
       continue;
     }
     if (multiplexers == 1) continue;  // "m0M" alone: the multiplexer of the others
-    draft_.problems.warn(
-        source.signals[i].offset, multiplexers == 0 ? "mux-missing" : "mux-ambiguous",
-        "signal \"" + clip(signals[i].name) + "\" is multiplexed, but its message " +
-            (multiplexers == 0 ? "has no multiplexer"
-                               : "has several multiplexers and no SG_MUL_VAL_ "
-                                 "says which selects it") +
-            "; it is read in every frame");
+    draft_.problems.warn(source.name_offset(i), multiplexers == 0 ? "mux-missing" : "mux-ambiguous",
+                         "signal \"" + clip(signals[i].name) +
+                             "\" is multiplexed, but its message " +
+                             (multiplexers == 0 ? "has no multiplexer"
+                                                : "has several multiplexers and no SG_MUL_VAL_ "
+                                                  "says which selects it") +
+                             "; it is read in every frame");
   }
 }
 
@@ -653,7 +674,7 @@ void Resolver::long_names() {
     std::map<Text, NodeDef> details;
     for (auto& [name, node] : db_.node_details) {
       const auto found = nodes.find(name);
-      if (found != nodes.end()) node.short_name = name;
+      if (found != nodes.end()) node.short_name = draft_.arena().shorten(name);
       details.insert_or_assign(found != nodes.end() ? found->second : name, node);
     }
     db_.node_details = std::move(details);
@@ -670,7 +691,9 @@ void Resolver::long_names() {
   std::vector<Text> receivers;
   for (MessageDef& message : db_.messages) {
     if (const Text* name = long_name(message.attributes, "SystemMessageLongSymbol")) {
-      if (*name != message.name) message.short_name = std::exchange(message.name, *name);
+      if (*name != message.name) {
+        message.short_name = draft_.arena().shorten(std::exchange(message.name, *name));
+      }
     }
     if (!nodes.empty()) {
       rename_node(message.transmitter);
@@ -679,14 +702,18 @@ void Resolver::long_names() {
     std::map<Text, Text> signals;  // short -> long
     for (SignalDef& signal : message.signals) {
       if (!nodes.empty()) {
-        receivers.assign(signal.receivers.begin(), signal.receivers.end());
+        SignalUsage usage = *signal.usage;
+        receivers.assign(usage.receivers.begin(), usage.receivers.end());
         for (Text& node : receivers) rename_node(node);
-        if (!(signal.receivers == receivers)) signal.receivers = draft_.arena().list(receivers);
+        if (!(usage.receivers == receivers)) {
+          usage.receivers = draft_.arena().list(receivers);
+          signal.usage = draft_.arena().one(usage);
+        }
       }
       const Text* name = long_name(signal.attributes, "SystemSignalLongSymbol");
       if (name == nullptr || *name == signal.name) continue;
-      signal.short_name = std::exchange(signal.name, *name);
-      signals.emplace(signal.short_name, signal.name);
+      signal.short_name = draft_.arena().shorten(signal.name);
+      signals.emplace(std::exchange(signal.name, *name), *name);
     }
     if (signals.empty()) continue;
     const auto rename_signal = [&](Text& name) {
@@ -717,7 +744,7 @@ void Resolver::unassigned() {
     }
     if (kept != i) {
       db_.messages[kept] = std::move(db_.messages[i]);
-      draft_.messages[kept] = std::move(draft_.messages[i]);
+      draft_.messages[kept] = draft_.messages[i];
     }
     ++kept;
   }

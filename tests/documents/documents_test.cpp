@@ -58,20 +58,23 @@ std::string frames() {
   const can::DbcParseResult parsed = can::parse_dbc(std::string(daemon::beltgrip_dbc_text()));
   std::ostringstream out;
   out << "# The frames of BeltGrip\n"
-      << parsed.database.comment << " The file is `can_dbc/beltgrip.dbc`; what a receiver of clamp "
+      << can::Text(parsed.database.comment)
+      << " The file is `can_dbc/beltgrip.dbc`; what a receiver of clamp "
       << "requests keeps to is `daemon/CLAMP_CONTRACT.md`.\n"
       << kGenerated;
   for (const can::MessageDef& message : parsed.database.messages) {
     out << "\n## " << message.name << ", 0x" << std::hex << std::uppercase << message.id.value
         << std::dec << "\n"
-        << message.comment << "\n\n| signal | bit, length | factor | range | unit | meaning |\n"
+        << can::Text(message.comment)
+        << "\n\n| signal | bit, length | factor | range | unit | meaning |\n"
         << "|---|---|---|---|---|---|\n";
     for (const can::SignalDef& each : message.signals) {
       const std::string values = values_of(each);
       out << "| " << each.name << " | " << each.start_bit << ", " << each.length << " | "
-          << number(each.scale) << " | " << number(each.minimum) << " to " << number(each.maximum)
-          << " | " << each.unit << " | " << cell(each.comment)
-          << (each.comment.empty() || values.empty() ? "" : " ") << cell(values) << " |\n";
+          << number(each.scale) << " | " << number(each.usage->minimum) << " to "
+          << number(each.usage->maximum) << " | " << can::Text(each.unit) << " | "
+          << cell(each.comment) << (each.comment.empty() || values.empty() ? "" : " ")
+          << cell(values) << " |\n";
     }
   }
   return out.str();

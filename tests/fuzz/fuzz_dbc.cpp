@@ -89,14 +89,16 @@ std::string written(const Database& db, Texts& texts) {
       const bool minus = is_float || signal.type == ValueType::kSigned;
       text += " : " + std::to_string(signal.start_bit) + '|' + std::to_string(signal.length) + '@' +
               (signal.byte_order == ByteOrder::kBig ? '0' : '1') + (minus ? '-' : '+') + " (" +
-              number(signal.scale) + ',' + number(signal.offset) + ") [" + number(signal.minimum) +
-              '|' + number(signal.maximum) + "] \"" + signal.unit + "\"";
-      for (const double value : {signal.scale, signal.offset, signal.minimum, signal.maximum}) {
+              number(signal.scale) + ',' + number(signal.offset) + ") [" +
+              number(signal.usage->minimum) + '|' + number(signal.usage->maximum) + "] \"" +
+              signal.unit + "\"";
+      for (const double value :
+           {signal.scale, signal.offset, signal.usage->minimum, signal.usage->maximum}) {
         if (!(value - value == 0.0)) texts.refuse();  // "inf" is no number of the format
       }
-      for (std::size_t i = 0; i < signal.receivers.size(); ++i) {
-        texts.name(signal.receivers[i]);
-        text += (i == 0 ? " " : ",") + signal.receivers[i];
+      for (std::size_t i = 0; i < signal.usage->receivers.size(); ++i) {
+        texts.name(signal.usage->receivers[i]);
+        text += (i == 0 ? " " : ",") + signal.usage->receivers[i];
       }
       text += '\n';
       const std::string object = id + ' ' + signal.name;

@@ -61,8 +61,8 @@ Detectable::Detectable(const daemon::Config& config) {
         out.id = message.id;
         out.length = static_cast<std::uint8_t>(message.length);
         out.codec = can::SignalCodec(signal);
-        out.minimum = signal.minimum;
-        out.maximum = signal.maximum;
+        out.minimum = signal.usage->minimum;
+        out.maximum = signal.usage->maximum;
         out.stale_s = std::max(kStale_s, kStalePeriods * period_s(config, message));
         out.flag = row.flag;
         out.below = row.below;

@@ -86,9 +86,9 @@ void print_signal(const can::SignalDef& signal) {
               type_text(signal.type).c_str(), number_text(signal.scale).c_str(),
               number_text(signal.offset).c_str());
   if (!signal.unit.empty()) std::printf(" %s", can::printable(signal.unit).c_str());
-  if (signal.minimum < signal.maximum) {
-    std::printf(", from %s to %s", number_text(signal.minimum).c_str(),
-                number_text(signal.maximum).c_str());
+  if (signal.usage->minimum < signal.usage->maximum) {
+    std::printf(", from %s to %s", number_text(signal.usage->minimum).c_str(),
+                number_text(signal.usage->maximum).c_str());
   }
   if (signal.is_multiplexer) std::printf(", multiplexer");
   if (signal.multiplexed_by)

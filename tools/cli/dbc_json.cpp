@@ -104,7 +104,7 @@ class DatabaseWriter {
     json_.field("signed", is_float || signal.type == can::ValueType::kSigned);
     json_.field("float", is_float);
     json_.field("scale", signal.scale).field("offset", signal.offset);
-    json_.field("min", signal.minimum).field("max", signal.maximum);
+    json_.field("min", signal.usage->minimum).field("max", signal.usage->maximum);
     json_.field("unit", signal.unit);
     json_.field("comment", signal.comment);
     json_.field("is_multiplexer", signal.is_multiplexer);
@@ -125,7 +125,7 @@ class DatabaseWriter {
     json_.key("attributes");
     write(signal.attributes);
     json_.key("receivers");
-    write(signal.receivers);
+    write(signal.usage->receivers);
     short_name(signal.short_name);
     json_.end_object();
   }

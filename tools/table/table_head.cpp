@@ -209,17 +209,17 @@ can::Database database_of(const Head& head) {
     message.length = 8;
     can::SignalDef& signal = message.signals.emplace_back();
     signal.name = message.name;
-    signal.unit = database.arena->keep(column.unit);
+    signal.unit = database.arena->shorten(database.arena->keep(column.unit));
     signal.length = 64;
     if (column.numbers == 0 && !column.texts.empty()) {
       signal.values = values_of(column.texts, *database.arena);
       signal.length = 16;
-      signal.maximum = static_cast<double>(std::max<std::int64_t>(1, signal.values.back().first));
+      const auto last = static_cast<double>(std::max<std::int64_t>(1, signal.values.back().first));
+      signal.usage = database.arena->one(can::SignalUsage{0.0, last, {}});
     } else if (column.decimals) {
       signal.type = can::ValueType::kSigned;
       for (int digit = 0; digit < *column.decimals; ++digit) signal.scale /= 10.0;
-      signal.minimum = -kRange;
-      signal.maximum = kRange;
+      signal.usage = database.arena->one(can::SignalUsage{-kRange, kRange, {}});
     } else {
       signal.type = can::ValueType::kFloat64;
     }

@@ -56,8 +56,8 @@ OwnFrames::Field OwnFrames::field(OwnMessage message, std::string_view signal) {
   assert(found != nullptr);
   const can::SignalDef* definition = found->find_signal(std::string(signal));
   assert(definition != nullptr);
-  Field result{can::SignalCodec(*definition), definition->scale, definition->minimum,
-               definition->maximum, 0};
+  Field result{can::SignalCodec(*definition), definition->scale, definition->usage->minimum,
+               definition->usage->maximum, 0};
   for (const auto& [raw, text] : definition->values) {
     if (text == "NotAvailable") result.not_available = static_cast<std::uint64_t>(raw);
   }

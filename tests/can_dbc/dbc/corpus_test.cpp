@@ -178,8 +178,8 @@ class FileCheck {
     EXPECT_EQ(kinds[static_cast<int>(signal_->type)], f[5]) << where;
     EXPECT_EQ(signal_->scale, number(f[6])) << where;
     EXPECT_EQ(signal_->offset, number(f[7])) << where;
-    EXPECT_EQ(signal_->minimum, f[8] == "-" ? 0.0 : number(f[8])) << where;
-    EXPECT_EQ(signal_->maximum, f[9] == "-" ? 0.0 : number(f[9])) << where;
+    EXPECT_EQ(signal_->usage->minimum, f[8] == "-" ? 0.0 : number(f[8])) << where;
+    EXPECT_EQ(signal_->usage->maximum, f[9] == "-" ? 0.0 : number(f[9])) << where;
     EXPECT_EQ(signal_->unit, f[10]) << where;
     // The reference names a selector by its short name.
     const std::string rule = multiplexing(*signal_);

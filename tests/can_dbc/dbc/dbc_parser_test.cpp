@@ -68,11 +68,11 @@ std::string told(const DbcParseResult& result) {
       all += s.name + ' ' + std::to_string(s.start_bit) + ' ' + std::to_string(s.length) + ' ' +
              std::to_string(static_cast<int>(s.byte_order)) +
              std::to_string(static_cast<int>(s.type));
-      for (const double value : {s.scale, s.offset, s.minimum, s.maximum}) {
+      for (const double value : {s.scale, s.offset, s.usage->minimum, s.usage->maximum}) {
         all += ' ' + std::to_string(std::bit_cast<std::uint64_t>(value));
       }
       all += " [" + std::string(s.unit) + "] " + (s.is_multiplexer ? "M" : "-");
-      for (const Text receiver : s.receivers) all += ' ' + std::string(receiver);
+      for (const Text receiver : s.usage->receivers) all += ' ' + std::string(receiver);
       if (s.multiplexed_by != nullptr) {
         all += " by " + s.multiplexed_by->selector;
         for (const auto& [low, high] : s.multiplexed_by->ranges) {
@@ -194,9 +194,9 @@ SG_MUL_VAL_ 291 Torque Mode 3-3, 5-10;
   EXPECT_EQ(speed.byte_order, ByteOrder::kBig);
   EXPECT_EQ(speed.scale, 0.25);
   EXPECT_EQ(speed.offset, -10.0);
-  EXPECT_EQ(speed.maximum, 16373.75);
+  EXPECT_EQ(speed.usage->maximum, 16373.75);
   EXPECT_EQ(speed.unit, "rpm");
-  EXPECT_EQ(speed.receivers, (std::vector<Text>{"Gateway", "Engine"}));
+  EXPECT_EQ(speed.usage->receivers, (std::vector<Text>{"Gateway", "Engine"}));
   EXPECT_EQ(speed.comment, "of a signal; with \"quotes\"");
   EXPECT_EQ(speed.attributes.at("Start"), "0.5");
   const SignalDef& mode = message.signals[1];
@@ -206,8 +206,8 @@ SG_MUL_VAL_ 291 Torque Mode 3-3, 5-10;
   const SignalDef& torque = message.signals[2];
   EXPECT_EQ(torque.scale, 0.5);
   EXPECT_EQ(torque.offset, 10.0);
-  EXPECT_EQ(torque.minimum, -1000.0);
-  EXPECT_EQ(torque.maximum, 1000.5);
+  EXPECT_EQ(torque.usage->minimum, -1000.0);
+  EXPECT_EQ(torque.usage->maximum, 1000.5);
   ASSERT_TRUE(torque.multiplexed_by);
   EXPECT_EQ(torque.multiplexed_by->selector, "Mode");
   EXPECT_EQ(torque.multiplexed_by->ranges,
@@ -579,9 +579,9 @@ TEST(DbcParser, NumbersOfEveryKind) {
   EXPECT_EQ(codes(result), "");
   EXPECT_EQ(signal(result, "s").scale, 0.0015);
   EXPECT_EQ(signal(result, "s").offset, -200.0);
-  EXPECT_EQ(signal(result, "s").maximum, 18446744073709551616.0);
+  EXPECT_EQ(signal(result, "s").usage->maximum, 18446744073709551616.0);
   EXPECT_EQ(signal(result, "t").scale, 0.5);
-  EXPECT_EQ(signal(result, "t").maximum, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(signal(result, "t").usage->maximum, std::numeric_limits<double>::infinity());
   EXPECT_EQ(signal(result, "u").start_bit, 16U);
   EXPECT_EQ(signal(result, "s").values.size(), 4U);
   EXPECT_EQ(signal(result, "s").values.at(-1), "max");
@@ -1045,7 +1045,7 @@ TEST(DbcParser, AStrayQuoteBehindNodesAndReceiversCostsNothing) {
       parse(kNodes + "BO_ 1 M: 8 A\n SG_ s : 0|8@1+ (1,0) [0|1] \"\" B\";\n");
   EXPECT_EQ(places(receivers), "3:33 signal-incomplete");
   EXPECT_EQ(signal(receivers, "s").unit, "");
-  EXPECT_EQ(signal(receivers, "s").receivers, std::vector<Text>{"B"});
+  EXPECT_EQ(signal(receivers, "s").usage->receivers, std::vector<Text>{"B"});
   // With receivers behind the last quote, the others are the unit's.
   const DbcParseResult inch =
       parse(kNodes + "BO_ 1 M: 8 A\n SG_ s : 0|8@1+ (1,0) [0|1] \"12\" pipe\" B\n");

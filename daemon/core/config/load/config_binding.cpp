@@ -247,9 +247,9 @@ std::optional<RoleBinding> RoleBinder::from_message(RoleBinding binding,
   binding.signal_name = signal.name;
   binding.codec = can::SignalCodec(signal);
   if (!read_multiplexers(message, signal, binding)) return {};
-  if (signal.minimum < signal.maximum) {
-    binding.minimum = signal.minimum;
-    binding.maximum = signal.maximum;
+  if (signal.usage->minimum < signal.usage->maximum) {
+    binding.minimum = signal.usage->minimum;
+    binding.maximum = signal.usage->maximum;
   }
   const std::optional<can::Unit> unit = unit_of(signal, dbc_path);
   if (!unit) return {};

@@ -6,6 +6,7 @@
 
 #include <bit>
 #include <cmath>
+#include <deque>
 #include <limits>
 
 #include "tests/daemon/test_vehicle.h"
@@ -25,8 +26,8 @@ Config one_signal(Role role, const can::SignalDef& signal, std::uint32_t length 
   binding.id = {0x100, false};
   binding.message_length = length;
   binding.codec = can::SignalCodec(signal);
-  binding.minimum = signal.minimum;
-  binding.maximum = signal.maximum;
+  binding.minimum = signal.usage->minimum;
+  binding.maximum = signal.usage->maximum;
   binding.period_ms = period_ms;
   config.roles.push_back(binding);
   return config;
@@ -39,8 +40,8 @@ can::SignalDef signal_def(std::uint32_t length, can::ValueType type, double scal
   signal.type = type;
   signal.scale = scale;
   signal.offset = offset;
-  signal.minimum = minimum;
-  signal.maximum = maximum;
+  static std::deque<can::SignalUsage> usages;  // as long as the signals
+  signal.usage = &usages.emplace_back(can::SignalUsage{minimum, maximum, {}});
   return signal;
 }
 
