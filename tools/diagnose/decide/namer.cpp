@@ -400,6 +400,11 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
       const auto or_better = [&](Hypothesis other) {
         if (other.log_likelihood > h.log_likelihood) h = std::move(other);
       };
+      for (const Score& score : scores) {
+        if (score.slot == candidate.back() && score.far) {
+          or_better(engine.refine_from(*score.far, candidate));
+        }
+      }
       if (h.log_likelihood < base.log_likelihood) or_better(engine.refine(candidate));
       if (afar) or_better(engine.refine_from_afar(candidate));
       return h;

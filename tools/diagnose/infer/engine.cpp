@@ -29,6 +29,7 @@ constexpr double kSameStep = 1e-3;     // apart by less of their length: both fa
 constexpr double kCurveFault = 0.1;    // one sigma of curve_faults()
 constexpr int kSettled = 20;           // steps, where all else stays
 constexpr double kReach = 3.0;         // chosen, tolerances: no healthy machine is farther off
+constexpr double kFarReach = 3.0;      // chosen, times: as far the equation is that of a far size
 constexpr double kSizePrior = 3.0;     // one sigma of an effect's size, in usual sizes
 
 bool stop_used(const Campaign& campaign, int stop) {
@@ -138,6 +139,11 @@ Engine::Engine(Campaign campaign, int jobs) : jobs_(jobs), campaign_(std::move(c
     if (is_secondary && !campaign_.has_balance) continue;
     if ((i == kCommandGain || i == kCommandOffset_Pa) && !campaign_.has_tracking) continue;
     nuisances_.push_back(i);
+  }
+  for (int slot = 0; slot < static_cast<int>(campaign_.slots.size()); ++slot) {
+    for (const double size : campaign_.slots[static_cast<std::size_t>(slot)].row->far_sizes) {
+      far_sizes_.push_back({slot, size});
+    }
   }
 }
 
@@ -397,17 +403,28 @@ void Engine::update_noise() {
   for (Index j = 0; j < scales.size(); ++j) {
     scales[j] = scale(summary_parameters_[static_cast<std::size_t>(j)]);
   }
-  // A tight prior on sizes: together, all effects could explain the noise itself.
+  // A tight prior on sizes: together, all effects could explain the noise itself. Those far from
+  // zero stand beside them: what a large lag or play leaves is no noise either.
   Prior all = prior(summary_parameters_, state_);
-  for (Index j = static_cast<Index>(nuisances_.size()); j < all.precision.size(); ++j) {
-    all.precision[j] = kSaturatedPrecision;
-    all.pull[j] = 0.0;
-  }
+  const Index constants = static_cast<Index>(nuisances_.size());
+  const Index sizes = all.precision.size() - constants + static_cast<Index>(far_sizes_.size());
+  all.precision.conservativeResize(constants + sizes);
+  all.pull.conservativeResize(constants + sizes);
+  all.precision.tail(sizes).setConstant(kSaturatedPrecision);
+  all.pull.tail(sizes).setZero();
   std::vector<RawColumns> raw(campaign_.runs.size());
   in_parallel(jobs_, raw.size(), [&](std::size_t e) {
     const auto run = static_cast<int>(e);
     Residuals at = residuals_of(campaign_, run, state_);
-    raw[e] = raw_columns(campaign_, run, state_, at, summary_parameters_, scales, true);
+    const ExtraColumns far = [&](int, const Residuals& here) {
+      std::vector<ResidualColumns> out;
+      for (const auto& [slot, size] : far_sizes_) {
+        out.push_back(secant(campaign_, run, state_, here, slot, size));
+        for (Eigen::ArrayXd& column : out.back()) column *= scale(kNuisanceCount + slot);
+      }
+      return out;
+    };
+    raw[e] = raw_columns(campaign_, run, state_, at, summary_parameters_, scales, true, far);
   });
   for (int pass = 0; pass < 2; ++pass) {
     whitening_ = fit_whitening(campaign_, raw, all, whitening_, jobs_);
@@ -475,23 +492,23 @@ std::vector<Score> Engine::screen(const Fit& from, int scatter_steps) const {
       slots.push_back(slot);
     }
   }
-  std::vector<Score> out(slots.size());
-  in_parallel(jobs_, slots.size(), [&](std::size_t i) {
-    const int slot = slots[i];
+  // By the column of its derivative, or of a size far from zero.
+  const auto score_of = [&](int slot, int column) {
     std::vector<int> parameters = base;
     parameters.push_back(kNuisanceCount + slot);
-    const std::vector<int> columns = columns_of(parameters);
+    std::vector<int> columns = base_columns;
+    columns.push_back(column);
     const Fit fit =
         fit_linear(summaries_, columns, prior(parameters, state_), from.scatter, scatter_steps);
     const Information info =
-        information_on(summaries_, base_columns, base_prior, columns.back(), fit.scatter);
-    Score& score = out[i];
+        information_on(summaries_, base_columns, base_prior, column, fit.scatter);
+    Score score;
     score.slot = slot;
     double energy = 0.0;
-    for (const Summary& each : summaries_) energy += each.aa(columns.back(), columns.back());
+    for (const Summary& each : summaries_) energy += each.aa(column, column);
     score.absorbed = energy > 0.0 ? 1.0 - info.without_scatter / energy : 1.0;
     const Information beside_curve =
-        information_on(summaries_, curve_columns, any_curve, columns.back(), fit.scatter);
+        information_on(summaries_, curve_columns, any_curve, column, fit.scatter);
     score.in_curve = energy > 0.0 ? 1.0 - beside_curve.without_scatter / energy : 1.0;
     const double unit = scale(kNuisanceCount + slot);
     const auto last = fit.step.size() - 1;
@@ -500,6 +517,23 @@ std::vector<Score> Engine::screen(const Fit& from, int scatter_steps) const {
     score.chi2 = chi2_of_student(fit.step[last] / std::sqrt(fit.covariance(last, last)),
                                  degrees(info.with_scatter, info.without_scatter));
     score.gain = 2.0 * (fit.log_likelihood - from.log_likelihood);
+    score.far = state_;
+    move(parameters, fit.step, 1.0, *score.far);
+    return score;
+  };
+  std::vector<Score> out(slots.size());
+  in_parallel(jobs_, slots.size(), [&](std::size_t i) {
+    const int slot = slots[i];
+    Score& best = out[i];
+    best = score_of(slot, columns_of({kNuisanceCount + slot}).front());
+    best.far.reset();
+    for (std::size_t j = 0; j < far_sizes_.size(); ++j) {
+      if (far_sizes_[j].slot != slot) continue;
+      Score there = score_of(slot, static_cast<int>(summary_parameters_.size() + j));
+      const double reached = there.value / far_sizes_[j].size;
+      const bool is_there = reached > 1.0 / kFarReach && reached < kFarReach;
+      if (is_there && there.gain > best.gain) best = std::move(there);
+    }
   });
   return out;
 }

@@ -3,6 +3,7 @@
 // their likelihoods compare.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "tools/diagnose/infer/infer.h"
@@ -32,6 +33,9 @@ struct Score {
   double sigma = 0.0;     // its one sigma
   double absorbed = 0.0;  // share of the column's energy that the machine's constants explain
   double in_curve = 0.0;  // that the friction curve alone could explain, however it runs
+  // Where the slot's equation does another thing far from zero and explains more there: the state
+  // that the linear fit leads to from that size.
+  std::optional<ModelState> far;
 };
 
 // The machine without effects, as near to the data as its constants alone lead it. A fit by the
@@ -135,6 +139,11 @@ class Engine {
   static constexpr int kScatterSteps = 8;
   // from: the fit without the slot; scatter_steps 0: by its scatter.
   std::vector<Score> screen(const Fit& from, int scatter_steps) const;
+  // A column of the matrices, behind those of the parameters, for a size far from zero.
+  struct FarSize {
+    int slot = 0;
+    double size = 0.0;
+  };
   std::vector<int> columns_of(const std::vector<int>& parameters) const;
   // The matrices with the sizes of some accepted effects put back to zero.
   std::vector<Summary> summaries_without(const std::vector<int>& slots) const;
@@ -151,6 +160,7 @@ class Engine {
   std::vector<int> nuisances_;
   Whitening whitening_;
   std::vector<int> summary_parameters_;
+  std::vector<FarSize> far_sizes_;  // their columns stand behind those of the parameters
   std::vector<Summary> summaries_;
   Fit base_;
 };

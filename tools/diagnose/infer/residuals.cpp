@@ -358,6 +358,25 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
   return propagate(campaign, at, change);
 }
 
+ResidualColumns secant(const Campaign& campaign, int run, const ModelState& state,
+                       const Residuals& at, int slot, double size) {
+  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+  const double step = size - state.effects[slot];
+  if (step == 0.0) return derivative(campaign, run, state, at, kNuisanceCount + slot);
+  ModelState moved = state;
+  moved.effects[slot] = size;
+  const Quantities there =
+      quantities(campaign, data, {at.clean_pressure_Pa, at.clean_reading_Nm}, run, moved);
+  const Quantities& here = at.there;
+  QuantityChange change;
+  change.slip = (there.slip - here.slip) / step;
+  change.torque = (there.belt_torque - here.belt_torque) / step;
+  change.ln_capacity = (there.capacity / here.capacity).log() / step;
+  if (there.balance.size() > 0) change.balance = (there.balance - here.balance) / step;
+  if (there.tracking.size() > 0) change.tracking = (there.tracking - here.tracking) / step;
+  return propagate(campaign, at, change);
+}
+
 namespace {
 // Of noise alone, with its sigma: a fourth difference. Of a motion that swings with 0.4 Hz a
 // hundredth is left, where a second difference over as long takes all of it for noise.

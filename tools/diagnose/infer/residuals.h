@@ -129,6 +129,10 @@ using ResidualColumns = std::array<Eigen::ArrayXd, kResidualKinds>;
 ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& state,
                            const Residuals& at, int parameter);
 
+// The change of the residual from the state's size of a slot to another one, per unit of it.
+ResidualColumns secant(const Campaign& campaign, int run, const ModelState& state,
+                       const Residuals& at, int slot, double size);
+
 // Effect of a change of slip, torque, ln(capacity), balance and tracking on the residuals.
 struct QuantityChange {
   Eigen::ArrayXd slip, torque, ln_capacity, balance, tracking;  // empty: none

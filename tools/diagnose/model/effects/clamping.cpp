@@ -2,6 +2,7 @@
 #include "tools/diagnose/model/effects/effect.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace beltgrip::diagnose {
@@ -85,12 +86,17 @@ void from_each_side(const Carried&, const AddSlot& add) {
   for (const std::string_view before : {"", "raised", "lowered"}) add(0, before);
 }
 
+constexpr std::array kFarLags_s{0.1, 0.3};
+constexpr std::array kFarPlays_N{60.0, 200.0};
+
 constexpr Equation kEquations[] = {
     {"centrifugal_force", "coefficient_N_s2", apply_centrifugal_force},
     {"spring_force", "force_N", apply_spring_force},
-    {"hydraulic_lag", "time_constant_s", apply_hydraulic_lag, of_each_input},
+    {"hydraulic_lag", "time_constant_s", apply_hydraulic_lag, of_each_input, false, nullptr,
+     nullptr, kFarLags_s},
     {"hydraulic_lag", "delay_s", apply_hydraulic_delay, of_each_input},
-    {"clamp_hysteresis", "force_N", apply_clamp_hysteresis, from_each_side},
+    {"clamp_hysteresis", "force_N", apply_clamp_hysteresis, from_each_side, false, nullptr, nullptr,
+     kFarPlays_N},
 };
 
 }  // namespace

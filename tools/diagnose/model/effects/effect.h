@@ -39,6 +39,9 @@ struct Equation {
   // Between what is fitted, relative to the nominal curve, and what files hold; none: the same.
   double (*to_contract)(double value, double peak_percent, double mu_max) = nullptr;
   double (*from_contract)(double value, double peak_percent, double mu_max) = nullptr;
+  // Sizes at which its equation does another thing than near zero: what is left of a step a while
+  // behind it, what is left of play that has been crossed. A fit sets out from there as well.
+  std::span<const double> far_sizes{};
 };
 std::span<const Equation> measurement_equations();  // what the bus says differs from what is there
 std::span<const Equation> clamping_equations();     // from the measured pressure to the force
