@@ -18,5 +18,14 @@ TEST(Scatter, ACauseDoesNotDriveTheExperimentsApart) {
   EXPECT_FALSE(parts_experiments(usual, usual));
 }
 
+TEST(Scatter, WhatHealthyExperimentsDifferByIsNotDrivenApart) {
+  Scatter alike = default_scatter();
+  alike.variance[3] /= 9.0;
+  EXPECT_FALSE(parts_experiments(alike, default_scatter()));
+  Scatter apart = default_scatter();
+  apart.variance[3] *= 9.0;
+  EXPECT_TRUE(parts_experiments(alike, apart));
+}
+
 }  // namespace
 }  // namespace beltgrip::diagnose
