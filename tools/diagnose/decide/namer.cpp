@@ -396,15 +396,14 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
     bool found = false;
     // From the linear estimate, and where that leaves the range of the linear, from the present.
     const auto fitted = [&](const std::vector<int>& candidate, bool afar) {
-      Hypothesis h = engine.refine_from(engine.add(candidate).state, candidate);
+      const auto score = std::find_if(scores.begin(), scores.end(), [&](const Score& each) {
+        return each.slot == candidate.back() && each.far;
+      });
+      Hypothesis h = engine.refine_from(
+          score != scores.end() ? *score->far : engine.add(candidate).state, candidate);
       const auto or_better = [&](Hypothesis other) {
         if (other.log_likelihood > h.log_likelihood) h = std::move(other);
       };
-      for (const Score& score : scores) {
-        if (score.slot == candidate.back() && score.far) {
-          or_better(engine.refine_from(*score.far, candidate));
-        }
-      }
       if (h.log_likelihood < base.log_likelihood) or_better(engine.refine(candidate));
       if (afar) or_better(engine.refine_from_afar(candidate));
       return h;

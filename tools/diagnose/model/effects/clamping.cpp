@@ -86,8 +86,8 @@ void from_each_side(const Carried&, const AddSlot& add) {
   for (const std::string_view before : {"", "raised", "lowered"}) add(0, before);
 }
 
-constexpr std::array kFarLags_s{0.1, 0.3};
-constexpr std::array kFarPlays_N{60.0, 200.0};
+constexpr std::array kFarLags_s{0.2};
+constexpr std::array kFarPlays_N{120.0};
 
 constexpr Equation kEquations[] = {
     {"centrifugal_force", "coefficient_N_s2", apply_centrifugal_force},
