@@ -57,8 +57,9 @@ struct Arguments {
   bool check = false;
 };
 
-MonoTime steady_ns() {
-  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+MonoTime steady_now() {
+  return MonoTime::of_ns(std::chrono::steady_clock::now().time_since_epoch() /
+                         std::chrono::nanoseconds(1));
 }
 
 void complain(const std::string& line) {
@@ -143,7 +144,7 @@ std::string runtime_folder() {
 
 // "wake-up p50 61 us, p99 140 us, worst 900 us (12000)"
 std::string latency_text(const std::string& name, const LatencyHistogram& histogram) {
-  const auto us = [](Duration duration) { return std::to_string(duration / 1000) + " us"; };
+  const auto us = [](Duration duration) { return std::to_string(duration / kMicrosecond) + " us"; };
   return name + " p50 " + us(histogram.quantile(0.5)) + ", p99 " + us(histogram.quantile(0.99)) +
          ", worst " + us(histogram.maximum()) + " (" + std::to_string(histogram.count()) + ")";
 }
@@ -190,7 +191,7 @@ class Requests {
   LogSink& log_;
   ServiceNotify& service_;
   bool manager_waits_ = false;
-  MonoTime patience_ends_ = 0;
+  MonoTime patience_ends_{};
 };
 
 // At level debug, once a second.
@@ -324,7 +325,7 @@ int run(const Arguments& arguments) {
   Reloader reloader(arguments.config, config, reload_slot, claim ? &*claim : nullptr, say);
   Requests requests(request_fd, reloader, log, service);
   bool observed = false;
-  MonoTime pulse_at = 0;
+  MonoTime pulse_at{};
   const auto figure = [&](const Event& event) {
     observed = slot.take() || observed;
     if (!observed) return std::string();
@@ -337,7 +338,7 @@ int run(const Arguments& arguments) {
     carried.turn(unix_time_s());
   };
   const auto on_turn = [&] {
-    const MonoTime now = steady_ns();
+    const MonoTime now = steady_now();
     take_carried();
     if (requests.turn(now)) {
       carried.change(reloader.running());
@@ -355,11 +356,11 @@ int run(const Arguments& arguments) {
     pulse_at = now + kSecond;
   };
   if (record_rings != nullptr) {
-    const auto wall_ns = static_cast<std::int64_t>(unix_time_s() * static_cast<double>(kSecond));
+    const auto wall_ns = static_cast<std::int64_t>(unix_time_s() * 1e9);
     std::vector<std::string> interfaces{config.interface};
     if (config.further_bus) interfaces.push_back(config.further_bus->interface);
     recorder = std::make_unique<FlightRecorder>(arguments.record, std::move(interfaces),
-                                                *record_rings, wall_ns - steady_ns());
+                                                *record_rings, wall_ns - steady_now().ns());
   }
   Housekeeper housekeeper(events, rings, history.get(), log, figure, stop_fd, on_stop, on_turn);
 

@@ -23,7 +23,7 @@ constexpr Duration kReopenFirst = 100 * kMillisecond;
 constexpr Duration kReopenMaximum = 5 * kSecond;
 
 std::int64_t nanoseconds(const timespec& time) noexcept {
-  return std::int64_t{time.tv_sec} * kSecond + time.tv_nsec;
+  return (std::int64_t{time.tv_sec} * kSecond).ns() + time.tv_nsec;
 }
 
 std::int64_t clock_ns(clockid_t clock) noexcept {
@@ -46,7 +46,7 @@ can_filter filter_of(const WantedFrames& wanted) noexcept {
 
 }  // namespace
 
-MonoTime monotonic_now() noexcept { return clock_ns(CLOCK_MONOTONIC); }
+MonoTime monotonic_now() noexcept { return MonoTime::of_ns(clock_ns(CLOCK_MONOTONIC)); }
 
 CanSocket::CanSocket(const std::string& interface, std::span<const WantedFrames> wanted,
                      std::uint8_t bus)
@@ -133,7 +133,7 @@ void CanSocket::lost(int error) noexcept {
   } else if (error == ENODEV || error == ENXIO || error == EBADF) {
     close_socket();
     state_ = BusState::kAbsent;
-    reopen_pause_ = 0;
+    reopen_pause_ = {};
     reopen_at_ = monotonic_now() + kReopenFirst;
   }
 }

@@ -27,7 +27,7 @@ namespace beltgrip::daemon {
 class CanSocket {
  public:
   static constexpr std::size_t kBatch = 64;
-  static constexpr MonoTime kNever = std::numeric_limits<MonoTime>::max();
+  static constexpr MonoTime kNever = MonoTime::max();
 
   // Of `wanted` it takes those of `bus`, which is what its frames are marked with.
   CanSocket(const std::string& interface, std::span<const WantedFrames> wanted, std::uint8_t bus);
@@ -64,8 +64,8 @@ class CanSocket {
   std::uint8_t bus_;
   int socket_ = -1;
   BusState state_ = BusState::kActive;
-  MonoTime reopen_at_ = 0;
-  Duration reopen_pause_ = 0;
+  MonoTime reopen_at_{};
+  Duration reopen_pause_{};
 
   // One batch.
   std::array<mmsghdr, kBatch> headers_{};

@@ -24,6 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kTurn_ms = 50;
+constexpr std::int64_t kSecond_ns = kSecond.ns();
 constexpr Duration kFlush = kSecond;
 constexpr Duration kRetry = 60 * kSecond;
 constexpr std::size_t kBeforeMost = 65536;  // items in memory: 6000 a second and more
@@ -43,21 +44,21 @@ std::string number_text(double value) {
 
 std::string stamp_text(std::int64_t t_ns) {
   std::array<char, 40> text;
-  const int length =
-      std::snprintf(text.data(), text.size(), "(%lld.%09lld)",
-                    static_cast<long long>(t_ns / kSecond), static_cast<long long>(t_ns % kSecond));
+  const int length = std::snprintf(text.data(), text.size(), "(%lld.%09lld)",
+                                   static_cast<long long>(t_ns / kSecond_ns),
+                                   static_cast<long long>(t_ns % kSecond_ns));
   return {text.data(), static_cast<std::size_t>(length)};
 }
 
 std::string file_name(const std::string& interface, std::int64_t wall_ns) {
-  const std::time_t seconds = wall_ns / kSecond;
+  const std::time_t seconds = wall_ns / kSecond_ns;
   std::tm date{};
   gmtime_r(&seconds, &date);
   std::array<char, 48> text;
   const int length =
       std::snprintf(text.data(), text.size(), "-%04d%02d%02dT%02d%02d%02d.%03dZ",
                     date.tm_year + 1900, date.tm_mon + 1, date.tm_mday, date.tm_hour, date.tm_min,
-                    date.tm_sec, static_cast<int>(wall_ns % kSecond / kMillisecond));
+                    date.tm_sec, static_cast<int>(wall_ns % kSecond_ns / kMillisecond.ns()));
   return "beltgrip-" + plain_name(interface) +
          std::string(text.data(), static_cast<std::size_t>(length)) + std::string(kEnding);
 }
@@ -122,7 +123,7 @@ class FlightRecorder::File {
   std::vector<char> packed_;
   std::uint64_t size_ = 0;
   std::string failed_;
-  MonoTime flush_at_ = 0;
+  MonoTime flush_at_{};
 };
 
 FlightRecorder::FlightRecorder(std::string folder, std::vector<std::string> interfaces,
@@ -236,7 +237,7 @@ void FlightRecorder::open_file(MonoTime t) {
   fs::create_directories(folder_, error);
   make_room();
   file_ = std::make_unique<File>(
-      (fs::path(folder_) / file_name(interfaces_[0], t + wall_offset_ns_)).string());
+      (fs::path(folder_) / file_name(interfaces_[0], t.ns() + wall_offset_ns_)).string());
   if (!file_->failed().empty()) {
     trouble(t, file_->path() + ": cannot be made (" + file_->failed() + ")");
     return;
@@ -268,7 +269,7 @@ void FlightRecorder::open(MonoTime t) {
 }
 
 void FlightRecorder::write_line(MonoTime t, const std::string& text) {
-  file_->write("# " + stamp_text(t + wall_offset_ns_) + ' ' + text + '\n');
+  file_->write("# " + stamp_text(t.ns() + wall_offset_ns_) + ' ' + text + '\n');
 }
 
 void FlightRecorder::write_learned(MonoTime t) {
@@ -300,7 +301,7 @@ void FlightRecorder::write(const RecordItem& item) {
         write_line(item.t, "lost " + std::to_string(item.frame.dropped_before));
       }
       std::string line =
-          stamp_text(item.t + wall_offset_ns_) + ' ' +
+          stamp_text(item.t.ns() + wall_offset_ns_) + ' ' +
           interfaces_[std::min<std::size_t>(item.frame.bus, interfaces_.size() - 1)] + ' ' +
           can::frame_text(item.frame.frame);
       line += item.frame.own_echo ? " T\n" : "\n";
@@ -311,7 +312,7 @@ void FlightRecorder::write(const RecordItem& item) {
       write_line(item.t, "after");
       break;
     case RecordKind::kLate:
-      write_line(item.t, "late " + std::to_string(item.now + wall_offset_ns_));
+      write_line(item.t, "late " + std::to_string(item.now.ns() + wall_offset_ns_));
       break;
     case RecordKind::kBus:
       write_line(item.t, "bus " + std::to_string(item.bus) + ' ' +
@@ -325,7 +326,7 @@ void FlightRecorder::write(const RecordItem& item) {
       write_learned(item.t);
       break;
     case RecordKind::kEnd:
-      write_line(item.t, "end " + std::to_string(item.now + wall_offset_ns_));
+      write_line(item.t, "end " + std::to_string(item.now.ns() + wall_offset_ns_));
       break;
     case RecordKind::kMark:
     case RecordKind::kReload:

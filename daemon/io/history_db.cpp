@@ -235,10 +235,10 @@ std::optional<HistoryRow> row_of(const Stored& stored) {
   row.result.direction = *direction;
   row.result.end_stop = *end_stop;
   row.result.samples = stored.samples;
-  row.result.start = 0;
+  row.result.start = {};
   row.result.end = std::isfinite(stored.duration_s) && std::abs(stored.duration_s) < 1e9
-                       ? std::llround(stored.duration_s * 1e9)
-                       : 0;
+                       ? MonoTime::of_ns(std::llround(stored.duration_s * 1e9))
+                       : MonoTime{};
   row.notes = static_cast<std::uint32_t>(stored.notes);
   return row;
 }

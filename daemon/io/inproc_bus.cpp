@@ -11,8 +11,7 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr std::size_t kRingSize = 4096;
 
 MonoTime steady_now() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(SteadyClock::now().time_since_epoch())
-      .count();
+  return MonoTime::of_ns(SteadyClock::now().time_since_epoch() / std::chrono::nanoseconds(1));
 }
 }  // namespace
 
@@ -23,7 +22,7 @@ struct InprocBus::Slot {
   std::uint32_t dropped = 0;
   bool waiting = false;
   bool granted = false;  // virtual time: may run
-  MonoTime deadline = 0;
+  MonoTime deadline{};
   std::condition_variable wake;
 
   void put(const can::CanFrame& frame, MonoTime t, bool own) noexcept {
@@ -70,8 +69,8 @@ class InprocBus::InprocPort final : public Port {
       if (deadline == kNever) {
         slot_.wake.wait(lock, ready);
       } else {
-        slot_.wake.wait_until(lock, SteadyClock::time_point(std::chrono::nanoseconds(deadline)),
-                              ready);
+        slot_.wake.wait_until(
+            lock, SteadyClock::time_point(std::chrono::nanoseconds(deadline.ns())), ready);
       }
       return outcome();
     }

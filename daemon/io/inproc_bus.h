@@ -21,7 +21,7 @@ namespace beltgrip::daemon {
 class InprocBus : public std::enable_shared_from_this<InprocBus> {
  public:
   enum class Clock { kMonotonic, kVirtual };
-  static constexpr MonoTime kNever = std::numeric_limits<MonoTime>::max();
+  static constexpr MonoTime kNever = MonoTime::max();
 
   static std::shared_ptr<InprocBus> create(Clock clock);
   // The bus of that name in this process, on the monotonic clock; made on the first call.
@@ -47,7 +47,7 @@ class InprocBus : public std::enable_shared_from_this<InprocBus> {
   std::mutex mutex_;
   std::vector<std::unique_ptr<Slot>> slots_;  // by order of connection; gaps stay empty
   Slot* running_ = nullptr;                   // virtual time: whose thread runs
-  MonoTime virtual_now_ = 0;
+  MonoTime virtual_now_{};
   bool closed_ = false;
 };
 

@@ -14,7 +14,6 @@ namespace {
 
 // Room for three missed turns before the service manager loses patience.
 constexpr int kFeedsPerPeriod = 4;
-constexpr Duration kMicrosecond = 1000;
 
 std::string four_digits(double value) {
   std::array<char, 32> text;
@@ -47,7 +46,7 @@ std::string status_line(const Observation& observation) {
 ServiceNotify::ServiceNotify() {
   std::uint64_t period_us = 0;
   if (sd_watchdog_enabled(0, &period_us) > 0) {
-    feed_period_ = static_cast<Duration>(period_us) * kMicrosecond / kFeedsPerPeriod;
+    feed_period_ = period_us * kMicrosecond / kFeedsPerPeriod;
   }
 }
 
@@ -61,7 +60,7 @@ void ServiceNotify::turn(MonoTime now, const Observation* newest) {
     message += "STATUS=" + status_ + "\n";
   }
   // Only a loop that has moved on since the last time is worth a feed.
-  if (feed_period_ != 0 && now >= feed_at_ && newest->pipeline.samples != samples_fed_) {
+  if (feed_period_ != Duration{} && now >= feed_at_ && newest->pipeline.samples != samples_fed_) {
     samples_fed_ = newest->pipeline.samples;
     feed_at_ = now + feed_period_;
     message += "WATCHDOG=1\n";
@@ -70,7 +69,8 @@ void ServiceNotify::turn(MonoTime now, const Observation* newest) {
 }
 
 void ServiceNotify::reloading(MonoTime now) {
-  const std::string message = "RELOADING=1\nMONOTONIC_USEC=" + std::to_string(now / kMicrosecond);
+  const std::string message =
+      "RELOADING=1\nMONOTONIC_USEC=" + std::to_string(now.since_origin() / kMicrosecond);
   sd_notify(0, message.c_str());
 }
 

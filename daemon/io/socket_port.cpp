@@ -50,8 +50,9 @@ Wake SocketPort::wait_until(MonoTime deadline) noexcept {
     }
     const bool waiting = std::any_of(waiting_.begin(), waiting_.end(),
                                      [](const Waiting& each) { return !each.empty(); });
-    const Duration left = waiting ? 0 : std::max<Duration>(until - t, 0);
-    const timespec timeout{static_cast<time_t>(left / kSecond), static_cast<long>(left % kSecond)};
+    const Duration left = waiting ? Duration{} : std::max(until - t, Duration{});
+    const timespec timeout{static_cast<time_t>(left / kSecond),
+                           static_cast<long>((left % kSecond).ns())};
     const int ready = ppoll(fds.data(), count_ + 1, &timeout, nullptr);
     if (ready > 0 && (fds[0].revents & POLLIN) != 0) return Wake::kClosed;
     for (std::size_t i = 1; i <= count_ && ready > 0; ++i) {

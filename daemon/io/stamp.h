@@ -17,8 +17,8 @@ class StampConverter {
 
   // Both clocks, read together, before the stamps of a batch.
   void read(MonoTime monotonic, std::int64_t wall) noexcept {
-    const std::int64_t offset = wall - monotonic;
-    const std::int64_t moved = offset - offset_;
+    const Duration offset = Duration::of_ns(wall) - monotonic.since_origin();
+    const Duration moved = offset - offset_;
     stepped_ = known_ && (moved > kSlewMaximum || moved < -kSlewMaximum);
     known_ = true;
     offset_ = offset;
@@ -28,18 +28,18 @@ class StampConverter {
   // Without a stamp the frame counts as received now. Never later than now, never before the one
   // before.
   MonoTime convert(bool has_stamp, std::int64_t stamp) noexcept {
-    const std::int64_t age = wall_ - stamp;
-    const bool usable = has_stamp && !stepped_ && age >= 0 && age <= kAgeMaximum;
+    const Duration age = Duration::of_ns(wall_ - stamp);
+    const bool usable = has_stamp && !stepped_ && age >= Duration{} && age <= kAgeMaximum;
     const MonoTime t = usable ? monotonic_ - age : monotonic_;
     newest_ = t > newest_ ? t : newest_;
     return newest_;
   }
 
  private:
-  MonoTime monotonic_ = 0;
+  MonoTime monotonic_{};
   std::int64_t wall_ = 0;
-  std::int64_t offset_ = 0;
-  MonoTime newest_ = 0;
+  Duration offset_{};
+  MonoTime newest_{};
   bool known_ = false;
   bool stepped_ = false;
 };

@@ -24,11 +24,10 @@ namespace {
 
 using Json = nlohmann::ordered_json;  // NaN and infinity become null
 
-constexpr double kMicrosecond = 1e3;
 constexpr int kWaitingMost = 8;
 
 Json latency(const LatencyHistogram& histogram) {
-  const auto us = [](Duration duration) { return static_cast<double>(duration) / kMicrosecond; };
+  const auto us = [](Duration duration) { return static_cast<double>(duration.ns()) / 1e3; };
   Json classes = Json::array();
   for (std::size_t i = 0; i < LatencyHistogram::kClasses; ++i) {
     if (histogram.count_of(i) == 0) continue;

@@ -11,7 +11,7 @@
 namespace beltgrip::test {
 
 struct SentFrame {
-  daemon::MonoTime t = 0;
+  daemon::MonoTime t{};
   can::CanFrame frame;
   std::uint8_t bus = 0;
   friend bool operator==(const SentFrame&, const SentFrame&) = default;
@@ -20,13 +20,13 @@ struct SentFrame {
 class FramePlayer final : public daemon::Port {
  public:
   explicit FramePlayer(std::vector<can::StampedFrame> frames) : frames_(std::move(frames)) {
-    if (!frames_.empty()) now_ = frames_.front().t_ns;
+    if (!frames_.empty()) now_ = daemon::MonoTime::of_ns(frames_.front().t_ns);
   }
 
   daemon::MonoTime now() noexcept override { return now_; }
   daemon::Wake wait_until(daemon::MonoTime deadline) noexcept override {
     if (next_ == frames_.size()) return daemon::Wake::kClosed;
-    if (frames_[next_].t_ns <= deadline) {
+    if (frames_[next_].t_ns <= deadline.ns()) {
       limit_ = deadline;
       return daemon::Wake::kFrames;
     }
@@ -35,9 +35,9 @@ class FramePlayer final : public daemon::Port {
   }
   std::size_t receive(std::span<daemon::RxFrame> out) noexcept override {
     std::size_t count = 0;
-    while (count < out.size() && next_ < frames_.size() && frames_[next_].t_ns <= limit_) {
+    while (count < out.size() && next_ < frames_.size() && frames_[next_].t_ns <= limit_.ns()) {
       out[count] = {};
-      out[count].t = frames_[next_].t_ns;
+      out[count].t = daemon::MonoTime::of_ns(frames_[next_].t_ns);
       out[count].frame = frames_[next_].frame;
       out[count].bus = frames_[next_].bus;
       now_ = std::max(now_, out[count].t);
@@ -62,8 +62,8 @@ class FramePlayer final : public daemon::Port {
  private:
   std::vector<can::StampedFrame> frames_;
   std::size_t next_ = 0;
-  daemon::MonoTime now_ = 0;
-  daemon::MonoTime limit_ = 0;
+  daemon::MonoTime now_{};
+  daemon::MonoTime limit_{};
 };
 
 class ReportKeeper final : public daemon::SampleSink {

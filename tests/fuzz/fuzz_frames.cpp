@@ -81,8 +81,8 @@ class Judge {
       require(std::isfinite(report.sample.omega_p_rad_s) && report.sample.omega_p_rad_s > 0.0);
       require(std::isfinite(report.sample.omega_s_rad_s) && std::isfinite(report.sample.torque_Nm));
       require(std::isfinite(report.sample.secondary_pressure_Pa));
-      require(report.sample.t_ns > last_sample_);
-      last_sample_ = report.sample.t_ns;
+      require(report.sample.t_ns > last_sample_.ns());
+      last_sample_ = MonoTime::of_ns(report.sample.t_ns);
     }
     if (report.curve.usable) {
       require(std::isfinite(report.curve.mu_star) && std::isfinite(report.curve.friction_slope));
@@ -118,7 +118,7 @@ class Judge {
 
   std::array<int, 4> counters_{-1, -1, -1, -1};
   bool stop_ = false;
-  MonoTime last_sample_ = std::numeric_limits<MonoTime>::min();
+  MonoTime last_sample_ = MonoTime::min();
 };
 
 // Takes bytes off the front; zeros at the end.
@@ -145,15 +145,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   constexpr std::array<std::uint32_t, 8> kIds{0x100, 0x101, 0x100, 0x101,
                                               0x6A0, 0x6A3, 0x7FF, 0x40};
   constexpr Duration kPeriod = 5 * kMillisecond;
-  constexpr MonoTime kEnd = 60 * kSecond;
+  constexpr MonoTime kEnd{60 * kSecond};
 
   Input input(data, size);
   Pipeline pipeline((input.byte() & 1U) != 0 ? always : by_signal);
   Judge judge;
-  MonoTime now = 0, next = 0;
+  MonoTime now{}, next{};
   while (!input.empty() && now < kEnd) {
     const std::uint8_t step = input.byte();
-    now += step == 255 ? 2 * kSecond : Duration{step} * kMillisecond / 4;
+    now += step == 255 ? 2 * kSecond : step * kMillisecond / 4;
     for (; next <= now; next += kPeriod) {
       Outbox outbox;
       judge.report(pipeline.on_sample(next, outbox));
@@ -169,7 +169,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       continue;
     }
     RxFrame frame;
-    frame.t = (what & 0x80U) != 0 ? now - Duration{input.byte()} * kSecond : now;
+    frame.t = (what & 0x80U) != 0 ? now - input.byte() * kSecond : now;
     frame.frame.id = {kIds[what & 7U], (what & 0x08U) != 0 && (what & 0x10U) != 0};
     frame.frame.error = (what & 7U) == 7;
     frame.frame.remote = (what & 0x60U) == 0x60;

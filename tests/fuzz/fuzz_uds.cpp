@@ -64,9 +64,10 @@ PollLimits make_limits() {
 
 // What one ECU has been sent.
 struct Seen {
-  MonoTime request = -kSecond;
-  MonoTime foreign = -10 * kSecond;
-  std::array<MonoTime, 3> last{-kSecond, -kSecond, -kSecond};  // by identifier
+  MonoTime request{-kSecond};
+  MonoTime foreign{-10 * kSecond};
+  std::array<MonoTime, 3> last{MonoTime{-kSecond}, MonoTime{-kSecond},
+                               MonoTime{-kSecond}};  // by identifier
   bool flow = false;
 };
 
@@ -74,7 +75,7 @@ struct Seen {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const Config config = make_config();
-  constexpr MonoTime kEnd = 200 * kSecond;
+  constexpr MonoTime kEnd{200 * kSecond};
   InputMonitor inputs(config);
   FaultSet faults;
   TxGate gate({}, Control::kObserve, {}, make_limits());
@@ -83,10 +84,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto byte = [&]() -> std::uint8_t {
     return size == 0 ? std::uint8_t{0} : (--size, *data++);
   };
-  MonoTime now = 0, next = 0;
+  MonoTime now{}, next{};
   while (size > 0 && now < kEnd) {
     const std::uint8_t step = byte();
-    now += step == 255 ? 3 * kSecond : Duration{step} * kMillisecond / 4;
+    now += step == 255 ? 3 * kSecond : step * kMillisecond / 4;
     for (; next <= now; next += kStep) {
       Outbox outbox;
       inputs.update(next, faults);

@@ -76,12 +76,12 @@ class Recorder final : public daemon::SampleSink {
       run_.results.push_back(report.result);
       learn(report);
     }
-    check_reaction(static_cast<double>(report.t) * 1e-9, report.request_force_N > 0.0);
+    check_reaction(static_cast<double>(report.t.ns()) * 1e-9, report.request_force_N > 0.0);
     if (report.state == daemon::State::kSettling) run_.inhibits |= report.inhibits;
     run_.faults |= report.faults;
     if (report.frozen && run_.frozen.empty()) {
       run_.frozen = std::string(daemon::role_name(*report.frozen)) + " at " +
-                    std::to_string(static_cast<double>(report.t) * 1e-9) + " s";
+                    std::to_string(static_cast<double>(report.t.ns()) * 1e-9) + " s";
     }
     run_.last_state = report.state;
   }
@@ -93,7 +93,7 @@ class Recorder final : public daemon::SampleSink {
     const daemon::ExperimentResult& result = report.result;
     if (result.outcome == daemon::Outcome::kAborted) return;
     estimator::BeltExperiment row;
-    row.time_s = kEpoch_s + static_cast<double>(report.t) * 1e-9;
+    row.time_s = kEpoch_s + static_cast<double>(report.t.ns()) * 1e-9;
     row.kind = result.peak.kind;
     row.mu_max = result.peak.mu_max;
     row.mu_max_std = result.peak.mu_max_std;

@@ -134,7 +134,7 @@ bool Detectable::admit(Message& message, double t_s, const can::CanFrame& frame)
 
 void Detectable::on_received(const daemon::RxFrame& received) {
   const can::CanFrame& frame = received.frame;
-  const double t_s = static_cast<double>(received.t) * 1e-9;
+  const double t_s = static_cast<double>(received.t.ns()) * 1e-9;
   if (frame.error) {
     if (frame.id.value == kBusOff) off_s_ = t_s;
     if (frame.id.value == kRestarted) off_s_ = kNever;

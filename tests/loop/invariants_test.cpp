@@ -36,7 +36,7 @@ class Player {
 
   explicit Player(const daemon::Config& given = config())
       : invariants_(given), frames_(given.identifiers) {
-    report_.t = 100 * daemon::kSecond;
+    report_.t = daemon::MonoTime{100 * daemon::kSecond};
     report_.sample.omega_p_rad_s = 140.0;
     report_.sample.omega_s_rad_s = 315.0;
     announce();
@@ -200,7 +200,8 @@ TEST(Invariants, ValidOnlyWithAValue) {
 TEST(Invariants, TenLinesASecondAreNeverExceeded) {
   Player player;
   player.play(400, 0.0, 0.0, [](Player::Sample& s) {
-    s.report.faults = s.report.t / kSample % 2 == 0 ? fault_bit(Fault::kInputRange) : 0U;
+    s.report.faults =
+        s.report.t.since_origin() / kSample % 2 == 0 ? fault_bit(Fault::kInputRange) : 0U;
   });
   EXPECT_FALSE(player.found("I9")) << player.all();
 }

@@ -25,7 +25,7 @@ std::vector<DriveStep> record_drive(const sim::VehicleScenario& scenario,
   std::vector<DriveStep> steps;
   sim::VehiclePort::Observers observers;
   observers.on_received = [&](const daemon::RxFrame& frame) {
-    steps.push_back({true, frame, 0, daemon::State::kInhibited});
+    steps.push_back({true, frame, {}, daemon::State::kInhibited});
   };
   sim::VehiclePort port(scenario, 1, observers);
   daemon::Pipeline pipeline(config);

@@ -14,7 +14,7 @@ namespace beltgrip::test {
 struct DriveStep {
   bool is_frame = false;
   daemon::RxFrame frame;
-  daemon::MonoTime t = 0;  // of a sample, and the state that it led to
+  daemon::MonoTime t{};  // of a sample, and the state that it led to
   daemon::State state{};
 };
 

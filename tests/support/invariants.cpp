@@ -47,7 +47,8 @@ std::string text(double value) { return std::to_string(value); }
 Invariants::Invariants(const daemon::Config& config) : config_(config) {}
 
 void Invariants::broken(const std::string& which, const std::string& how) {
-  problems_.try_emplace(which, how + " at " + text(static_cast<double>(before_.t) * 1e-9) + " s");
+  problems_.try_emplace(which,
+                        how + " at " + text(static_cast<double>(before_.t.ns()) * 1e-9) + " s");
 }
 
 void Invariants::on_sent(const can::CanFrame& frame) { frames_.push_back(frame); }
@@ -74,7 +75,7 @@ void Invariants::check_report(const daemon::SampleReport& now) {
   // The end is reported at the present instant, which may be that of the last sample.
   const bool end = now.t == before_.t && now.state == State::kInhibited;
   if (any_ && now.t <= before_.t && !end) broken("I8", "the time of a sample does not increase");
-  const auto period = std::llround(1e9 / config_.estimator.sample_rate_hz);
+  const daemon::Duration period = daemon::period_of(config_.estimator.sample_rate_hz);
   if (any_ && now.t > before_.t && now.t - before_.t != period && now.state != State::kInhibited &&
       (now.faults & fault_bit(Fault::kSampleLate)) == 0) {
     broken("I8", "a sample is missing without being counted");
@@ -105,15 +106,15 @@ void Invariants::check_request(const daemon::SampleReport& now) {
   }
   if (stands && now.macro_slip_stop) broken("I3", "a request with MacroSlipStop");
   if (stands && !stood) {
-    const double pause_s = static_cast<double>(now.t - request_ended_) * 1e-9;
+    const double pause_s = static_cast<double>((now.t - request_ended_).ns()) * 1e-9;
     if (pause_s < config_.experiment.cooldown_s) broken("I2", "no cool-down: " + text(pause_s));
     request_begun_ = now.t;
     asked_ = true;
   }
   if (stands && stood) {
     const double fall_N = before_.request_force_N - now.request_force_N;
-    const double fall_max_N =
-        config_.estimator.ramp_rate_max_N_per_s * static_cast<double>(now.t - before_.t) * 1e-9;
+    const double fall_max_N = config_.estimator.ramp_rate_max_N_per_s *
+                              static_cast<double>((now.t - before_.t).ns()) * 1e-9;
     if (fall_N < 0.0) broken("I2", "the request rises by " + text(-fall_N) + " N");
     if (fall_N > fall_max_N + 1e-6) broken("I2", "the request falls by " + text(fall_N) + " N");
     if (now.t - request_begun_ > 15 * daemon::kSecond + 5 * kMs) broken("I2", "longer than 15 s");

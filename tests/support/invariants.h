@@ -53,13 +53,13 @@ class Invariants final : public daemon::SampleSink {
   bool any_ = false;
   std::vector<can::CanFrame> frames_;
   std::map<std::uint32_t, unsigned> counters_;
-  daemon::MonoTime request_begun_ = 0;
-  daemon::MonoTime request_ended_ = 0;
+  daemon::MonoTime request_begun_{};
+  daemon::MonoTime request_ended_{};
   bool asked_ = false;
   bool unsent_ = false;      // since the last report
   int inactive_due_ = 0;     // frames still owed after a request
   int inactive_before_ = 0;  // frames in a row, each within 100 ms of the one before
-  daemon::MonoTime last_clamp_ = 0;
+  daemon::MonoTime last_clamp_{};
   daemon::EventRing ring_;
   daemon::EventSink events_{ring_};
   daemon::LineBudget budget_;

@@ -57,7 +57,7 @@ daemon::Duration BusView::slowest_stale() const {
     const double period_s = course.span_s / static_cast<double>(course.frames);
     slowest_s = std::max(slowest_s, kGapPeriods * period_s);
   }
-  return static_cast<daemon::Duration>(1e9 * slowest_s);
+  return daemon::Duration::of_s(slowest_s);
 }
 
 double BusView::value(Role role) const {
@@ -95,7 +95,7 @@ void BusView::take_window(const daemon::SampleReport& report) {
     slip_sum_ += report.curve.sigma_star_percent;
     ++mu_count_;
   }
-  const double length_s = static_cast<double>(report.t - *window_begin_) * 1e-9;
+  const double length_s = static_cast<double>((report.t - *window_begin_).ns()) * 1e-9;
   if (length_s < kWindow_s) return;
   Window window;
   bool any = false;
@@ -221,8 +221,8 @@ void BusView::end_opportunity() {
   held_ = false;
   if (!settled_) return;
   ++prospects_.opportunities;
-  now_.begin_s = static_cast<double>(held_since_ - begin_.value_or(held_since_)) * 1e-9;
-  now_.length_s = static_cast<double>(newest_ - held_since_) * 1e-9;
+  now_.begin_s = static_cast<double>((held_since_ - begin_.value_or(held_since_)).ns()) * 1e-9;
+  now_.length_s = static_cast<double>((newest_ - held_since_).ns()) * 1e-9;
   // Without the inertia the slip limits cannot be judged: reach alone counts.
   const bool by_reach_alone = config_.variator.primary_inertia_kg_m2 <= 0.0;
   if (by_reach_alone) now_.in_reach = now_.torque_Nm >= now_.needed_Nm;

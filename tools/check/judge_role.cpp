@@ -143,7 +143,7 @@ void Judge::not_seen() {
         !(id.extended == binding_.id.extended && (distance <= kSimilarIdDistance || digit))) {
       continue;
     }
-    const double span_s = static_cast<double>(heard.last - heard.first) * 1e-9;
+    const double span_s = static_cast<double>((heard.last - heard.first).ns()) * 1e-9;
     const double rate_Hz = span_s > 0.0 ? static_cast<double>(heard.frames - 1) / span_s : 0.0;
     similar.emplace_back(
         distance, id_text(id) + format(" (%u bytes, %.0f Hz)", unsigned{heard.length}, rate_Hz) +

@@ -84,8 +84,9 @@ bool play(daemon::Port& port, const std::string& name, double speed,
   while (next(stamped)) {
     if (stamped.frame.error) continue;  // said by a controller, not sent by a node
     if (!first_ns) first_ns = stamped.t_ns;
-    const auto after = static_cast<double>(stamped.t_ns - *first_ns) / speed;
-    if (!pass_time(port, origin + static_cast<daemon::Duration>(after))) return false;
+    const auto after_ns = static_cast<double>(stamped.t_ns - *first_ns) / speed;
+    if (!pass_time(port, origin + daemon::Duration::of_ns(static_cast<std::int64_t>(after_ns))))
+      return false;
     if (!send(port, name, stamped.frame)) return false;
   }
   return true;
@@ -96,8 +97,9 @@ bool play_node(daemon::Port& port, double speed, const NodeStep& advance) {
   const daemon::MonoTime origin = port.now();
   std::array<daemon::RxFrame, 64> frames;
   std::vector<can::CanFrame> out;
-  for (std::int64_t now_ns = 0;; now_ns += kStep) {
-    const auto due = origin + static_cast<daemon::Duration>(static_cast<double>(now_ns) / speed);
+  for (std::int64_t now_ns = 0;; now_ns += kStep.ns()) {
+    const auto due = origin + daemon::Duration::of_ns(
+                                  static_cast<std::int64_t>(static_cast<double>(now_ns) / speed));
     std::size_t count = 0;
     for (;;) {
       const daemon::Wake wake = port.wait_until(due);

@@ -214,7 +214,7 @@ void run(const Options& options) {
   std::string what;
   if (live) {
     const auto port = open_buses_whole(config, stop_descriptor());
-    look(*port, config, watch, static_cast<daemon::Duration>(options.live_s * 1e9), nullptr, seen);
+    look(*port, config, watch, daemon::Duration::of_s(options.live_s), nullptr, seen);
     char seconds[32];
     std::snprintf(seconds, sizeof seconds, "%.4g", options.live_s);
     what = config.interface + " for " + seconds + " s";

@@ -91,10 +91,11 @@ std::vector<diagnose::Rerun> rerun(const std::vector<std::string>& paths,
   for (std::size_t i = 0; i < paths.size(); ++i) {
     const Found& then = found[i][1];
     for (const daemon::ExperimentResult& each : found[i][0]) {
-      diagnose::Rerun row{paths[i], static_cast<double>(each.start) * 1e-9,
+      diagnose::Rerun row{paths[i], static_cast<double>(each.start.ns()) * 1e-9,
                           diagnose::measured(each, with_before.variator), std::nullopt};
       const auto same = std::find_if(then.begin(), then.end(), [&](const auto& other) {
-        return std::abs(static_cast<double>(other.start - each.start)) * 1e-9 < kSameExperiment_s;
+        return std::abs(static_cast<double>((other.start - each.start).ns())) * 1e-9 <
+               kSameExperiment_s;
       });
       if (same != then.end()) row.after = diagnose::measured(*same, with_after.variator);
       if (row.before || row.after) out.push_back(std::move(row));

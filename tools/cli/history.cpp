@@ -80,7 +80,7 @@ std::vector<Cell> cells(const HistoryRow& row) {
           number("sigma_stop_percent", result.sigma_stop_percent),
           number("sigma_peak_percent", peak.sigma_peak_percent),
           number("samples", static_cast<double>(result.samples)),
-          number("duration_s", static_cast<double>(result.end - result.start) * 1e-9),
+          number("duration_s", static_cast<double>((result.end - result.start).ns()) * 1e-9),
           text("direction", lower(direction_name(result.direction))),
           text("ratio", lower(end_stop_name(result.end_stop))),
           number("speed_ratio", result.omega_s_rad_s / result.omega_p_rad_s),

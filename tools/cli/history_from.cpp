@@ -63,7 +63,7 @@ Replayed results_of(const std::vector<std::string>& logs, const daemon::Config& 
     for (const std::string& warning : replayed.warnings) text::warn(warning);
     double last_s = undated_s;
     const auto time_of = [&](daemon::MonoTime end) {
-      const double end_s = static_cast<double>(end) / double{daemon::kSecond};
+      const double end_s = daemon::seconds(end.since_origin());
       if (end_s >= kEarliestDate_s) return end_s;
       last_s = std::max(last_s, undated_s + end_s);
       return undated_s + end_s;

@@ -35,7 +35,7 @@ diagnose::SignalTable read_log(const std::string& path, const daemon::Config& co
     if (on_read && ++frames % kFramesPerWord == 0) {
       on_read(static_cast<double>(frame.t_ns - *first_ns) * 1e-9, timeline->share_read());
     }
-    daemon::RxFrame received{frame.t_ns, frame.frame};
+    daemon::RxFrame received{daemon::MonoTime::of_ns(frame.t_ns), frame.frame};
     received.bus = frame.bus;
     const daemon::FrameUse use = inputs.on_frame(received, faults);
     if (use == daemon::FrameUse::kBad) ++bad;
@@ -45,7 +45,8 @@ diagnose::SignalTable read_log(const std::string& path, const daemon::Config& co
       if (history.empty()) continue;
       diagnose::Channel& channel = table[binding.role];
       const double t_s =
-          static_cast<double>(history.newest() - inputs.delay(binding.role) - *first_ns) * 1e-9;
+          static_cast<double>((history.newest() - inputs.delay(binding.role)).ns() - *first_ns) *
+          1e-9;
       if (!channel.empty() && t_s <= channel.t_s.back()) continue;
       channel.t_s.push_back(t_s);
       channel.value.push_back(history.newest_value());

@@ -42,7 +42,7 @@ class Listener {
     whole_.interface = request.source;
     port_ = open_buses_whole(whole_, stop_descriptor());
     begin_ = port_->now();
-    if (request.duration_s > 0.0) end_ = begin_ + static_cast<Duration>(request.duration_s * 1e9);
+    if (request.duration_s > 0.0) end_ = begin_ + Duration::of_s(request.duration_s);
   }
 
   // on_frame(frame) for each, on_turn(now) after at most kTurn; ends when stopped, at the end of
@@ -51,21 +51,21 @@ class Listener {
     while (port_->now() < end_) {
       const daemon::Wake wake = port_->wait_until(std::min(end_, port_->now() + kTurn));
       if (wake == daemon::Wake::kClosed) return;
-      wall_offset_ = wall_now() - port_->now();
+      wall_offset_ = wall_now() - port_->now().ns();
       const std::size_t count = wake == daemon::Wake::kFrames ? port_->receive(frames_) : 0;
       for (std::size_t i = 0; i < count; ++i) on_frame(frames_[i]);
       if (!on_turn(port_->now())) return;
     }
   }
   MonoTime begin() const { return begin_; }
-  std::int64_t wall(MonoTime t) const { return t + wall_offset_; }
+  std::int64_t wall(MonoTime t) const { return t.ns() + wall_offset_; }
   daemon::BusState state() { return port_->bus_state(); }
 
  private:
   daemon::Config whole_;
   std::unique_ptr<daemon::Port> port_;
-  MonoTime begin_ = 0;
-  MonoTime end_ = std::numeric_limits<MonoTime>::max();
+  MonoTime begin_{};
+  MonoTime end_ = MonoTime::max();
   std::int64_t wall_offset_ = 0;
   std::array<daemon::RxFrame, 64> frames_;
 };
@@ -89,7 +89,7 @@ class BusSession {
   }
   bool is_own(const can::CanFrame& frame) const { return session_.is_own(frame); }
   const monitor::View& view(MonoTime t) {
-    view_.listening_s = static_cast<double>(t - listener_.begin()) * 1e-9;
+    view_.listening_s = static_cast<double>((t - listener_.begin()).ns()) * 1e-9;
     session_.show(view_, t);
     view_.wall_ns = listener_.wall(t);
     return view_;
@@ -109,7 +109,7 @@ void print_changes(Listener& listener, BusSession& session) {
     text::print(stdout, lines);
     std::fflush(stdout);
   };
-  MonoTime next = 0;
+  MonoTime next{};
   listener.listen(
       [&](const daemon::RxFrame& frame) {
         session.take(frame);
@@ -129,7 +129,7 @@ void print_once(const MonitorRequest& request, Listener& listener, BusSession& s
   const auto whole = [&] {
     const monitor::View& view = session.view(now);
     if (monitor::is_silent(view)) return true;
-    return view.heard_s >= static_cast<double>(kWholePicture) * 1e-9;
+    return view.heard_s >= static_cast<double>(kWholePicture.ns()) * 1e-9;
   };
   listener.listen([&](const daemon::RxFrame& frame) { session.take(frame); },
                   [&](MonoTime t) {
@@ -147,7 +147,7 @@ void print_once(const MonitorRequest& request, Listener& listener, BusSession& s
 void show_screen(Listener& listener, BusSession& session) {
   MonitorScreen screen;
   bool held = false;
-  MonoTime next = 0;
+  MonoTime next{};
   listener.listen([&](const daemon::RxFrame& frame) { session.take(frame); },
                   [&](MonoTime now) {
                     session.turn(now);
@@ -174,11 +174,11 @@ void list_frames(const MonitorRequest& request, Listener& listener) {
   listener.listen(
       [&](const daemon::RxFrame& frame) {
         if (!origin && rig.find_message(frame.frame.id) != nullptr) {
-          origin = frame.t - request.truth->first_frame_ns;
+          origin = frame.t - Duration::of_ns(request.truth->first_frame_ns);
         }
         if (!origin) return;
         const bool of_day = request.output == MonitorOutput::kFrames && !request.truth;
-        lister.on_frame(of_day ? listener.wall(frame.t) : frame.t - *origin, frame.frame);
+        lister.on_frame(of_day ? listener.wall(frame.t) : (frame.t - *origin).ns(), frame.frame);
       },
       [](MonoTime) { return true; });
   lister.end();

@@ -116,8 +116,8 @@ std::optional<RecordedLog> recorded_requests(const std::vector<std::string>& pat
   Reader reader(config);
   can::StampedFrame frame;
   while (timeline->next(frame)) {
-    reader.pass(frame.t_ns);
-    if (frame.bus == 0) reader.on_frame(frame.t_ns, frame.frame);
+    reader.pass(MonoTime::of_ns(frame.t_ns));
+    if (frame.bus == 0) reader.on_frame(MonoTime::of_ns(frame.t_ns), frame.frame);
   }
   return reader.take();
 }

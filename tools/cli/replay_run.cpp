@@ -71,11 +71,11 @@ class Sink final : public daemon::SampleSink {
     if (also_ != nullptr) also_->on_report(report);
     if (signals_ != nullptr) {
       signal_values(report, pipeline_, config_, values_);
-      signals_->row(report.t, values_);
+      signals_->row(report.t.ns(), values_);
     }
     if (trace_ == nullptr || !report.in_experiment || !report.curve.usable) return;
     const estimator::CurveEstimate& curve = report.curve;
-    row_ = text::seconds_text(report.t);
+    row_ = text::seconds_text(report.t.ns());
     for (const double value :
          {curve.mu_star, curve.sigma_star_percent, curve.slip_variance, curve.friction_slope}) {
       append(value);
@@ -311,7 +311,7 @@ void run_pipeline(daemon::Port& port, daemon::Pipeline& pipeline, const daemon::
   result.unusable = why_unusable(pipeline, config);
   daemon::CarriedRecord record(config);
   for (const daemon::CarriedWindow& window : result.carried_windows) {
-    record.take(window, static_cast<double>(window.end) / double{daemon::kSecond});
+    record.take(window, daemon::seconds(window.end.since_origin()));
   }
   result.carried = record.bounds();
 }
@@ -364,7 +364,7 @@ ReplayResult replay_record(const std::string& path, const daemon::Config& config
                result, outputs);
   result.frames = port.stats().frames;
   result.lines_bad = port.stats().lines_bad;
-  result.duration_ns = port.duration();
+  result.duration_ns = port.duration().ns();
   describe_troubles(port.stats(), {}, result);
   return result;
 }
@@ -408,7 +408,7 @@ ReplayResult replay(const std::vector<std::string>& paths, const std::string& in
   if (outputs.log_out != nullptr) {
     writer = std::make_unique<can::CandumpWriter>(outputs.log_out);
     receiver = [&](daemon::MonoTime t, const can::CanFrame& frame, std::uint8_t bus) {
-      writer->write(t, bus == 0 ? config.interface : further, frame);
+      writer->write(t.ns(), bus == 0 ? config.interface : further, frame);
     };
   }
   const int version = paths.size() == 1 && interface.empty() ? record_version(paths[0]) : 0;
@@ -475,9 +475,9 @@ std::string experiment_lines(const ReplayResult& result, std::size_t from) {
         .field("type", "experiment")
         .field("log", result.log)
         .key("start_s")
-        .raw(text::seconds_text(e.start))
+        .raw(text::seconds_text(e.start.ns()))
         .key("stop_s")
-        .raw(e.stopped ? text::seconds_text(e.end) : "null")
+        .raw(e.stopped ? text::seconds_text(e.end.ns()) : "null")
         .field("outcome", outcome_text(e.outcome))
         .field("stop_reason", reason_text(e.stop_reason))
         .field("mu_max", completed ? e.peak.mu_max : text::kJsonNull)
@@ -608,8 +608,8 @@ std::string experiment_text(const ReplayResult& result, std::size_t from) {
     out += "  " + outcome_text(e.outcome) + ", " +
            text::snake_case(daemon::direction_name(e.direction)) + ", " +
            text::snake_case(daemon::end_stop_name(e.end_stop)) + ": ";
-    const double end_s = static_cast<double>(e.end) * 1e-9;
-    const double length_s = static_cast<double>(e.end - e.start) * 1e-9;
+    const double end_s = static_cast<double>(e.end.ns()) * 1e-9;
+    const double length_s = static_cast<double>((e.end - e.start).ns()) * 1e-9;
     out += e.stopped ? format("stopped at %.3f s", end_s) : format("ended at %.3f s", end_s);
     out += format(" (%s) after %.1f s", reason_text(e.stop_reason).c_str(), length_s);
     if (e.stopped) out += format(", at %.2f %% slip", e.sigma_stop_percent);

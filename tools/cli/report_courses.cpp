@@ -60,7 +60,7 @@ ReportCourses::ReportCourses(std::string log, const daemon::Config& config, RunP
 
 void ReportCourses::on_report(const daemon::SampleReport& report) noexcept {
   progress_.at(report.t);
-  const double t_s = daemon::seconds(report.t);
+  const double t_s = daemon::seconds(report.t.since_origin());
   take_wear(report);
   take_drive_sample(report, t_s);
   take_lanes(report, t_s);
@@ -142,8 +142,8 @@ void ReportCourses::take_lanes(const daemon::SampleReport& report, double t_s) {
 }
 
 void ReportCourses::take_result(const daemon::ExperimentResult& result) {
-  now_.name = log_ + number(", from %.2f s on", daemon::seconds(result.start));
-  if (result.stopped) now_.stop_s = daemon::seconds(result.end);
+  now_.name = log_ + number(", from %.2f s on", daemon::seconds(result.start.since_origin()));
+  if (result.stopped) now_.stop_s = daemon::seconds(result.end.since_origin());
   const bool value = result.outcome == daemon::Outcome::kCompleted;
   const estimator::PeakEstimate& peak = result.peak;
   if (value) {
@@ -166,8 +166,8 @@ void ReportCourses::take_result(const daemon::ExperimentResult& result) {
                   number("%.1f", of_this_.slip_most_percent),
                   number("%.0f", of_this_.energy_J),
                   number("%.2f", of_this_.path_m)};
-  drive_.results.push_back(
-      {daemon::seconds(result.end), mu_max.empty() ? outcome_text(result.outcome) : mu_max});
+  drive_.results.push_back({daemon::seconds(result.end.since_origin()),
+                            mu_max.empty() ? outcome_text(result.outcome) : mu_max});
   experiments_.push_back(std::move(now_));
   now_ = {};
   now_.period_s = period_s_;
@@ -178,7 +178,7 @@ void ReportCourses::take_result(const daemon::ExperimentResult& result) {
 void ReportCourses::take_requests(const std::vector<daemon::RecordedRequest>& followed) {
   daemon::RecordedRequests requests(followed);
   for (std::size_t i = 0; i < drive_.t_s.size(); ++i) {
-    requests.step(std::llround(drive_.t_s[i] * 1e9));
+    requests.step(daemon::MonoTime::of_ns(std::llround(drive_.t_s[i] * 1e9)));
     if (const double force_N = requests.force_N(); force_N > 0.0) {
       drive_.asked_force_N[i] = force_N;
     }

@@ -96,21 +96,21 @@ void show(daemon::Port& port, const daemon::Config& config, daemon::MonoTime ori
   BusTable table(stdout);
   std::array<daemon::RxFrame, 64> frames;
   for (;;) {
-    const daemon::Wake wake = port.wait_until(std::numeric_limits<daemon::MonoTime>::max());
+    const daemon::Wake wake = port.wait_until(daemon::MonoTime::max());
     if (wake == daemon::Wake::kClosed) return;
     const std::size_t count = port.receive(frames);
     for (std::size_t i = 0; i < count; ++i) {
       const auto view = decoder.decode(frames[i].frame);
       if (!view) continue;
-      table.on_frame(frames[i].t - origin, *view);
-      also(frames[i].t - origin, *view);
+      table.on_frame((frames[i].t - origin).ns(), *view);
+      also((frames[i].t - origin).ns(), *view);
     }
   }
 }
 
 // The embedded bus with the daemon's loop on it, and beside it what drives: `feed` runs until its
 // end, then the bus closes. The table is printed meanwhile.
-void stage(const daemon::Config& config, daemon::MonoTime shift,
+void stage(const daemon::Config& config, daemon::Duration shift,
            const std::function<void(daemon::Port&)>& feed,
            const std::function<void(std::int64_t, const OwnFrameView&)>& also) {
   const auto bus = daemon::InprocBus::create(daemon::InprocBus::Clock::kMonotonic);
@@ -173,7 +173,7 @@ void run_vehicle(const Options& options) {
   ReplayResult result;
   run_daemon(port, config, result);
   if (!port.finite()) {
-    fail_not_finite(static_cast<double>(port.now()) * 1e-9, options.scenario.seed);
+    fail_not_finite(static_cast<double>(port.now().ns()) * 1e-9, options.scenario.seed);
   }
   results.print(stdout, port.vehicle());
 }
@@ -198,7 +198,7 @@ void run_rig(const Options& options) {
   Verdict verdict;
   bool first_taken = false;
   stage(
-      config, first.t_ns,
+      config, daemon::Duration::of_ns(first.t_ns),
       [&](daemon::Port& port) {
         play(port, kBus, 1.0, [&](can::StampedFrame& frame) {
           if (first_taken) return source.next(frame);

@@ -124,10 +124,10 @@ DriveResult drive_with_daemon(const sim::VehicleScenario& believed,
   Progress progress(shows_progress);
   observers.on_received = [&](const daemon::RxFrame& frame) {
     if (progress.steps()) {
-      const double t_s = static_cast<double>(frame.t) * 1e-9;
+      const double t_s = static_cast<double>(frame.t.ns()) * 1e-9;
       progress.tell(t_s, "s of the drive", "times real time", t_s / machine.duration_s);
     }
-    if (writer) writer->write(frame.t, kInterface, frame.frame);
+    if (writer) writer->write(frame.t.ns(), kInterface, frame.frame);
     ++result.daemon.frames;
   };
   observers.ends = stop_asked;

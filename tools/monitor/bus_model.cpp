@@ -81,7 +81,7 @@ std::string link_text(daemon::BusState link) {
 }
 
 void Rate::add(MonoTime t, double amount) {
-  const std::int64_t cell = t / kCell;
+  const std::int64_t cell = t.since_origin() / kCell;
   if (!any_) {
     any_ = true;
     first_ = t;
@@ -97,15 +97,15 @@ void Rate::add(MonoTime t, double amount) {
 // Of the whole cells before the one that is filling.
 double Rate::per_second(MonoTime now) const {
   if (!any_) return 0.0;
-  const std::int64_t cell = now / kCell;
-  const std::int64_t from = std::max(cell - kCells, first_ / kCell);
+  const std::int64_t cell = now.since_origin() / kCell;
+  const std::int64_t from = std::max(cell - kCells, first_.since_origin() / kCell);
   if (from >= cell) return 0.0;
   double sum = 0.0;
   for (std::int64_t each = std::max(from, newest_ - kCells); each < cell && each <= newest_;
        ++each) {
     sum += sums_[static_cast<std::size_t>(each % (kCells + 1))];
   }
-  return sum * kSecond_ns / static_cast<double>((cell - from) * kCell);
+  return sum * kSecond_ns / static_cast<double>(((cell - from) * kCell).ns());
 }
 
 int frame_bits(const can::CanFrame& frame) {
@@ -209,7 +209,7 @@ void BusModel::take_estimate(MonoTime t, const OwnFrameView& frame) {
       said_.experiments.erase(said_.experiments.begin());
     }
     said_.experiments.push_back(
-        {t, said_.outcome, said_.reason, said_.friction, sigma_most_percent_});
+        {t.ns(), said_.outcome, said_.reason, said_.friction, sigma_most_percent_});
     result_since_ = t;
   }
   count_ = count;
@@ -244,7 +244,7 @@ void BusModel::take_status(MonoTime t, const OwnFrameView& frame) {
 
 void BusModel::show(View& view, MonoTime now) const {
   const auto seconds = [&](MonoTime since) {
-    return static_cast<double>(now - since) / kSecond_ns;
+    return static_cast<double>((now - since).ns()) / kSecond_ns;
   };
   const std::optional<double> bitrate = view.traffic.bitrate;
   view.traffic = traffic_;

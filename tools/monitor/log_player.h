@@ -20,7 +20,7 @@ class LogPlayer {
 
   bool empty() const { return !has_next_ && !ended_at_; }
   bool ended() const { return !has_next_; }
-  double position_s() const { return static_cast<double>(now_ - first_) * 1e-9; }
+  double position_s() const { return static_cast<double>((now_ - first_).ns()) * 1e-9; }
   // Seconds since the first frame; not beyond the last.
   void play_to(double position_s);
   // The next frame and what belongs to its instant. False at the end.
@@ -38,7 +38,7 @@ class LogPlayer {
   can::StampedFrame next_;
   bool has_next_ = false;
   std::optional<daemon::MonoTime> ended_at_;
-  daemon::MonoTime first_ = 0, now_ = 0;
+  daemon::MonoTime first_{}, now_{};
 };
 
 }  // namespace beltgrip::monitor

@@ -45,7 +45,7 @@ void Session::advance(daemon::MonoTime now) {
 }
 
 void Session::show(View& view, daemon::MonoTime now) const {
-  view.t_ns = now;
+  view.t_ns = now.ns();
   view.link = link_;
   bus_.show(view, now);
   view.computed_here = shadow_ && computes();

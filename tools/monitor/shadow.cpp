@@ -21,7 +21,7 @@ Shadow::Shadow(const daemon::Config& config, Sent sent)
     : config_(config),
       pipeline_(config),
       sent_(std::move(sent)),
-      period_(std::llround(static_cast<double>(daemon::kSecond) / config.estimator.sample_rate_hz)),
+      period_(daemon::period_of(config.estimator.sample_rate_hz)),
       carried_watch_(config.control == daemon::Control::kCommand),
       carried_(config) {}
 
@@ -59,7 +59,7 @@ void Shadow::sample() {
   outbox_.size = 0;
   pipeline_.on_sample(next_, outbox_);
   if (const daemon::CarriedWindow* window = carried_watch_.step(pipeline_.report())) {
-    carried_.take(*window, static_cast<double>(window->end) / double{daemon::kSecond});
+    carried_.take(*window, daemon::seconds(window->end.since_origin()));
   }
   for (std::size_t i = 0; i < outbox_.size; ++i) {
     if (outbox_.bus[i] == 0) sent_(next_, outbox_.frames[i]);
@@ -89,7 +89,7 @@ void Shadow::show(View& view, MonoTime now) const {
     const Shown shown = in_shown_unit(role_dimension(role), seen.value);
     row.unit = shown.unit;
     if (seen.seen) row.value = shown.value;
-    row.age_s = seen.seen ? static_cast<double>(now - seen.t) * 1e-9 : 0.0;
+    row.age_s = seen.seen ? static_cast<double>((now - seen.t).ns()) * 1e-9 : 0.0;
     row.rate_Hz = rates_[i].per_second(now);
     row.trust = daemon::quality_name(seen.quality);
     row.good = seen.quality == SignalQuality::kValid;

@@ -33,8 +33,8 @@ T number(std::string_view text) {
 std::optional<MonoTime> stamp(std::string_view text) {
   const std::size_t point = text.find('.');
   if (!text.starts_with('(') || !text.ends_with(')') || point == std::string_view::npos) return {};
-  return number<MonoTime>(text.substr(1, point - 1)) * daemon::kSecond +
-         number<MonoTime>(text.substr(point + 1, 9));
+  return MonoTime(number<std::int64_t>(text.substr(1, point - 1)) * daemon::kSecond) +
+         daemon::Duration::of_ns(number<std::int64_t>(text.substr(point + 1, 9)));
 }
 
 }  // namespace
@@ -66,7 +66,7 @@ void RecordPort::read() {
     next_ = {};
     if (record.note.empty()) {
       next_.is_frame = true;
-      next_.t = record.t_ns;
+      next_.t = MonoTime::of_ns(record.t_ns);
       next_.frame = record.frame;
       next_.sent = record.sent;
       next_.bus = !further_.empty() && record.interface == further_ ? 1 : 0;
@@ -100,7 +100,7 @@ void RecordPort::obey(const Line& note) {
   const auto text = [&](std::size_t i) -> std::string_view {
     return i < note.numbers.size() ? std::string_view(note.numbers[i]) : std::string_view();
   };
-  if (note.word == "late") late_ = number<MonoTime>(text(0));
+  if (note.word == "late") late_ = MonoTime::of_ns(number<std::int64_t>(text(0)));
   if (note.word == "bus" && number<unsigned>(text(0)) < states_.size()) {
     states_[number<unsigned>(text(0))] = static_cast<daemon::BusState>(number<unsigned>(text(1)));
   }
@@ -120,12 +120,12 @@ void RecordPort::obey(const Line& note) {
   }
   if (note.word == "end") {
     closed_ = true;
-    now_ = number<MonoTime>(text(0));
+    now_ = MonoTime::of_ns(number<std::int64_t>(text(0)));
   }
 }
 
 daemon::Wake RecordPort::wait_until(MonoTime deadline) noexcept {
-  late_ = 0;
+  late_ = {};
   failed_.clear();
   while (!closed_ && has_next_ && next_.t <= deadline) {
     if (next_.is_frame) {

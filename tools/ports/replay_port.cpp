@@ -5,6 +5,8 @@
 
 namespace beltgrip::ports {
 
+using daemon::MonoTime;
+
 namespace {
 // A longer silence is a pause of the recording: what the daemon would say in it tells nobody
 // anything, and a night of it would be two million frames (chosen).
@@ -13,7 +15,7 @@ constexpr daemon::Duration kPause = 600 * daemon::kSecond;
 
 ReplayPort::ReplayPort(LogTimeline& log, Receiver receiver)
     : log_(log), receiver_(std::move(receiver)), has_next_(log_.next(next_)) {
-  if (has_next_) now_ = next_.t_ns;
+  if (has_next_) now_ = next_t();
   limit_ = now_;
 }
 
@@ -23,9 +25,9 @@ daemon::Wake ReplayPort::wait_until(daemon::MonoTime deadline) noexcept {
     limit_ = now_;
     return daemon::Wake::kFrames;
   }
-  if (next_.t_ns <= deadline) {
+  if (next_t() <= deadline) {
     // Everything that is due before the deadline may be taken in one go; receive() moves the clock.
-    now_ = std::max(now_, next_.t_ns);
+    now_ = std::max(now_, next_t());
     limit_ = deadline;
     return daemon::Wake::kFrames;
   }
@@ -34,9 +36,9 @@ daemon::Wake ReplayPort::wait_until(daemon::MonoTime deadline) noexcept {
 }
 
 daemon::MonoTime ReplayPort::silent_until() noexcept {
-  const bool is_pause = next_.t_ns - now_ > kPause;
+  const bool is_pause = next_t() - now_ > kPause;
   const bool heard = (receiver_ != nullptr && !is_pause) || echo_count_ > 0 || !has_next_;
-  return heard ? Port::silent_until() : next_.t_ns;
+  return heard ? Port::silent_until() : next_t();
 }
 
 std::size_t ReplayPort::receive(std::span<daemon::RxFrame> out) noexcept {
@@ -45,14 +47,14 @@ std::size_t ReplayPort::receive(std::span<daemon::RxFrame> out) noexcept {
     out[count++] = {now_, echoes_[i].frame, true, 0, echoes_[i].bus};
   }
   echo_count_ = 0;
-  while (count < out.size() && has_next_ && next_.t_ns <= limit_) {
+  while (count < out.size() && has_next_ && next_t() <= limit_) {
     daemon::RxFrame& frame = out[count++];
-    frame.t = next_.t_ns;
+    frame.t = next_t();
     frame.frame = next_.frame;
     frame.own_echo = take_sent(next_);
     frame.dropped_before = 0;
     frame.bus = next_.bus;
-    now_ = std::max(now_, next_.t_ns);
+    now_ = std::max(now_, next_t());
     has_next_ = log_.next(next_);
   }
   return count;
@@ -72,7 +74,8 @@ bool ReplayPort::take_sent(const can::StampedFrame& frame) noexcept {
   constexpr daemon::Duration kEchoWithin = daemon::kSecond;
   for (std::size_t i = 0; i < sent_count_; ++i) {
     Sent& each = sent_[i];
-    if (each.bus != frame.bus || each.frame != frame.frame || frame.t_ns - each.t > kEchoWithin) {
+    if (each.bus != frame.bus || each.frame != frame.frame ||
+        MonoTime::of_ns(frame.t_ns) - each.t > kEchoWithin) {
       continue;
     }
     each = sent_[--sent_count_];

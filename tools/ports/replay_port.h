@@ -34,11 +34,13 @@ class ReplayPort final : public daemon::Port {
   daemon::BusState bus_state_of(std::uint8_t) noexcept override { return bus_state(); }
 
  private:
+  daemon::MonoTime next_t() const noexcept { return daemon::MonoTime::of_ns(next_.t_ns); }
+
   LogTimeline& log_;
   Receiver receiver_;
   can::StampedFrame next_;
   bool has_next_;
-  daemon::MonoTime now_ = 0;
+  daemon::MonoTime now_{};
   daemon::MonoTime limit_;  // frames up to here have arrived
   static constexpr std::size_t kEchoes = 32;
   struct Echo {
@@ -50,7 +52,7 @@ class ReplayPort final : public daemon::Port {
   struct Sent {
     can::CanFrame frame;
     std::uint8_t bus = 0;
-    daemon::MonoTime t = 0;
+    daemon::MonoTime t{};
   };
   static constexpr std::size_t kSent = 32;
   std::array<Sent, kSent> sent_;  // the last of each bus and identifier that the log has not shown

@@ -35,7 +35,7 @@ const FaultStep* VehiclePort::active(FaultKind kind) const {
 
 void VehiclePort::arrive(std::int64_t t_ns, const can::CanFrame& frame, bool own) {
   Arrival arrival{t_ns, order_++, {}};
-  arrival.frame.t = t_ns;
+  arrival.frame.t = daemon::MonoTime::of_ns(t_ns);
   arrival.frame.frame = frame;
   arrival.frame.own_echo = own;
   arrivals_.push_back(arrival);
@@ -115,22 +115,23 @@ void VehiclePort::advance(std::int64_t t_ns, bool stop_at_frame) {
 
 daemon::Wake VehiclePort::wait_until(daemon::MonoTime deadline) noexcept {
   if (daemon_is_dead() || ended()) return daemon::Wake::kClosed;
-  std::int64_t until = deadline;
+  const std::int64_t deadline_ns = deadline.ns();
+  std::int64_t until_ns = deadline_ns;
   if (const FaultStep* fault = active(FaultKind::kLoopLate)) {
-    until = std::max<std::int64_t>(until, deadline + std::llround(fault->size * 1e9));
+    until_ns = std::max<std::int64_t>(until_ns, deadline_ns + std::llround(fault->size * 1e9));
   }
-  const bool late = until > deadline;
-  advance(until, !late);
+  const bool late = until_ns > deadline_ns;
+  advance(until_ns, !late);
   if (vehicle_.finished() || !vehicle_.finite()) return daemon::Wake::kClosed;
   if (late) {
-    now_ns_ = until;
+    now_ns_ = until_ns;
     return daemon::Wake::kDeadline;
   }
-  if (!arrivals_.empty() && arrivals_.front().t_ns <= std::min(deadline, vehicle_.now_ns())) {
+  if (!arrivals_.empty() && arrivals_.front().t_ns <= std::min(deadline_ns, vehicle_.now_ns())) {
     now_ns_ = std::max(now_ns_, arrivals_.front().t_ns);
     return daemon::Wake::kFrames;
   }
-  now_ns_ = std::max(now_ns_, deadline);
+  now_ns_ = std::max(now_ns_, deadline_ns);
   return daemon::Wake::kDeadline;
 }
 
@@ -140,7 +141,7 @@ std::size_t VehiclePort::receive(std::span<daemon::RxFrame> out) noexcept {
     if (observers_.on_received) observers_.on_received(arrivals_.front().frame);
     out[count] = arrivals_.front().frame;
     if (const FaultStep* fault = active(FaultKind::kStampBack)) {
-      out[count].t -= std::llround(fault->size * 1e9);
+      out[count].t -= daemon::Duration::of_ns(std::llround(fault->size * 1e9));
     }
     ++count;
     std::pop_heap(arrivals_.begin(), arrivals_.end(), std::greater<>{});

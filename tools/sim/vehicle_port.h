@@ -27,7 +27,7 @@ class VehiclePort final : public daemon::Port {
   };
   VehiclePort(const VehicleScenario& scenario, std::uint64_t seed, Observers observers = {});
 
-  daemon::MonoTime now() noexcept override { return now_ns_; }
+  daemon::MonoTime now() noexcept override { return daemon::MonoTime::of_ns(now_ns_); }
   daemon::Wake wait_until(daemon::MonoTime deadline) noexcept override;
   std::size_t receive(std::span<daemon::RxFrame> out) noexcept override;
   daemon::SendResult send(const can::CanFrame& frame) noexcept override;

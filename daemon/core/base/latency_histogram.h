@@ -21,21 +21,21 @@ class LatencyHistogram {
   static constexpr std::size_t kClasses = kParts * (kLastPower - kFirstPower) + 2;
 
   void add(Duration duration) noexcept {
-    const auto value = static_cast<std::uint64_t>(std::max<Duration>(duration, 0));
+    const auto value = static_cast<std::uint64_t>(std::max(duration.ns(), std::int64_t{0}));
     ++counts_[class_of(value)];
     ++count_;
-    maximum_ = std::max(maximum_, static_cast<Duration>(value));
+    maximum_ = std::max(maximum_, duration);
   }
   std::uint64_t count() const noexcept { return count_; }
   Duration maximum() const noexcept { return maximum_; }
   std::uint64_t count_of(std::size_t index) const noexcept { return counts_[index]; }
   // Values of a class are below this; the last one has no bound of its own.
   Duration upper_bound(std::size_t index) const noexcept {
-    if (index == 0) return Duration{1} << kFirstPower;
+    if (index == 0) return Duration::of_ns(1 << kFirstPower);
     if (index == kClasses - 1) return maximum_;
     const std::size_t part = index - 1;
     const std::size_t power = kFirstPower + part / kParts;
-    return static_cast<Duration>((kParts + part % kParts + 1) << (power - 2));
+    return Duration::of_ns(static_cast<std::int64_t>((kParts + part % kParts + 1) << (power - 2)));
   }
   // Below this lies at least the share q of all values; 0 without values.
   Duration quantile(double q) const noexcept {
@@ -60,7 +60,7 @@ class LatencyHistogram {
 
   std::array<std::uint64_t, kClasses> counts_{};
   std::uint64_t count_ = 0;
-  Duration maximum_ = 0;
+  Duration maximum_{};
 };
 
 }  // namespace beltgrip::daemon

@@ -75,8 +75,7 @@ static_assert(kRequestSlipRate_1_s < kMonitorSlipRate_1_s);
 static_assert(kRequestFast_m_s < kMonitorSlipSpeed_m_s);
 static_assert(kMonitorSlipSpeed_m_s < kPromisedSlipSpeed_m_s);
 static_assert(kRequestEnergy_J < kPromisedEnergy_J);
-static_assert(kRequestLongest <= kMonitorLongest &&
-              kMonitorLongest < static_cast<Duration>(kGateFrames) * kClampPeriod);
+static_assert(kRequestLongest <= kMonitorLongest && kMonitorLongest < kGateFrames * kClampPeriod);
 static_assert(kGateStartShare < kMonitorStartShare && kMonitorStartShare < 1.0);
 static_assert(kMonitorSpeedShare < kRequestSpeedShare && kRequestSpeedShare < 1.0);
 static_assert(seconds(kClampPeriod) < kGateFramePeriod_s);

@@ -17,7 +17,7 @@ namespace beltgrip::daemon {
 inline constexpr std::size_t kBusMax = 2;
 
 struct RxFrame {
-  MonoTime t = 0;  // arrival, monotonic; never later than now()
+  MonoTime t{};  // arrival, monotonic; never later than now()
   can::CanFrame frame;
   bool own_echo = false;             // our own frame, confirmed as sent (a log's port leaves our
                                      // identifiers out: elsewhere they mean a foreign sender)
@@ -61,7 +61,7 @@ class Port {
   }
   // Nothing comes before this instant, and nobody hears what is sent until then (the gap of a log):
   // the loop may leave out samples that change nothing. In the past: not known.
-  virtual MonoTime silent_until() noexcept { return std::numeric_limits<MonoTime>::min(); }
+  virtual MonoTime silent_until() noexcept { return MonoTime::min(); }
   // From now on these are wanted; a port that hands over every frame need not know.
   virtual void select(std::span<const WantedFrames>) noexcept {}
 };

@@ -119,8 +119,7 @@ estimator::PeakReading PeakEvaluation::reading_at(const EndedExperiment& ended, 
   const bool overdrive = ended.end_stop == estimator::EndStop::kOverdrive;
   const double ratio = overdrive ? config_.variator.ratio_overdrive : config_.variator.ratio_low;
   const double sign = ended.direction == estimator::Direction::kDrive ? 1.0 : -1.0;
-  const auto duration_ns = static_cast<double>(std::max<Duration>(ended.duration, 1));
-  const double duration_s = duration_ns / static_cast<double>(kSecond);
+  const double duration_s = seconds(std::max(ended.duration, kNanosecond));
   estimator::PeakReading reading;
   reading.end_stop = ended.end_stop;
   reading.mu = mu;

@@ -36,7 +36,7 @@ void AnswerLag::begin(MonoTime t, const Setup& setup) noexcept {
   own_s_ = setup.configured.lag_s;
   answered_ = own_s_ > 0.0 ? -std::expm1(-seconds(setup.sample) / own_s_) : 1.0;
   const double planned_s = setup.configured.dead_time_s + setup.configured.lag_s + kTransport_s;
-  enough_ = std::llround(kEnough * planned_s * static_cast<double>(kSecond));
+  enough_ = Duration::of_ns(std::llround(kEnough * planned_s * 1e9));
   period_ =
       setup.sample * std::max(1LL, std::llround(kPeriodShare * planned_s / seconds(setup.sample)));
   quick_ = std::min(kQuick, static_cast<std::size_t>(own_s_ / seconds(period_)));
@@ -75,7 +75,7 @@ void AnswerLag::measure(MonoTime t, double fallen_N, double rate_N_per_s) noexce
 void AnswerLag::read(MonoTime t, double force_N) noexcept {
   if (!measures_) return;
   if (!rests_ && t - resumed_ > kRare && ++skipped_ % kTakenRarely != 0) return;
-  const double periods = static_cast<double>(t - newest_) / static_cast<double>(period_);
+  const double periods = fraction(t - newest_, period_);
   const double whole = std::floor(periods), share = periods - whole;
   if (whole > 0.0 || whole < -2.0) return;  // its courses are not kept
   const std::size_t newest = newest_at_ + kKept - static_cast<std::size_t>(-whole);

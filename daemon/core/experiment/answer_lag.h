@@ -35,7 +35,7 @@ class AnswerLag {
     double force_N = 0.0;  // asked for so far
     Actuator configured;
     Reading reading;
-    Duration sample = 1;  // between two calls of ask()
+    Duration sample = kNanosecond;  // between two calls of ask()
   };
   void begin(MonoTime t, const Setup& setup) noexcept;
   // Every sample.
@@ -80,17 +80,17 @@ class AnswerLag {
   double step_N_ = 0.0, rests_from_N_ = 0.0;
   double crept_ = 0.0;  // through so much of a step, at rest
   bool rests_ = false;
-  Duration enough_ = 0;  // how long readings are taken before they tell
-  Duration period_ = 1;
+  Duration enough_{};  // how long readings are taken before they tell
+  Duration period_ = kNanosecond;
   std::size_t quick_ = 0;  // of kQuick, those below the first of the others
   double offset_most_N_ = 0.0;
   Course asked_, answered_to_;        // what is asked for; and as answered without dead time
   std::size_t newest_at_ = 0;         // where the newest is that is kept,
-  MonoTime newest_ = 0;               // and its instant
+  MonoTime newest_{};                 // and its instant
   unsigned skipped_ = 0, taken_ = 0;  // readings
-  MonoTime resumed_ = 0;
+  MonoTime resumed_{};
   bool measures_ = false;
-  MonoTime measures_since_ = 0;
+  MonoTime measures_since_{};
   double n_ = 0.0;
   std::array<double, kQuick + kLate> sums_N_{},
       squares_N2_{};  // of how far readings lie off each course

@@ -25,7 +25,7 @@ void AnswerProof::begin(MonoTime t, const Setup& setup) noexcept {
   setup_ = setup;
   const double planned_s = answer_s + AnswerLag::kTransport_s;
   late_s_ = kLateShare * planned_s;
-  late_after_ = std::llround(kLateAfter * planned_s * static_cast<double>(kSecond));
+  late_after_ = Duration::of_ns(std::llround(kLateAfter * planned_s * 1e9));
   late_ = false;
   credible_s_ = kCredibleShare * answer_s + AnswerLag::kTransport_s;
   rest_ = Rest::kComes;

@@ -38,7 +38,7 @@ constexpr double kFurther = 0.95;      // chosen: of the speed; is there more ro
 // Chosen: of the steepest fall, what an unknown belt has when a fault comes at the worst instant of
 // its crossing. With the whole of it 34 of 60 drawn cars were not asked.
 constexpr double kFaultShare = 0.5;
-constexpr double kSlipMean = 5e8;  // ns
+constexpr Duration kSlipMean = 500 * kMillisecond;
 constexpr double kPercent = 100.0;
 // A request begins at the own force and falls from there: what that falls by itself within the
 // actuator's answer must stay far inside the band in which a force counts as following. A coasting
@@ -377,9 +377,9 @@ void Arming::step(const Now& now) noexcept {
     block_since_ = now.t;
     block_sum_N_ = block_samples_ = 0.0;
   }
-  const double step = static_cast<double>(now.t - last_);
+  const Duration step = now.t - last_;
   last_ = now.t;
-  slip_samples_ = std::min(slip_samples_ + 1.0, std::max(1.0, kSlipMean / step));
+  slip_samples_ = std::min(slip_samples_ + 1.0, std::max(1.0, fraction(kSlipMean, step)));
   slip_percent_ += (now.slip_percent - slip_percent_) / slip_samples_;
   slip_course_.step(now.t, now.omega_s_rad_s / now.omega_p_rad_s);
   follow_force(now);

@@ -28,7 +28,8 @@ constexpr double kFloorNoise_N = 10.0;
 constexpr double kFloorPatience_s = 1.0;
 constexpr double kFloorFalls_N_per_s = 10.0;
 constexpr Duration kReleaseMinimum = 300 * kMillisecond;
-constexpr double kSlipAfter = 2e8;   // ns: averages noise, forgets macro slip before kReleaseTime
+constexpr Duration kSlipAfter =
+    200 * kMillisecond;              // averages noise, forgets macro slip before kReleaseTime
 constexpr double kSlipTold = 0.003;  // slip at the end of a request that shows whether it goes back
 constexpr double kSlipGone = 0.5;    // of it: then the force is back
 constexpr double kUntrueShare = 0.5;    // of the ratio's drift that another node's speed tells too
@@ -39,7 +40,7 @@ constexpr double kStuckFriction = 0.8;  // of the friction expected: the belt is
 ClampRequest::ClampRequest(const Config& config)
     : settings_(config.experiment),
       rate_max_N_per_s_(config.estimator.ramp_rate_max_N_per_s),
-      sample_(std::llround(static_cast<double>(kSecond) / config.estimator.sample_rate_hz)) {
+      sample_(period_of(config.estimator.sample_rate_hz)) {
   for (const RoleBinding& binding : config.roles) {
     if (binding.role != Role::kVehicleSpeed) continue;
     speed_step_m_s_ =
@@ -389,7 +390,7 @@ bool ClampRequest::released(const Now& now) const noexcept {
 
 void ClampRequest::follow_release(const Now& now) noexcept {
   const double slip = slip_.slip_at(now.omega_s_rad_s / now.omega_p_rad_s);
-  const double share = std::min(1.0, static_cast<double>(now.t - last_) / kSlipAfter);
+  const double share = std::min(1.0, fraction(now.t - last_, kSlipAfter));
   slip_after_ += share * (slip - slip_after_);
   last_ = now.t;
 }

@@ -68,8 +68,8 @@ inline constexpr std::size_t kStateCount = 8;
 enum class Outcome : std::uint8_t { kNone, kCompleted, kInconclusive, kAborted };  // wire values
 
 struct ExperimentResult {
-  MonoTime start = 0;    // first sample
-  MonoTime end = 0;      // stop decision, or the last sample
+  MonoTime start{};      // first sample
+  MonoTime end{};        // stop decision, or the last sample
   bool stopped = false;  // a stop decision came (end is its instant)
   Outcome outcome = Outcome::kNone;
   estimator::StopReason stop_reason = estimator::StopReason::kNone;

@@ -192,8 +192,9 @@ InputMonitor::Watch ExperimentStage::watch(double torque_Nm) const noexcept {
     watch.torque_sign = std::copysign(1.0, torque_Nm);
     watch.request_begun = running_.start;
     watch.fall_Pa_per_s = request_.rate_least_N_per_s() / config_.variator.secondary_piston_area_m2;
-    watch.answer = std::llround(1e9 * (config_.experiment.actuator_dead_time_s +
-                                       kAnswerLags * config_.experiment.actuator_lag_s));
+    watch.answer =
+        Duration::of_ns(std::llround(1e9 * (config_.experiment.actuator_dead_time_s +
+                                            kAnswerLags * config_.experiment.actuator_lag_s)));
   }
   return watch;
 }

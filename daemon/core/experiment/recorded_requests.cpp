@@ -46,7 +46,7 @@ double RecordedRequests::force_N() const noexcept {
   const RecordedRequest::Force& before = course[point_ - 1];
   if (point_ == course.size()) return before.force_N;
   const RecordedRequest::Force& after = course[point_];
-  const double share = static_cast<double>(t_ - before.t) / static_cast<double>(after.t - before.t);
+  const double share = fraction(t_ - before.t, after.t - before.t);
   return before.force_N + share * (after.force_N - before.force_N);
 }
 

@@ -11,10 +11,10 @@ constexpr Duration kDebounce = 10 * kMillisecond;
 constexpr Duration kEngineDebounce = 25 * kMillisecond;
 // A single sample's noise is as large as what is looked for.
 constexpr Duration kNearReference = 80 * kMillisecond;
-constexpr double kNearMean = 4e7;  // ns
+constexpr Duration kNearMean = 40 * kMillisecond;
 constexpr double kRateMean_s = 0.04;
 // Chosen, ns: ten frames of the pressure; the own force moves by 15 N within it before a request.
-constexpr double kActingMean = 1e8;
+constexpr Duration kActingMean = 100 * kMillisecond;
 constexpr double kRounding_N = 1.0;  // requests are whole newtons on the wire
 }  // namespace
 
@@ -45,7 +45,7 @@ void SafetyMonitor::see_acting_force(MonoTime t, const SafetySignals& signals) n
     return;
   }
   const double latest =
-      acting_N_ > 0.0 ? std::min(1.0, static_cast<double>(t - acting_seen_) / kActingMean) : 1.0;
+      acting_N_ > 0.0 ? std::min(1.0, fraction(t - acting_seen_, kActingMean)) : 1.0;
   acting_N_ += latest * (signals.clamp_force_N - acting_N_);
   acting_seen_ = t;
 }
@@ -93,7 +93,7 @@ bool SafetyMonitor::slips_near_own_force(MonoTime t, double ratio, double reques
   }
   const double share = (1.0 - request_N / first_request_N_) / (1.0 - limits_.force_near);
   if (share >= 1.0) return false;
-  const double latest = std::min(1.0, static_cast<double>(t - last_) / kNearMean);
+  const double latest = std::min(1.0, fraction(t - last_, kNearMean));
   near_mean_ += latest * (ratio * near_count_ / near_sum_ - 1.0 - near_mean_);
   const double most = limits_.slip_nearest + (limits_.slip_near - limits_.slip_nearest) * share;
   if (std::abs(near_mean_) > most) beyond(SafetyVerdict::kSlip, std::abs(near_mean_), most);

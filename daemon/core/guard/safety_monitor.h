@@ -109,18 +109,18 @@ class SafetyMonitor {
   SafetyVerdict withdrawn_ = SafetyVerdict::kAllowed;
   bool standing_ = false;
   bool asked_before_ = false;
-  MonoTime begun_ = 0;
-  MonoTime ended_ = 0;
-  MonoTime last_ = 0;
+  MonoTime begun_{};
+  MonoTime ended_{};
+  MonoTime last_{};
   double reference_ratio_ = 0.0;
   double first_request_N_ = 0.0;
   double last_request_N_ = 0.0;
-  static constexpr MonoTime kNever = std::numeric_limits<MonoTime>::max();
+  static constexpr MonoTime kNever = MonoTime::max();
   MonoTime beyond_since_ = kNever;  // slip_debounced
   MonoTime power_since_ = kNever;
   double slip_mean_ = 0.0, slip_rate_1_s_ = 0.0;
   double acting_N_ = 0.0;  // smoothed; 0: not known
-  MonoTime acting_seen_ = 0;
+  MonoTime acting_seen_{};
   double near_count_ = 0.0;
   double near_sum_ = 0.0;          // of the first speed ratios
   double near_mean_ = 0.0;         // drift from their mean

@@ -45,7 +45,7 @@ struct PollLimits {
     std::uint8_t bus = 0;
     can::CanId id;
     std::uint16_t identifier = 0;  // of the data
-    Duration period = 0;
+    Duration period{};
     std::uint8_t service = 0x22;
   };
   std::array<Request, kMost> requests{};
@@ -59,7 +59,7 @@ class TxGate {
   // Once a sample, before its frames; 0: not known, and no request may begin.
   void see_acting_force(double force_N) noexcept;
   // Counts what it refuses.
-  bool permits(const can::CanFrame& frame, std::uint8_t bus = 0, MonoTime t = 0) noexcept;
+  bool permits(const can::CanFrame& frame, std::uint8_t bus = 0, MonoTime t = {}) noexcept;
   std::uint64_t refused() const noexcept { return refused_; }
 
  private:
@@ -81,8 +81,8 @@ class TxGate {
   ClampLimits clamp_;
   PollLimits poll_;
   struct Polled {
-    MonoTime due = std::numeric_limits<MonoTime>::min();  // of the next request, at the full rate
-    bool flow_left = false;                               // a flow control for the last request
+    MonoTime due = MonoTime::min();  // of the next request, at the full rate
+    bool flow_left = false;          // a flow control for the last request
   };
   std::array<Polled, PollLimits::kMost> polled_{};
   std::uint32_t active_frames_ = 0;    // of the request that stands

@@ -26,18 +26,17 @@ bool has_right_crc(const can::CanFrame& frame, const CrcProtection& crc) noexcep
 
 void FrameGuard::count(MonoTime t) noexcept {
   if (!period_) return;
-  const auto period = static_cast<double>(*period_);
   const MonoTime newest = stamps_[(stamped_ + kFrames - 1) % kFrames];
-  const auto pause = std::max(kPause, static_cast<Duration>(kPausePeriods * period));
+  const auto pause = std::max(kPause, scaled(*period_, kPausePeriods));
   if (stamped_ > 0 && t - newest > pause) {
     stamped_ = 0;
     wrong_rate_ = false;
   }
   if (stamped_ >= kFrames) {
     // The oldest, which this one replaces: kFrames intervals ago.
-    const auto took = static_cast<double>(t - stamps_[stamped_ % kFrames]);
-    const double wanted = period * static_cast<double>(kFrames);
-    wrong_rate_ = took < kTooFast * wanted || took > kTooSlow * wanted;
+    const auto took_ns = static_cast<double>((t - stamps_[stamped_ % kFrames]).ns());
+    const auto wanted_ns = static_cast<double>((kFrames * *period_).ns());
+    wrong_rate_ = took_ns < kTooFast * wanted_ns || took_ns > kTooSlow * wanted_ns;
   }
   stamps_[stamped_ % kFrames] = t;
   ++stamped_;

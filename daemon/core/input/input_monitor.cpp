@@ -26,7 +26,7 @@ constexpr std::array kWatched{Role::kPrimarySpeed, Role::kSecondarySpeed, Role::
 constexpr double kOtherDeviations = 3.0;  // taken off what another signal says of a motion
 
 std::size_t spike_values(Duration period) noexcept {
-  const Duration whole = std::max<Duration>(period, 1);
+  const Duration whole = std::max(period, kNanosecond);
   const auto most = static_cast<std::size_t>((kSpikeLongest + whole / 2) / whole);
   return std::clamp<std::size_t>(most, 1, kSpikeValues);
 }
@@ -55,15 +55,11 @@ constexpr std::uint32_t key_of(std::uint8_t bus, can::CanId id, bool by_group) n
          (by_group ? kGroup : 0);
 }
 
-Duration scaled(Duration duration, double factor) {
-  return static_cast<Duration>(static_cast<double>(duration) * factor);
-}
-
 }  // namespace
 
 InputMonitor::InputMonitor(const Config& config) : config_(config), uds_(config) {
   for (auto& each : standard_) each.fill(kNone);
-  newest_.fill(std::numeric_limits<MonoTime>::min());
+  newest_.fill(MonoTime::min());
   extended_.fill(kNone);
   for (const RoleBinding& binding : config_.roles) bind(binding);
   for (std::uint8_t i = 0; i < message_count_; ++i) guard(messages_[i]);
@@ -89,13 +85,13 @@ void InputMonitor::bind(const RoleBinding& binding) {
   row.minimum = binding.minimum - spare;
   row.maximum = binding.maximum + spare;
   if (binding.period_ms) {
-    row.period = static_cast<Duration>(*binding.period_ms * static_cast<double>(kMillisecond));
+    row.period = Duration::of_ms(*binding.period_ms);
   }
   const double step = binding.codec.physical(1) - binding.codec.physical(0);
   row.gate = SpikeGate(std::abs(binding.factor * step));
   row.course = ValueCourse(std::abs(binding.factor * step),
                            role_dimension(binding.role) == can::Dimension::kAngularSpeed);
-  row.delay = static_cast<Duration>(binding.delay_ms * static_cast<double>(kMillisecond));
+  row.delay = Duration::of_ms(binding.delay_ms);
   row.learns = !row.period;
   row.by_group = binding.sources.any();
   constexpr std::uint8_t kNullAddress = 0xFE;  // what a DBC writes for "any source"
@@ -307,7 +303,8 @@ bool InputMonitor::is_frozen(Motion& motion, const Row& row, const Row& other,
 double InputMonitor::moved_since(Role role, MonoTime t) const noexcept {
   const Row& from = row(role);
   double then = 0.0;
-  if (from.quality != SignalQuality::kValid || !from.history.value_at(t, 0, then)) return 0.0;
+  if (from.quality != SignalQuality::kValid || !from.history.value_at(t, Duration{}, then))
+    return 0.0;
   const double moved = from.history.newest_value() - then;
   const double spare = kOtherDeviations * from.course.noise() + from.course.resolution();
   return std::copysign(std::max(0.0, std::abs(moved) - spare), moved);
@@ -321,7 +318,7 @@ double InputMonitor::should_have_moved(Role role, MonoTime t) const noexcept {
   const MonoTime since = row(role).course.since();
   if (role == Role::kSecondaryPressure) {
     const Duration asked = t - watch_.answer - std::max(since, watch_.request_begun);
-    return watch_.fall_Pa_per_s * seconds(std::max<Duration>(0, asked));
+    return watch_.fall_Pa_per_s * seconds(std::max(Duration{}, asked));
   }
   if (role == Role::kEngineSpeed) return std::abs(moved_since(Role::kPrimarySpeed, since));
   const double ratio = secondary.course.value() / primary.course.value();

@@ -14,7 +14,7 @@ constexpr Duration kUsableAgain = FaultSet::kHold;
 }  // namespace
 
 Duration sample_period(const Config& config) noexcept {
-  return std::llround(static_cast<double>(kSecond) / config.estimator.sample_rate_hz);
+  return period_of(config.estimator.sample_rate_hz);
 }
 
 InputStage::InputStage(const Config& config)
@@ -84,7 +84,7 @@ bool InputStage::lockup_closed() const noexcept {
 }
 
 bool InputStage::starved(MonoTime t) const noexcept {
-  const Duration slowest = std::max(sampler_.delay().value_or(0), sample_period_);
+  const Duration slowest = std::max(sampler_.delay().value_or(Duration{}), sample_period_);
   return t - last_usable_ > InputMonitor::stale_after(slowest);
 }
 
@@ -110,13 +110,13 @@ Stop InputStage::missing_condition() const noexcept {
 }
 
 Duration InputStage::slowest_stale() const noexcept {
-  Duration slowest = 0;
+  Duration slowest{};
   for (std::size_t i = 0; i < kRoleCount; ++i) {
     const auto role = static_cast<Role>(i);
     const bool idle = role == Role::kOilTemperature || role == Role::kVehicleSpeed ||
                       role == Role::kSecondaryPressure;
     if (idle || !monitor_.is_bound(role)) continue;
-    slowest = std::max(slowest, monitor_.period(role).value_or(0));
+    slowest = std::max(slowest, monitor_.period(role).value_or(Duration{}));
   }
   return InputMonitor::stale_after(slowest);
 }

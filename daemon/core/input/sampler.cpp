@@ -8,7 +8,7 @@ Sampler::Sampler(const InputMonitor& inputs, bool torque_is_engine)
     : inputs_(inputs), torque_(torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque) {}
 
 void Sampler::settle() noexcept {
-  Duration delay = 0;
+  Duration delay{};
   for (const Role role : inputs_.required()) {
     const std::optional<Duration> period = inputs_.period(role);
     if (!period) return;
@@ -20,10 +20,10 @@ void Sampler::settle() noexcept {
 }
 
 bool Sampler::read(Role role, MonoTime t, double& value) const noexcept {
-  constexpr Duration kReachPeriods = 2;
+  constexpr int kReachPeriods = 2;
   const Duration delay = inputs_.delay(role);
   const Duration reach =
-      kReachPeriods * inputs_.period(role).value_or(0) + std::max<Duration>(0, delay);
+      kReachPeriods * inputs_.period(role).value_or(Duration{}) + std::max(Duration{}, delay);
   return inputs_.history(role).value_at(t + delay, reach, value);
 }
 
@@ -33,7 +33,7 @@ const estimator::VariatorSample& Sampler::sample(MonoTime t, bool may_settle) no
   if (!delay_ || !inputs_.all_valid()) return sample_;
   const MonoTime at = t - *delay_;
   estimator::VariatorSample next;
-  next.t_ns = at;
+  next.t_ns = at.ns();
   next.usable = read(Role::kPrimarySpeed, at, next.omega_p_rad_s) &&
                 read(Role::kSecondarySpeed, at, next.omega_s_rad_s) &&
                 read(Role::kSecondaryPressure, at, next.secondary_pressure_Pa) &&

@@ -35,7 +35,7 @@ class Sampler {
   const InputMonitor& inputs_;
   Role torque_;
   std::optional<Duration> delay_;
-  MonoTime last_ = std::numeric_limits<MonoTime>::min();  // instant of the last usable sample
+  MonoTime last_ = MonoTime::min();  // instant of the last usable sample
   estimator::VariatorSample sample_;
 };
 

@@ -29,8 +29,7 @@ bool SignalHistory::value_at(MonoTime t, Duration reach, double& value) const no
       const Point& before = at(age);
       if (before.t > t) continue;
       const Point& after = at(age - 1);
-      const double share =
-          static_cast<double>(t - before.t) / static_cast<double>(after.t - before.t);
+      const double share = fraction(t - before.t, after.t - before.t);
       value = before.value + share * (after.value - before.value);
       return true;
     }
@@ -42,20 +41,20 @@ bool SignalHistory::value_at(MonoTime t, Duration reach, double& value) const no
   }
   const std::size_t count = std::min(size_, kLine);
   if (count < 2) return false;
-  const double span = static_cast<double>(last.t - at(count - 1).t);
+  const Duration span = last.t - at(count - 1).t;
   // Stamps relative to the newest, in units of the time they span.
   double mean_x = 0.0;
   for (std::size_t age = 0; age < count; ++age) {
-    mean_x += static_cast<double>(at(age).t - last.t) / span;
+    mean_x += fraction(at(age).t - last.t, span);
   }
   mean_x /= static_cast<double>(count);
   double xx = 0.0, xy = 0.0;
   for (std::size_t age = 0; age < count; ++age) {
-    const double x = static_cast<double>(at(age).t - last.t) / span - mean_x;
+    const double x = fraction(at(age).t - last.t, span) - mean_x;
     xx += x * x;
     xy += x * (at(age).value - last.value);  // any constant: the x add up to nothing
   }
-  const double ahead = static_cast<double>(std::min(t - last.t, reach)) / span;
+  const double ahead = fraction(std::min(t - last.t, reach), span);
   value = last.value + xy / xx * std::min(ahead, kAheadMaximum);
   return true;
 }

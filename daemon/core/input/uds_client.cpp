@@ -30,8 +30,7 @@ void UdsClient::add(const RoleBinding& role, const UdsSource& source) {
     return each.service == source.service && each.identifier == source.identifier;
   });
   // Without a period there is no polling; the configuration sees to that.
-  const auto period = static_cast<Duration>(role.period_ms.value_or(kPauseLongest / kMillisecond) *
-                                            static_cast<double>(kMillisecond));
+  const auto period = role.period_ms ? Duration::of_ms(*role.period_ms) : kPauseLongest;
   if (item == items_end) {
     ++ecu->item_count;
     item->service = source.service;
@@ -61,7 +60,7 @@ bool UdsClient::on_frame(const RxFrame& frame, UdsReading& reading) noexcept {
     ecu->flow_due = false;
     return false;
   }
-  switch (ecu->receiver.on_frame(frame.t, frame.frame)) {
+  switch (ecu->receiver.on_frame(frame.t.ns(), frame.frame)) {
     case Event::kMessage:
       take_message(*ecu, frame.t, reading);
       break;
@@ -110,7 +109,7 @@ void UdsClient::take_message(Ecu& ecu, MonoTime t, UdsReading& reading) noexcept
         return;
       }
       fail(ecu, t,
-           can::uds_refusal(reply.code) == can::UdsRefusal::kEver ? kPauseRefused : Duration{0});
+           can::uds_refusal(reply.code) == can::UdsRefusal::kEver ? kPauseRefused : Duration{});
       return;
     case UdsReply::Kind::kOther:
       return;
@@ -132,13 +131,13 @@ bool UdsClient::take_data(std::uint16_t identifier, std::span<const std::uint8_t
   rest_ = {};
   if (item == end) return false;
   ++counters_.answers;
-  item->pause = 0;
+  item->pause = {};
   const auto asked = ecu.asked_items();
   if (std::find(asked.begin(), asked.end(), &*item) != asked.end()) ecu.asked_count = 0;
   const std::size_t size =
       item->bytes == 0 ? data.size() : std::min<std::size_t>(item->bytes, data.size());
   rest_ = data.subspan(size);
-  reading = {ecu.receiver.first_ns(), item->role_list(), data.first(size)};
+  reading = {MonoTime::of_ns(ecu.receiver.first_ns()), item->role_list(), data.first(size)};
   return true;
 }
 
@@ -182,7 +181,7 @@ void UdsClient::step(Ecu& ecu, MonoTime t, bool up, Outbox& outbox) noexcept {
   if (!started_) {
     for (std::size_t i = 0; i < ecu.item_count; ++i) ecu.items[i].due = t;
   }
-  if (ecu.receiver.expire(t)) ++counters_.broken;
+  if (ecu.receiver.expire(t.ns())) ++counters_.broken;
   if (!polls_) return;
   if (ecu.is_asked() && !up) unsent(ecu, t);
   // A long answer has its own time-out from frame to frame, but not for ever.
@@ -190,7 +189,7 @@ void UdsClient::step(Ecu& ecu, MonoTime t, bool up, Outbox& outbox) noexcept {
   if (ecu.is_asked() && late) {
     ++counters_.timeouts;
     ecu.receiver.reset();
-    fail(ecu, t, 0);
+    fail(ecu, t, {});
   }
   if (ecu.flow_due) {
     outbox.push(can::iso_tp_flow_control(ecu.request, ecu.flow), ecu.bus);
@@ -219,7 +218,7 @@ void UdsClient::ask(Ecu& ecu, MonoTime t, Outbox& outbox) noexcept {
   for (auto other = ecu.items.begin(); together && other != end; ++other) {
     if (ecu.asked_count == can::identifiers_most(service)) break;
     if (other == item || other->service != service || other->bytes == 0) continue;
-    if (other->pause == 0 && other->due <= t + other->period / 4) take(*other);
+    if (other->pause == Duration{} && other->due <= t + other->period / 4) take(*other);
   }
   const can::UdsRequest request =
       can::uds_read_request(service, {identifiers.data(), ecu.asked_count});

@@ -33,7 +33,7 @@ namespace beltgrip::daemon {
 
 // The data of one identifier, and the roles whose value it holds. Valid until the next frame.
 struct UdsReading {
-  MonoTime t = 0;
+  MonoTime t{};
   std::span<const Role> roles;
   std::span<const std::uint8_t> data;
 };
@@ -78,9 +78,9 @@ class UdsClient {
     std::uint16_t bytes = 0;  // of data; 0: not known
     std::array<Role, kRoleCount> roles{};
     std::uint8_t role_count = 0;
-    Duration period = 0;
-    Duration pause = 0;  // after a failure; 0: all is well
-    MonoTime due = 0;
+    Duration period{};
+    Duration pause{};  // after a failure; 0: all is well
+    MonoTime due{};
     std::span<const Role> role_list() const noexcept { return {roles.data(), role_count}; }
   };
   struct Ecu {
@@ -94,9 +94,9 @@ class UdsClient {
     bool alone = false;  // refuses several at once
     bool is_asked() const noexcept { return asked_count > 0; }
     std::span<Item* const> asked_items() const noexcept { return {asked.data(), asked_count}; }
-    MonoTime asked_at = 0;
-    MonoTime give_up_at = 0;
-    MonoTime quiet_until = std::numeric_limits<MonoTime>::min();  // another tester is there
+    MonoTime asked_at{};
+    MonoTime give_up_at{};
+    MonoTime quiet_until = MonoTime::min();  // another tester is there
     bool flow_due = false;
     bool flow_sent = false;  // for this request
     can::FlowStatus flow = can::FlowStatus::kContinue;

@@ -59,7 +59,7 @@ void ValueCourse::close_run(MonoTime t, double value) noexcept {
   }
   if (t - span_ >= kSpan) {
     longest_before_ = longest_;
-    longest_ = 0;
+    longest_ = {};
     span_ = t;
   }
   longest_ = std::max(longest_, newest_ - since_);
@@ -151,23 +151,23 @@ std::optional<Duration> ValueCourse::shown_after(Duration period) const noexcept
   if (known_ < kEnough) return std::nullopt;
   const double sigma = noise();
   constexpr double kNotAtAll = 1e18;
-  double by_motion = kNotAtAll, by_noise = kNotAtAll;
+  double by_motion_ns = kNotAtAll, by_noise_ns = kNotAtAll;
   if (const double slope = has_inertia_ ? slope_per_s() : 0.0; slope > 0.0) {
     const double after_s = moving(sigma) / slope;
     if (after_s < seconds(kSlopeOver)) {
-      by_motion =
-          std::max(after_s * double{kSecond}, kTimesHeld * static_cast<double>(usual_hold()));
+      by_motion_ns = std::max(after_s * 1e9, kTimesHeld * static_cast<double>(usual_hold().ns()));
     }
   }
   if (sigma > 0.0) {
     const double values = kNever / evidence(0.0, kNoiseLeast * sigma);
-    by_noise = std::max(values * static_cast<double>(period),
-                        (has_inertia_ ? kTimesLongest : kTimesLongestRest) *
-                            static_cast<double>(std::max(longest_, longest_before_)));
+    by_noise_ns = std::max(values * static_cast<double>(period.ns()),
+                           (has_inertia_ ? kTimesLongest : kTimesLongestRest) *
+                               static_cast<double>(std::max(longest_, longest_before_).ns()));
   }
-  const double after = std::min(by_motion, by_noise);
-  if (after >= kNotAtAll) return std::nullopt;
-  return std::max({static_cast<Duration>(after), kShortest, kFewest * period});
+  const double after_ns = std::min(by_motion_ns, by_noise_ns);
+  if (after_ns >= kNotAtAll) return std::nullopt;
+  return std::max(
+      {Duration::of_ns(static_cast<std::int64_t>(after_ns)), kShortest, kFewest * period});
 }
 
 bool ValueCourse::rests() const noexcept {
@@ -181,7 +181,7 @@ bool ValueCourse::stands_still(double moved, bool goes_on) const noexcept {
   const double stood_s = seconds(std::min(stood, kSlopeOver));
   const double most = std::max(moved, goes_on && has_inertia_ ? slope_per_s() * stood_s : 0.0);
   const auto times = [stood](Duration duration) {
-    return static_cast<double>(stood) / static_cast<double>(std::max<Duration>(duration, 1));
+    return fraction(stood, std::max(duration, kNanosecond));
   };
   if (most > moving(sigma) && times(usual_hold()) > kTimesHeld) {
     return true;

@@ -48,7 +48,7 @@ class ValueCourse {
 
  private:
   struct Point {
-    MonoTime t = 0;
+    MonoTime t{};
     double value = 0.0;
   };
   static constexpr std::size_t kPoints = 32;
@@ -67,19 +67,19 @@ class ValueCourse {
   bool has_inertia_ = false;
   std::array<Point, kPoints> points_{};  // where runs began
   std::size_t count_ = 0;
-  MonoTime since_ = 0, newest_ = 0;
+  MonoTime since_{}, newest_{};
   double value_ = 0.0;
-  double change_ = 0.0;          // with which the run began
-  long run_ = 0;                 // values equal to the first of the run, beside it
-  long since_wide_ = kNarrow;    // values since a change by more than one step
-  double resolution_ = 0.0;      // 0: not known
-  double turns_ = 0.0;           // mean of - d_k d_k+1
-  double drift_ = 0.0;           // mean of the last d_k; 0 without inertia
-  double scatter_ = 0.0;         // mean of |d_k - drift|
-  double known_ = 0.0;           // values that it rests on
-  MonoTime span_ = 0;            // begin of the present span of kSpan
-  Duration longest_ = 0;         // run in it,
-  Duration longest_before_ = 0;  // and in the one before
+  double change_ = 0.0;        // with which the run began
+  long run_ = 0;               // values equal to the first of the run, beside it
+  long since_wide_ = kNarrow;  // values since a change by more than one step
+  double resolution_ = 0.0;    // 0: not known
+  double turns_ = 0.0;         // mean of - d_k d_k+1
+  double drift_ = 0.0;         // mean of the last d_k; 0 without inertia
+  double scatter_ = 0.0;       // mean of |d_k - drift|
+  double known_ = 0.0;         // values that it rests on
+  MonoTime span_{};            // begin of the present span of kSpan
+  Duration longest_{};         // run in it,
+  Duration longest_before_{};  // and in the one before
 };
 
 }  // namespace beltgrip::daemon

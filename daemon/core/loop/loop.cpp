@@ -26,7 +26,7 @@ class Loop {
         meters_(meters),
         tap_(tap),
         exchange_(exchange),
-        period_(std::llround(static_cast<double>(kSecond) / sample_rate_hz)),
+        period_(period_of(sample_rate_hz)),
         next_(port.now()),
         buses_(static_cast<std::uint8_t>(pipeline.bus_count())) {
     if (tap_ != nullptr) tap_->start(next_);
@@ -55,7 +55,7 @@ class Loop {
     const std::size_t count = port_.receive(frames_);
     // A port that announces frames and has none must not keep the samples from their turn.
     if (count == 0 && port_.now() >= next_) sample();
-    const MonoTime taken = meters_ != nullptr ? port_.now() : 0;
+    const MonoTime taken = meters_ != nullptr ? port_.now() : MonoTime{};
     for (std::size_t i = 0; i < count; ++i) {
       if (meters_ != nullptr) meters_->frame_age.add(taken - frames_[i].t);
       // A frame that came after a sample's instant is not seen by that sample, however late it is.
@@ -178,13 +178,13 @@ class Loop {
   Exchange exchange_;
   Duration period_;
   MonoTime next_;
-  MonoTime due_ = 0;                            // of the sample under way, before any were given up
+  MonoTime due_{};                              // of the sample under way, before any were given up
   std::array<BusState, kBusMax> bus_states_{};  // kActive
   std::uint8_t buses_;
   LoopCounters counters_;
   Pulse pulse_;               // of the last sample
   MonoTime changed_ = next_;  // when it became so, or a frame came
-  MonoTime reload_from_ = 0;
+  MonoTime reload_from_{};
   Outbox outbox_;
   std::array<RxFrame, kBatch> frames_{};
 };

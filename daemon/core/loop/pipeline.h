@@ -27,7 +27,7 @@ struct SignalObservation {
   SignalQuality quality = SignalQuality::kUnbound;
   bool seen = false;
   double value = 0.0;  // SI
-  MonoTime t = 0;      // its stamp
+  MonoTime t{};        // its stamp
 };
 
 struct PipelineCounters {

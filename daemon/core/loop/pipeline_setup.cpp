@@ -17,7 +17,7 @@ SafetyLimits safety_limits(const Config& config) {
   limits.centrifugal_N_s2 = config.variator.secondary_centrifugal_N_s2;
   limits.floor_force_N =
       config.variator.secondary_piston_area_m2 * config.experiment.secondary_pressure_floor_Pa;
-  limits.pause_min = std::llround(config.experiment.cooldown_s * static_cast<double>(kSecond));
+  limits.pause_min = Duration::of_ns(std::llround(config.experiment.cooldown_s * 1e9));
   return limits;
 }
 

@@ -5,7 +5,7 @@ namespace beltgrip::daemon {
 void RecordTap::frame(const RxFrame& frame) noexcept {
   if (frame.t <= sampled_ && after_ != sampled_) {
     after_ = sampled_;
-    push({.t = sampled_ + 1, .kind = RecordKind::kAfter});
+    push({.t = sampled_ + kNanosecond, .kind = RecordKind::kAfter});
   }
   push({.t = frame.t, .kind = RecordKind::kFrame, .frame = frame});
 }

@@ -28,8 +28,8 @@ enum class RecordKind : std::uint8_t {
 };
 
 struct RecordItem {
-  MonoTime t = 0;
-  MonoTime now = 0;
+  MonoTime t{};
+  MonoTime now{};
   RecordKind kind = RecordKind::kMark;
   bool in_experiment = false;
   std::uint8_t bus = 0;
@@ -65,15 +65,15 @@ class RecordTap {
   void sampled(const SampleReport& report) noexcept;
   void reloaded(MonoTime t) noexcept { push({.t = t, .kind = RecordKind::kReload}); }
   void end(MonoTime now) noexcept {
-    push({.t = sampled_ + 1, .now = now, .kind = RecordKind::kEnd});
+    push({.t = sampled_ + kNanosecond, .now = now, .kind = RecordKind::kEnd});
   }
 
  private:
   void push(const RecordItem& item) noexcept { rings_.items.push(item); }
 
   RecordRings& rings_;
-  MonoTime sampled_ = 0;  // the newest sample
-  MonoTime after_ = 0;    // the newest kAfter
+  MonoTime sampled_{};  // the newest sample
+  MonoTime after_{};    // the newest kAfter
   bool in_experiment_ = false;
   std::uint32_t faults_ = 0;
   int left_ = 0;

@@ -13,7 +13,7 @@
 namespace beltgrip::daemon {
 
 struct SampleReport {
-  MonoTime t = 0;
+  MonoTime t{};
   State state = State::kInhibited;
   bool in_experiment = false;
   bool macro_slip_stop = false;

@@ -16,7 +16,7 @@ namespace beltgrip::daemon {
 
 namespace {
 
-constexpr double kWindow_s = static_cast<double>(CarriedWatch::kWindow) / double{kSecond};
+constexpr double kWindow_s = seconds(CarriedWatch::kWindow);
 
 std::string format(const char* pattern, auto... values) {
   std::array<char, 256> text;

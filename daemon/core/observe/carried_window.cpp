@@ -85,7 +85,7 @@ bool CarriedWatch::end_block(const SampleReport& report) noexcept {
       halves_[1].sigma_percent / halves_[1].samples - halves_[0].sigma_percent / halves_[0].samples;
   Sums all = halves_[0];
   all.add(halves_[1]);
-  constexpr double kBetween_s = static_cast<double>(kWindow - kBlock) / double{kSecond};
+  constexpr double kBetween_s = seconds(kWindow - kBlock);
   window_.end = report.t;
   window_.mu_star_held = lowest_;
   window_.mu_star = all.mu_star / all.samples;

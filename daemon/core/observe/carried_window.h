@@ -18,7 +18,7 @@
 namespace beltgrip::daemon {
 
 struct CarriedWindow {
-  MonoTime end = 0;
+  MonoTime end{};
   estimator::Direction direction = estimator::Direction::kDrive;
   estimator::EndStop end_stop = estimator::EndStop::kOverdrive;
   double mu_star_held = 0.0;  // the lowest of its means
@@ -46,7 +46,7 @@ class CarriedWatch {
   static constexpr Duration kBlock = 100 * kMillisecond;
   // Chosen: an hour has 1,800 windows; noise lifts one of them in 600 h of steady driving.
   static constexpr std::size_t kBlocks = 20;
-  static constexpr Duration kWindow = kBlock * static_cast<Duration>(kBlocks);
+  static constexpr Duration kWindow = kBlock * kBlocks;
   // Chosen: slip that the second half of a window may have more than the first; a belt that lets go
   // gains its peak's 2 % in less than a second, creep under a torque that rises by half gains 0.2.
   static constexpr double kSlipGrowth_percent = 0.25;
@@ -68,9 +68,9 @@ class CarriedWatch {
   bool commands_;
   bool runs_ = false;
   bool lowered_ = false;
-  MonoTime last_ = 0;         // sample
-  MonoTime block_since_ = 0;  // first sample of the block
-  std::size_t blocks_ = 0;    // complete
+  MonoTime last_{};         // sample
+  MonoTime block_since_{};  // first sample of the block
+  std::size_t blocks_ = 0;  // complete
   Sums block_, halves_[2];
   double lowest_ = 0.0;
   double omega_p_first_rad_s_ = 0.0;  // mean of the first block

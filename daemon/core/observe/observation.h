@@ -13,7 +13,7 @@
 namespace beltgrip::daemon {
 
 struct Observation {
-  MonoTime t = 0;
+  MonoTime t{};
   SampleReport report;
   PipelineCounters pipeline;
   LoopMeters loop;

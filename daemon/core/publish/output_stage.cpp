@@ -28,7 +28,7 @@ PollLimits poll_limits(const Config& config) {
   if (config.diagnostics != Diagnostics::kPoll) return limits;
   for (const RoleBinding& role : config.roles) {
     if (!role.uds || !role.period_ms) continue;
-    const auto period = static_cast<Duration>(*role.period_ms * static_cast<double>(kMillisecond));
+    const auto period = Duration::of_ms(*role.period_ms);
     const auto end = limits.requests.begin() + static_cast<std::ptrdiff_t>(limits.size);
     const auto same = std::find_if(limits.requests.begin(), end, [&](const auto& each) {
       return each.bus == role.bus && each.id == role.uds->request &&

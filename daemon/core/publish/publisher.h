@@ -50,7 +50,7 @@ class Publisher {
 
  private:
   struct Schedule {
-    MonoTime next = 0;
+    MonoTime next{};
     std::uint8_t counter = 0;
   };
   // True if the message leaves at t; moves its schedule on.

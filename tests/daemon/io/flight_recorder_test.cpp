@@ -32,11 +32,12 @@ namespace fs = std::filesystem;
 class RoughPort final : public Port {
  public:
   RoughPort(std::vector<can::StampedFrame> frames, std::uint32_t seed) : random_(seed) {
-    now_ = frames.front().t_ns;
-    for (const can::StampedFrame& each : frames) queue_.emplace(each.t_ns, RxFrame{});
+    now_ = MonoTime::of_ns(frames.front().t_ns);
+    for (const can::StampedFrame& each : frames)
+      queue_.emplace(MonoTime::of_ns(each.t_ns), RxFrame{});
     auto place = queue_.begin();
     for (const can::StampedFrame& each : frames) {
-      place->second.t = each.t_ns;
+      place->second.t = MonoTime::of_ns(each.t_ns);
       place->second.frame = each.frame;
       place->second.bus = each.bus;
       buses_ = std::max(buses_, std::size_t{each.bus} + 1);
@@ -45,7 +46,7 @@ class RoughPort final : public Port {
     // What comes to the program later than its stamp says.
     for (auto each = queue_.begin(); each != queue_.end();) {
       auto node = queue_.extract(each++);
-      if (chance(0.01)) node.key() += 3 * kMillisecond + 1;
+      if (chance(0.01)) node.key() += 3 * kMillisecond + kNanosecond;
       if (chance(0.002)) node.mapped().dropped_before = 3;
       later_.insert(std::move(node));
     }
@@ -59,8 +60,8 @@ class RoughPort final : public Port {
       now_ = std::max(now_, queue_.begin()->first);
       return Wake::kFrames;
     }
-    now_ = std::max(now_, deadline + 50'000);
-    if (chance(0.01)) now_ += static_cast<MonoTime>(random_() % 20) * kMillisecond;
+    now_ = std::max(now_, deadline + 50 * kMicrosecond);
+    if (chance(0.01)) now_ += random_() % 20 * kMillisecond;
     if (chance(0.001)) now_ += 80 * kMillisecond;
     for (std::size_t i = 0; i < buses_; ++i) {
       if (!chance(0.003)) continue;
@@ -80,7 +81,9 @@ class RoughPort final : public Port {
   SendResult send_on(std::uint8_t bus, const can::CanFrame& frame) noexcept override {
     if (chance(0.01)) return chance(0.5) ? SendResult::kFull : SendResult::kDown;
     sent.push_back({now_, frame, bus});
-    if (!chance(0.05)) queue_.emplace(now_ + 100'000, RxFrame{now_ + 90'000, frame, true, 0, bus});
+    if (!chance(0.05))
+      queue_.emplace(now_ + 100 * kMicrosecond,
+                     RxFrame{now_ + 90 * kMicrosecond, frame, true, 0, bus});
     return SendResult::kSent;
   }
   BusState bus_state() noexcept override { return states_[0]; }
@@ -93,7 +96,7 @@ class RoughPort final : public Port {
 
   std::mt19937 random_;
   std::multimap<MonoTime, RxFrame> queue_, later_;  // by when it comes
-  MonoTime now_ = 0;
+  MonoTime now_{};
   std::size_t buses_ = 1;
   std::array<BusState, kBusMax> states_{};  // kActive
 };
@@ -204,7 +207,7 @@ TEST_P(Rough, RunIsDecidedAgainByteByByte) {
   EXPECT_EQ(port.stats().lines_bad, 0U);
   ASSERT_EQ(replayed.reports.size(), reports.reports.size());
   for (std::size_t i = 0; i < reports.reports.size(); ++i) {
-    ASSERT_EQ(replayed.reports[i].t - kWallOffset_ns, reports.reports[i].t) << i;
+    ASSERT_EQ(replayed.reports[i].t - Duration::of_ns(kWallOffset_ns), reports.reports[i].t) << i;
     ASSERT_EQ(bytes(replayed.reports[i]), bytes(reports.reports[i])) << i;
   }
   ASSERT_EQ(sent.size(), live.sent.size());
@@ -220,7 +223,7 @@ INSTANTIATE_TEST_SUITE_P(, Rough, testing::Combine(testing::Range(1U, 9U), testi
 
 // Seconds of frames, and a fault from `fault_s` on, through the rings.
 void feed(RecordRings& rings, double seconds, double fault_s, double experiment_s = -1.0,
-          MonoTime start = kSecond) {
+          MonoTime start = MonoTime{kSecond}) {
   RecordTap tap(rings);
   tap.start(start);
   SampleReport report;
@@ -246,7 +249,7 @@ std::pair<double, double> span_of(const fs::path& path) {
   can::LogRecord record;
   std::pair<double, double> span{-1, -1};
   while (log->next(record)) {
-    const double t_s = static_cast<double>(record.t_ns - kSecond) * 1e-9;
+    const double t_s = static_cast<double>(record.t_ns - kSecond.ns()) * 1e-9;
     if (span.first < 0) span.first = t_s;
     span.second = t_s;
   }
@@ -294,7 +297,7 @@ TEST_F(Recorded, TheFolderStaysWithinItsSizeAndTheOldestGo) {
   std::size_t named = 0;
   std::string oldest;
   for (int round = 0; round < 3; ++round) {
-    feed(rings, 30, 0, -1, (1 + 40 * round) * kSecond);
+    feed(rings, 30, 0, -1, MonoTime{(1 + 40 * round) * kSecond});
     while (named < static_cast<std::size_t>(round + 1) * 2) {
       for (const auto& message : recorder.take_messages()) {
         EXPECT_FALSE(message.warning) << message.line;
@@ -352,7 +355,7 @@ TEST_F(Recorded, ADiskThatIsFullIsOneWarningUntilItIsNot) {
   // A minute later on the loop's clock.
   RecordTap tap(rings);
   SampleReport report;
-  report.t = 100 * kSecond;
+  report.t = MonoTime{100 * kSecond};
   report.in_experiment = true;
   tap.sampled(report);
   report.t += kSecond;

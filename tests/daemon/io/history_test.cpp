@@ -30,8 +30,8 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 ExperimentResult result(double mu, int number = 0) {
   ExperimentResult each;
-  each.start = 1'000'000'000;
-  each.end = 13'500'000'000;
+  each.start = MonoTime{kSecond};
+  each.end = MonoTime{13'500 * kMillisecond};
   each.stopped = true;
   each.outcome = Outcome::kCompleted;
   each.stop_reason = estimator::StopReason::kSlope;

@@ -21,11 +21,11 @@ can::CanFrame numbered(std::uint32_t number) {
 TEST(InprocBus, VirtualTimePassesOnlyWhileAllWait) {
   const auto bus = InprocBus::create(InprocBus::Clock::kVirtual);
   const auto port = bus->connect();
-  EXPECT_EQ(port->now(), 0);
-  EXPECT_EQ(port->wait_until(3 * kSecond), Wake::kDeadline);
-  EXPECT_EQ(port->now(), 3 * kSecond);
-  EXPECT_EQ(port->wait_until(kSecond), Wake::kDeadline);  // has been
-  EXPECT_EQ(port->now(), 3 * kSecond);
+  EXPECT_EQ(port->now(), MonoTime{});
+  EXPECT_EQ(port->wait_until(MonoTime{3 * kSecond}), Wake::kDeadline);
+  EXPECT_EQ(port->now(), MonoTime{3 * kSecond});
+  EXPECT_EQ(port->wait_until(MonoTime{kSecond}), Wake::kDeadline);  // has been
+  EXPECT_EQ(port->now(), MonoTime{3 * kSecond});
   EXPECT_EQ(port->wait_until(InprocBus::kNever), Wake::kClosed);  // nobody is left to send
 }
 
@@ -59,7 +59,7 @@ TEST(InprocBus, FramesReachAllWithTheirInstantAndTheirSenderAsEcho) {
   };
   for (std::uint32_t i = 0; i < 100; ++i) {
     take_echoes();
-    sender->wait_until(MonoTime{i / 5} * kMillisecond);  // five at an instant
+    sender->wait_until(MonoTime{i / 5 * kMillisecond});  // five at an instant
     EXPECT_EQ(sender->send(numbered(i)), SendResult::kSent);
   }
   take_echoes();
@@ -69,7 +69,7 @@ TEST(InprocBus, FramesReachAllWithTheirInstantAndTheirSenderAsEcho) {
   for (const auto& times : seen) {
     ASSERT_EQ(times.size(), 100U);
     for (std::size_t i = 0; i < times.size(); ++i) {
-      EXPECT_EQ(times[i], static_cast<MonoTime>(i / 5) * kMillisecond);
+      EXPECT_EQ(times[i], MonoTime{i / 5 * kMillisecond});
     }
   }
 }
@@ -83,14 +83,14 @@ TEST(InprocBus, AtTheSameInstantTheLaterConnectedRunsFirst) {
     for (std::uint32_t i = 1; i <= 50; ++i) {
       std::array<RxFrame, 4> echoes;
       second->receive(echoes);
-      second->wait_until(MonoTime{i} * 5 * kMillisecond);
+      second->wait_until(MonoTime{i * 5 * kMillisecond});
       second->send(numbered(i));
     }
     second.reset();
   });
   std::array<RxFrame, 4> batch;
   for (std::uint32_t i = 1; i <= 50; ++i) {
-    const MonoTime deadline = MonoTime{i} * 5 * kMillisecond;
+    const MonoTime deadline{i * 5 * kMillisecond};
     EXPECT_EQ(first->wait_until(deadline), Wake::kFrames);
     EXPECT_EQ(first->receive(batch), 1U);
     EXPECT_EQ(batch[0].t, deadline);

@@ -55,13 +55,13 @@ Observation after(std::uint64_t samples) {
 
 TEST_F(Notify, ReadyOnlyOnceTheLoopHasSampled) {
   ServiceNotify notify;
-  notify.turn(0, nullptr);
+  notify.turn(MonoTime{}, nullptr);
   EXPECT_EQ(heard(), "");
   const Observation none = after(0);
-  notify.turn(1, &none);
+  notify.turn(MonoTime::of_ns(1), &none);
   EXPECT_EQ(heard(), "");
   const Observation one = after(1);
-  notify.turn(2, &one);
+  notify.turn(MonoTime::of_ns(2), &one);
   EXPECT_EQ(heard(), "READY=1\nSTATUS=Inhibited, no result yet\nWATCHDOG=1\n");
   EXPECT_EQ(heard(), "");
 }
@@ -69,20 +69,20 @@ TEST_F(Notify, ReadyOnlyOnceTheLoopHasSampled) {
 TEST_F(Notify, TheWatchdogIsFedWhileTheLoopGoesOnAndNotOtherwise) {
   ServiceNotify notify;
   const Observation first = after(1);
-  notify.turn(0, &first);
+  notify.turn(MonoTime{}, &first);
   heard();
   const Observation second = after(100);
-  notify.turn(499 * kMillisecond, &second);
+  notify.turn(MonoTime{499 * kMillisecond}, &second);
   EXPECT_EQ(heard(), "") << "four times in its two seconds are enough";
-  notify.turn(500 * kMillisecond, &second);
+  notify.turn(MonoTime{500 * kMillisecond}, &second);
   EXPECT_EQ(heard(), "WATCHDOG=1\n");
   // The helper lives on, the loop does not.
   for (int turn = 1; turn <= 200; ++turn) {
-    notify.turn((500 + 20 * turn) * kMillisecond, &second);
+    notify.turn(MonoTime{(500 + 20 * turn) * kMillisecond}, &second);
     ASSERT_EQ(heard(), "") << turn;
   }
   const Observation third = after(101);
-  notify.turn(5 * kSecond, &third);
+  notify.turn(MonoTime{5 * kSecond}, &third);
   EXPECT_EQ(heard(), "WATCHDOG=1\n");
 }
 
@@ -90,7 +90,7 @@ TEST_F(Notify, WithoutAWatchdogNothingIsFed) {
   unsetenv("WATCHDOG_USEC");
   ServiceNotify notify;
   const Observation one = after(1);
-  notify.turn(0, &one);
+  notify.turn(MonoTime{}, &one);
   EXPECT_EQ(heard(), "READY=1\nSTATUS=Inhibited, no result yet\n");
 }
 
@@ -98,20 +98,20 @@ TEST_F(Notify, SaysWhenItsStateChangesAndWhenItStops) {
   unsetenv("WATCHDOG_USEC");
   ServiceNotify notify;
   Observation seen = after(1);
-  notify.turn(0, &seen);
+  notify.turn(MonoTime{}, &seen);
   heard();
   seen.report.state = State::kRamping;
   seen.report.faults = fault_bit(Fault::kInputStale) | fault_bit(Fault::kBusDown);
-  notify.turn(1, &seen);
+  notify.turn(MonoTime::of_ns(1), &seen);
   EXPECT_EQ(heard(), "STATUS=Ramping, no result yet, faults InputStale BusDown\n");
   seen.report.faults = 0;
   seen.report.result.peak.kind = estimator::PeakKind::kValue;
   seen.report.result.peak.mu_max = 0.10537;
   seen.report.result.peak.mu_max_std = 0.0002;
-  notify.turn(2, &seen);
+  notify.turn(MonoTime::of_ns(2), &seen);
   EXPECT_EQ(heard(), "STATUS=Ramping, mu_max 0.1054 +- 0.0002\n");
   seen.report.result.peak.kind = estimator::PeakKind::kLowerBound;
-  notify.turn(3, &seen);
+  notify.turn(MonoTime::of_ns(3), &seen);
   EXPECT_EQ(heard(), "STATUS=Ramping, mu_max above 0.1054\n");
   notify.stopping();
   EXPECT_EQ(heard(), "STOPPING=1\nSTATUS=stopping");
@@ -121,7 +121,7 @@ TEST(NoManager, IsNoTrouble) {
   unsetenv("NOTIFY_SOCKET");
   ServiceNotify notify;
   const Observation one = after(1);
-  EXPECT_NO_THROW(notify.turn(0, &one));
+  EXPECT_NO_THROW(notify.turn(MonoTime{}, &one));
   EXPECT_NO_THROW(notify.stopping());
 }
 

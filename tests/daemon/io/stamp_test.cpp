@@ -6,41 +6,44 @@
 namespace beltgrip::daemon {
 namespace {
 
-constexpr std::int64_t kWall = 1'700'000'000 * kSecond;
+constexpr Duration kWall = 1'700'000'000 * kSecond;
 
 TEST(StampConverter, AgesAreTakenFromTheWallClock) {
   StampConverter stamps;
-  stamps.read(100 * kSecond, kWall);
-  EXPECT_EQ(stamps.convert(true, kWall - 3 * kMillisecond), 100 * kSecond - 3 * kMillisecond);
-  EXPECT_EQ(stamps.convert(true, kWall), 100 * kSecond);
+  stamps.read(MonoTime{100 * kSecond}, kWall.ns());
+  EXPECT_EQ(stamps.convert(true, (kWall - 3 * kMillisecond).ns()),
+            MonoTime{100 * kSecond - 3 * kMillisecond});
+  EXPECT_EQ(stamps.convert(true, kWall.ns()), MonoTime{100 * kSecond});
 }
 
 TEST(StampConverter, WithoutAStampItIsNow) {
   StampConverter stamps;
-  stamps.read(100 * kSecond, kWall);
-  EXPECT_EQ(stamps.convert(false, 0), 100 * kSecond);
+  stamps.read(MonoTime{100 * kSecond}, kWall.ns());
+  EXPECT_EQ(stamps.convert(false, 0), MonoTime{100 * kSecond});
 }
 
 TEST(StampConverter, AFrameOfAStoppedReaderKeepsItsAge) {
   StampConverter stamps;
-  stamps.read(100 * kSecond, kWall);
-  stamps.read(101 * kSecond, kWall + kSecond);
-  EXPECT_EQ(stamps.convert(true, kWall + 750 * kMillisecond), 100'750 * kMillisecond);
+  stamps.read(MonoTime{100 * kSecond}, kWall.ns());
+  stamps.read(MonoTime{101 * kSecond}, (kWall + kSecond).ns());
+  EXPECT_EQ(stamps.convert(true, (kWall + 750 * kMillisecond).ns()),
+            MonoTime{100'750 * kMillisecond});
 }
 
 // Steps of a second, an hour, to 1970 and to 2106, each between stamp and reading.
 TEST(StampConverter, AStepOfTheWallClockCannotEnter) {
-  for (const std::int64_t step : {kSecond, -kSecond, 3600 * kSecond, -3600 * kSecond, -kWall,
-                                  2'600'000'000 * kSecond, 5 * kMillisecond, -5 * kMillisecond}) {
+  for (const Duration step : {kSecond, -kSecond, 3600 * kSecond, -3600 * kSecond, -kWall,
+                              2'600'000'000 * kSecond, 5 * kMillisecond, -5 * kMillisecond}) {
     StampConverter stamps;
-    MonoTime mono = 100 * kSecond;
-    stamps.read(mono, kWall + mono);
-    MonoTime last = stamps.convert(true, kWall + mono - 1000);
+    MonoTime mono{100 * kSecond};
+    stamps.read(mono, (kWall + mono.since_origin()).ns());
+    MonoTime last = stamps.convert(true, (kWall + mono.since_origin() - kMicrosecond).ns());
     mono += 5 * kMillisecond;
-    stamps.read(mono, kWall + mono + step);
+    stamps.read(mono, (kWall + mono.since_origin() + step).ns());
     // Stamped before the step, and after it.
-    for (const std::int64_t stamp : {kWall + mono - 2000, kWall + mono + step - 1000}) {
-      const MonoTime t = stamps.convert(true, stamp);
+    for (const Duration stamp : {kWall + mono.since_origin() - 2 * kMicrosecond,
+                                 kWall + mono.since_origin() + step - kMicrosecond}) {
+      const MonoTime t = stamps.convert(true, stamp.ns());
       EXPECT_GE(t, last) << step;
       EXPECT_LE(t, mono) << step;
       EXPECT_GE(t, mono - kMillisecond) << step;
@@ -48,17 +51,19 @@ TEST(StampConverter, AStepOfTheWallClockCannotEnter) {
     }
     // And the batch after that is as ever.
     mono += 5 * kMillisecond;
-    stamps.read(mono, kWall + mono + step);
-    EXPECT_EQ(stamps.convert(true, kWall + mono + step - 1000), mono - 1000) << step;
+    stamps.read(mono, (kWall + mono.since_origin() + step).ns());
+    EXPECT_EQ(stamps.convert(true, (kWall + mono.since_origin() + step - kMicrosecond).ns()),
+              mono - kMicrosecond)
+        << step;
   }
 }
 
 TEST(StampConverter, NeverLaterThanNowNeverBackwards) {
   StampConverter stamps;
-  stamps.read(100 * kSecond, kWall);
-  EXPECT_EQ(stamps.convert(true, kWall + kSecond), 100 * kSecond);
-  EXPECT_EQ(stamps.convert(true, kWall - kSecond), 100 * kSecond);
-  EXPECT_EQ(stamps.convert(true, kWall - 10 * kSecond), 100 * kSecond);
+  stamps.read(MonoTime{100 * kSecond}, kWall.ns());
+  EXPECT_EQ(stamps.convert(true, (kWall + kSecond).ns()), MonoTime{100 * kSecond});
+  EXPECT_EQ(stamps.convert(true, (kWall - kSecond).ns()), MonoTime{100 * kSecond});
+  EXPECT_EQ(stamps.convert(true, (kWall - 10 * kSecond).ns()), MonoTime{100 * kSecond});
 }
 
 }  // namespace

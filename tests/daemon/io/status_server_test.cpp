@@ -48,10 +48,10 @@ TEST(StatusServer, AnswersEachClientOnceTheLoopHasSampled) {
   const int first = connect_to(folder.path());
   const int second = connect_to(folder.path());
   const Config config;
-  server.turn(config, 0, nullptr);  // they wait on
+  server.turn(config, MonoTime{}, nullptr);  // they wait on
   Observation observation;
   observation.pipeline.samples = 7;
-  server.turn(config, 0, &observation);
+  server.turn(config, MonoTime{}, &observation);
   for (const int fd : {first, second}) {
     EXPECT_EQ(nlohmann::json::parse(read_all(fd)).at("counters").at("samples"), 7);
   }
@@ -70,7 +70,7 @@ TEST(StatusServer, WithoutAFolderThatCanBeWrittenItSaysSoAndGoesOn) {
   StatusServer server("/nowhere", error);
   EXPECT_NE(error.find("/nowhere/status.sock"), std::string::npos) << error;
   const Observation observation;
-  server.turn(Config{}, 0, &observation);
+  server.turn(Config{}, MonoTime{}, &observation);
   std::string none;
   const StatusServer unasked("", none);
   EXPECT_EQ(none, "");
@@ -83,23 +83,24 @@ TEST(StatusServer, ClientsThatLeaveOrNeverReadDoNoHarm) {
   close(connect_to(folder.path()));
   const int lazy = connect_to(folder.path());
   const Observation observation;
-  server.turn(Config{}, 0, &observation);
+  server.turn(Config{}, MonoTime{}, &observation);
   EXPECT_FALSE(read_all(lazy).empty());
 }
 
 TEST(StatusJson, SaysWhatIsKnownAndNullForTheRest) {
   Observation observation;
-  observation.t = 9 * kSecond;
+  observation.t = MonoTime{9 * kSecond};
   observation.report.state = State::kRamping;
   observation.report.faults = fault_bit(Fault::kInputStale);
   observation.report.curve.usable = true;  // but the sample is not
   observation.report.curve.mu_star = 0.1;
   SignalObservation& speed = observation.signals[static_cast<std::size_t>(Role::kPrimarySpeed)];
-  speed = {.quality = SignalQuality::kStale, .seen = true, .value = 105.0, .t = 8 * kSecond};
+  speed = {
+      .quality = SignalQuality::kStale, .seen = true, .value = 105.0, .t = MonoTime{8 * kSecond}};
   SignalObservation& torque = observation.signals[static_cast<std::size_t>(Role::kEngineTorque)];
   torque.quality = SignalQuality::kMissing;
-  observation.loop.wake_up.add(100'000);
-  auto status = nlohmann::json::parse(status_json(Config{}, 10 * kSecond, observation));
+  observation.loop.wake_up.add(Duration::of_ns(100'000));
+  auto status = nlohmann::json::parse(status_json(Config{}, MonoTime{10 * kSecond}, observation));
   EXPECT_EQ(status.at("state"), "Ramping");
   EXPECT_EQ(status.at("faults"), nlohmann::json::array({"InputStale"}));
   EXPECT_EQ(status.at("result"), nullptr);
@@ -117,7 +118,7 @@ TEST(StatusJson, SaysWhatIsKnownAndNullForTheRest) {
   observation.report.result.outcome = Outcome::kInconclusive;
   observation.report.result.peak.kind = estimator::PeakKind::kLowerBound;
   observation.report.result.peak.mu_max = 0.09;
-  status = nlohmann::json::parse(status_json(Config{}, 10 * kSecond, observation));
+  status = nlohmann::json::parse(status_json(Config{}, MonoTime{10 * kSecond}, observation));
   EXPECT_EQ(status.at("mu_star"), 0.1);
   EXPECT_EQ(status.at("friction_slope"), nullptr);
   EXPECT_EQ(status.at("result").at("mu_max"), nullptr) << "a bound is no value";

@@ -19,7 +19,7 @@ namespace beltgrip::daemon {
 ClampRequest::ClampRequest(const Config& config)
     : settings_(config.experiment),
       rate_max_N_per_s_(config.estimator.ramp_rate_max_N_per_s),
-      sample_(0) {}
+      sample_() {}
 
 void ClampRequest::begin(const Now& now, const RequestPlan&, double,
                          const AnswerLag::Reading&) noexcept {
@@ -30,8 +30,8 @@ void ClampRequest::begin(const Now& now, const RequestPlan&, double,
 
 void ClampRequest::step(const Now& now, double) noexcept {
   const test::Sabotage& told = test::sabotage();
-  const double step_s = static_cast<double>(now.t - last_) * 1e-9;
-  const double since_s = static_cast<double>(now.t - begun_) * 1e-9;
+  const double step_s = static_cast<double>((now.t - last_).ns()) * 1e-9;
+  const double since_s = static_cast<double>((now.t - begun_).ns()) * 1e-9;
   last_ = now.t;
   const bool gap = since_s > told.stands_s && since_s <= told.stands_s + told.gap_s;
   const bool again = since_s > told.stands_s + told.gap_s;

@@ -19,7 +19,7 @@ HistoryRow row(int number, double mu) {
   HistoryRow each;
   each.time_s = 1.7e9 + 3600.0 * number;
   each.fingerprint = "00000000deadbeef";
-  each.result.end = 12'500'000'000;
+  each.result.end = daemon::MonoTime{12'500 * daemon::kMillisecond};
   each.result.outcome = daemon::Outcome::kCompleted;
   each.result.stop_reason = estimator::StopReason::kSlope;
   each.result.peak = {estimator::PeakKind::kValue, mu, 3e-4, mu - 6e-4, mu + 6e-4, 2.5, 900};

@@ -538,7 +538,7 @@ TEST_F(Hostile, AHistoryRowWithARightChecksumAndMadValuesIsDamaged) {
         daemon::HistoryRow row;
         row.time_s = 1.7e9 + i;
         row.fingerprint = "00000000deadbeef";
-        row.result.end = 12'500'000'000;
+        row.result.end = daemon::MonoTime{12'500 * daemon::kMillisecond};
         row.result.outcome = daemon::Outcome::kCompleted;
         row.result.peak = {estimator::PeakKind::kValue, 0.1, 3e-4, 0.099, 0.101, 2.5, 900};
         row.result.oil_degC = 80.0;

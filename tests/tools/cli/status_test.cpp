@@ -71,7 +71,7 @@ daemon::Observation observed() {
 std::string answer(const daemon::Observation& observation) {
   daemon::Config config;
   config.interface = "can0";
-  return daemon::status_json(config, 2 * daemon::kSecond, observation);
+  return daemon::status_json(config, daemon::MonoTime{2 * daemon::kSecond}, observation);
 }
 
 std::string answer_with_result() {
@@ -82,7 +82,7 @@ std::string answer_with_result() {
   result.peak.kind = estimator::PeakKind::kValue;
   result.peak.mu_max = 0.0925;
   result.peak.mu_max_std = 0.0015;
-  result.end = daemon::kSecond;
+  result.end = daemon::MonoTime{daemon::kSecond};
   observation.report.faults = 1;
   return answer(observation);
 }
@@ -106,7 +106,7 @@ TEST_F(StatusCommand, SaysWhatWasCarriedWithoutSlip) {
   bounds[0].force_N_s = 100.0;
   bounds[0].used_N_s = 6.0;
   bounds[3].refused_mu_star = 0.4;
-  const std::string json = daemon::status_json({}, 0, observed(), bounds);
+  const std::string json = daemon::status_json({}, daemon::MonoTime{}, observed(), bounds);
   const Server server(place_.path("status.sock"), {json});
   const std::string words = beltgrip(command({})).out;
   EXPECT_NE(

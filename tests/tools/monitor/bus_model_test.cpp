@@ -51,12 +51,12 @@ class Model : public testing::Test {
 };
 
 TEST_F(Model, SaysWhatTheFramesSay) {
-  state(kSecond, daemon::State::kRamping, daemon::Outcome::kNone, estimator::StopReason::kNone,
-        daemon::fault_bit(daemon::Fault::kInputStale));
-  slip(kSecond, 1.25, 0.0875, estimator::Phase::kPeak, true);
+  state(MonoTime{kSecond}, daemon::State::kRamping, daemon::Outcome::kNone,
+        estimator::StopReason::kNone, daemon::fault_bit(daemon::Fault::kInputStale));
+  slip(MonoTime{kSecond}, 1.25, 0.0875, estimator::Phase::kPeak, true);
   daemon::ClampValues clamp{true, 2058.0};
-  model_.on_frame(kSecond, frames_.pack(clamp, 0));
-  const View seen = view(kSecond);
+  model_.on_frame(MonoTime{kSecond}, frames_.pack(clamp, 0));
+  const View seen = view(MonoTime{kSecond});
   EXPECT_EQ(seen.state, "ramping");
   EXPECT_EQ(seen.phase, "peak");
   EXPECT_TRUE(seen.stop);
@@ -67,48 +67,48 @@ TEST_F(Model, SaysWhatTheFramesSay) {
   EXPECT_EQ(seen.faults[0].name, "InputStale");
   EXPECT_EQ(seen.faults[0].means, "it came and has stopped");
   clamp.request_active = false;
-  model_.on_frame(kSecond, frames_.pack(clamp, 1));
-  EXPECT_FALSE(view(kSecond).force_asked_N);
+  model_.on_frame(MonoTime{kSecond}, frames_.pack(clamp, 1));
+  EXPECT_FALSE(view(MonoTime{kSecond}).force_asked_N);
 }
 
 TEST_F(Model, WhatIsNotAvailableIsNoNumber) {
   daemon::SlipValues none;
   none.available = false;
-  model_.on_frame(0, frames_.pack(none, 0));
-  model_.on_frame(0, frames_.pack(daemon::EstimateValues{}, 0));
-  EXPECT_FALSE(view(0).mu_star);
-  EXPECT_FALSE(view(0).sigma_star_percent);
-  EXPECT_FALSE(view(0).force_least_N);
+  model_.on_frame(MonoTime{}, frames_.pack(none, 0));
+  model_.on_frame(MonoTime{}, frames_.pack(daemon::EstimateValues{}, 0));
+  EXPECT_FALSE(view(MonoTime{}).mu_star);
+  EXPECT_FALSE(view(MonoTime{}).sigma_star_percent);
+  EXPECT_FALSE(view(MonoTime{}).force_least_N);
 }
 
 TEST_F(Model, TheCurveIsThatOfTheExperiment) {
-  state(0, daemon::State::kIdle);
-  slip(10 * kMillisecond, 0.3, 0.03);
-  EXPECT_TRUE(view(kSecond).curve.empty());
-  state(20 * kMillisecond, daemon::State::kRamping);
-  slip(30 * kMillisecond, 0.5, 0.05);
-  slip(40 * kMillisecond, 1.0, 0.08, estimator::Phase::kPeak);
-  state(50 * kMillisecond, daemon::State::kReleasing);
-  slip(60 * kMillisecond, 3.0, 0.07, estimator::Phase::kMacroSlip);  // on its way back
-  const View seen = view(kSecond);
+  state(MonoTime{}, daemon::State::kIdle);
+  slip(MonoTime{10 * kMillisecond}, 0.3, 0.03);
+  EXPECT_TRUE(view(MonoTime{kSecond}).curve.empty());
+  state(MonoTime{20 * kMillisecond}, daemon::State::kRamping);
+  slip(MonoTime{30 * kMillisecond}, 0.5, 0.05);
+  slip(MonoTime{40 * kMillisecond}, 1.0, 0.08, estimator::Phase::kPeak);
+  state(MonoTime{50 * kMillisecond}, daemon::State::kReleasing);
+  slip(MonoTime{60 * kMillisecond}, 3.0, 0.07, estimator::Phase::kMacroSlip);  // on its way back
+  const View seen = view(MonoTime{kSecond});
   ASSERT_EQ(seen.curve.size(), 2U);
   EXPECT_NEAR(seen.curve[1].sigma_star_percent, 1.0, 1e-9);
   EXPECT_EQ(seen.curve[1].phase, estimator::Phase::kPeak);
-  state(70 * kMillisecond, daemon::State::kCooldown);
-  EXPECT_EQ(view(kSecond).curve.size(), 2U) << "it stays to look at";
-  state(80 * kMillisecond, daemon::State::kRamping);
-  EXPECT_TRUE(view(kSecond).curve.empty()) << "the next one begins anew";
+  state(MonoTime{70 * kMillisecond}, daemon::State::kCooldown);
+  EXPECT_EQ(view(MonoTime{kSecond}).curve.size(), 2U) << "it stays to look at";
+  state(MonoTime{80 * kMillisecond}, daemon::State::kRamping);
+  EXPECT_TRUE(view(MonoTime{kSecond}).curve.empty()) << "the next one begins anew";
 }
 
 TEST_F(Model, AResultIsARowWithItsOutcomeAndItsMostSlip) {
-  estimate(0, 0.0, 0);
-  state(0, daemon::State::kRamping);
-  slip(10 * kMillisecond, 3.4, 0.1);
+  estimate(MonoTime{}, 0.0, 0);
+  state(MonoTime{}, daemon::State::kRamping);
+  slip(MonoTime{10 * kMillisecond}, 3.4, 0.1);
   // The estimate may come before the status of the same instant.
-  estimate(kSecond, 0.1068, 1);
-  state(kSecond + kMillisecond, daemon::State::kReleasing, daemon::Outcome::kCompleted,
+  estimate(MonoTime{kSecond}, 0.1068, 1);
+  state(MonoTime{kSecond + kMillisecond}, daemon::State::kReleasing, daemon::Outcome::kCompleted,
         estimator::StopReason::kSlope);
-  const View seen = view(kSecond + kMillisecond);
+  const View seen = view(MonoTime{kSecond + kMillisecond});
   ASSERT_EQ(seen.experiments.size(), 1U);
   EXPECT_EQ(seen.experiments[0].outcome, "completed");
   EXPECT_EQ(seen.experiments[0].reason, "slope");
@@ -119,54 +119,55 @@ TEST_F(Model, AResultIsARowWithItsOutcomeAndItsMostSlip) {
 }
 
 TEST_F(Model, WhoComesLateKnowsNoEarlierExperiment) {
-  estimate(0, 0.1, 7);
-  EXPECT_TRUE(view(0).experiments.empty());
-  EXPECT_EQ(view(0).experiment_count, 7U);
+  estimate(MonoTime{}, 0.1, 7);
+  EXPECT_TRUE(view(MonoTime{}).experiments.empty());
+  EXPECT_EQ(view(MonoTime{}).experiment_count, 7U);
 }
 
 TEST_F(Model, SilenceIsTold) {
-  EXPECT_FALSE(view(0).silence_s);
+  EXPECT_FALSE(view(MonoTime{}).silence_s);
   can::CanFrame other;
   other.id = {0x123, false};
-  model_.on_frame(0, other);
+  model_.on_frame(MonoTime{}, other);
   View seen;
-  model_.show(seen, 3 * kSecond);
+  model_.show(seen, MonoTime{3 * kSecond});
   EXPECT_FALSE(seen.silence_s);
   EXPECT_TRUE(is_silent(seen));
-  slip(3 * kSecond, 1.0, 0.1);
-  EXPECT_FALSE(is_silent(view(5 * kSecond)));
-  EXPECT_NEAR(view(6 * kSecond).silence_s.value(), 3.0, 1e-9);
-  EXPECT_TRUE(is_silent(view(6 * kSecond)));
+  slip(MonoTime{3 * kSecond}, 1.0, 0.1);
+  EXPECT_FALSE(is_silent(view(MonoTime{5 * kSecond})));
+  EXPECT_NEAR(view(MonoTime{6 * kSecond}).silence_s.value(), 3.0, 1e-9);
+  EXPECT_TRUE(is_silent(view(MonoTime{6 * kSecond})));
 }
 
 TEST_F(Model, WhatCannotBeBelievedIsShownAndNotTaken) {
-  slip(0, 1.0, 0.1);
+  slip(MonoTime{}, 1.0, 0.1);
   can::CanFrame wrong = frames_.pack(daemon::SlipValues{true, {}, true, 0.2, 2.0, 0.0}, 1);
   wrong.data[5] ^= 1;
-  model_.on_frame(1, wrong);
-  EXPECT_EQ(view(2).distrust.wrong_crc, 1U);
-  EXPECT_EQ(view(2).distrust.last, "0x6A1: wrong CRC");
-  EXPECT_FALSE(view(2).stop);
-  EXPECT_NEAR(view(2).mu_star.value(), 0.1, 1e-9);
-  model_.on_frame(3, frames_.pack(daemon::SlipValues{}, 9));  // after 0
-  EXPECT_EQ(view(4).distrust.wrong_sequence, 1U);
+  model_.on_frame(MonoTime::of_ns(1), wrong);
+  EXPECT_EQ(view(MonoTime::of_ns(2)).distrust.wrong_crc, 1U);
+  EXPECT_EQ(view(MonoTime::of_ns(2)).distrust.last, "0x6A1: wrong CRC");
+  EXPECT_FALSE(view(MonoTime::of_ns(2)).stop);
+  EXPECT_NEAR(view(MonoTime::of_ns(2)).mu_star.value(), 0.1, 1e-9);
+  model_.on_frame(MonoTime::of_ns(3), frames_.pack(daemon::SlipValues{}, 9));  // after 0
+  EXPECT_EQ(view(MonoTime::of_ns(4)).distrust.wrong_sequence, 1U);
   can::CanFrame longer = frames_.pack(daemon::SlipValues{}, 10);
   longer.length = 12;
   longer.fd = true;
-  model_.on_frame(5, longer);
-  EXPECT_EQ(view(6).distrust.foreign_version, 1U);
-  EXPECT_NE(view(6).distrust.last.find("12 bytes of CAN FD, not 8"), std::string::npos);
+  model_.on_frame(MonoTime::of_ns(5), longer);
+  EXPECT_EQ(view(MonoTime::of_ns(6)).distrust.foreign_version, 1U);
+  EXPECT_NE(view(MonoTime::of_ns(6)).distrust.last.find("12 bytes of CAN FD, not 8"),
+            std::string::npos);
 }
 
 // The interface was gone, or another daemon begins: no two senders.
 TEST_F(Model, BehindASilenceCountersBeginAnew) {
-  slip(0, 1.0, 0.1);
-  model_.on_frame(400 * kMillisecond, frames_.pack(daemon::SlipValues{}, 9));
-  EXPECT_EQ(view(kSecond).distrust.wrong_sequence, 1U) << "so soon it is another sender";
-  model_.on_frame(kSecond, frames_.pack(daemon::SlipValues{}, 3));
-  EXPECT_EQ(view(kSecond).distrust.wrong_sequence, 1U);
-  model_.on_frame(kSecond + 100 * kMillisecond, frames_.pack(daemon::SlipValues{}, 4));
-  EXPECT_EQ(view(2 * kSecond).distrust.wrong_sequence, 1U);
+  slip(MonoTime{}, 1.0, 0.1);
+  model_.on_frame(MonoTime{400 * kMillisecond}, frames_.pack(daemon::SlipValues{}, 9));
+  EXPECT_EQ(view(MonoTime{kSecond}).distrust.wrong_sequence, 1U) << "so soon it is another sender";
+  model_.on_frame(MonoTime{kSecond}, frames_.pack(daemon::SlipValues{}, 3));
+  EXPECT_EQ(view(MonoTime{kSecond}).distrust.wrong_sequence, 1U);
+  model_.on_frame(MonoTime{kSecond + 100 * kMillisecond}, frames_.pack(daemon::SlipValues{}, 4));
+  EXPECT_EQ(view(MonoTime{2 * kSecond}).distrust.wrong_sequence, 1U);
 }
 
 // A later version may have one state and one fault more.
@@ -175,9 +176,9 @@ TEST_F(Model, ALaterVersionsValuesAreNumbers) {
   frame.data[1] = static_cast<std::uint8_t>(0x0B << 4);  // State = 11
   frame.data[7] = 0x80;                                  // a bit beyond the faults
   can::e2e::protect(frame, 0x6A3, 0);
-  model_.on_frame(0, frame);
-  EXPECT_EQ(view(0).state, "11 (unknown here)");
-  EXPECT_EQ(view(0).distrust.foreign_version, 1U);
+  model_.on_frame(MonoTime{}, frame);
+  EXPECT_EQ(view(MonoTime{}).state, "11 (unknown here)");
+  EXPECT_EQ(view(MonoTime{}).distrust.foreign_version, 1U);
 }
 
 TEST_F(Model, TheLoadIsThatOfTheLastSecond) {
@@ -185,11 +186,11 @@ TEST_F(Model, TheLoadIsThatOfTheLastSecond) {
   frame.id = {0x123, false};
   frame.length = 8;
   EXPECT_EQ(frame_bits(frame), 111);  // 44 + 64 bits, 3 of pause
-  for (int i = 0; i < 500; ++i) model_.on_frame(i * 10 * kMillisecond, frame);
-  EXPECT_NEAR(view(5 * kSecond).traffic.frames_per_s, 100.0, 0.1);
-  EXPECT_NEAR(view(5 * kSecond).traffic.bit_per_s, 11'100.0, 10.0);
-  EXPECT_NEAR(view(5 * kSecond + 500 * kMillisecond).traffic.frames_per_s, 50.0, 0.1);
-  EXPECT_EQ(view(7 * kSecond).traffic.frames_per_s, 0.0);
+  for (int i = 0; i < 500; ++i) model_.on_frame(MonoTime{i * 10 * kMillisecond}, frame);
+  EXPECT_NEAR(view(MonoTime{5 * kSecond}).traffic.frames_per_s, 100.0, 0.1);
+  EXPECT_NEAR(view(MonoTime{5 * kSecond}).traffic.bit_per_s, 11'100.0, 10.0);
+  EXPECT_NEAR(view(MonoTime{5 * kSecond + 500 * kMillisecond}).traffic.frames_per_s, 50.0, 0.1);
+  EXPECT_EQ(view(MonoTime{7 * kSecond}).traffic.frames_per_s, 0.0);
 }
 
 }  // namespace

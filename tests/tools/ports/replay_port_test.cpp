@@ -168,48 +168,48 @@ TEST(ReplayPort, WhatASilenceMayBeLeftOutOf) {
     LogTimeline log = timeline({{{0}, {gap_ns}}});
     ReplayPort port(log, std::move(receiver));
     daemon::RxFrame frame;
-    EXPECT_EQ(port.wait_until(1 * kS), daemon::Wake::kFrames);
+    EXPECT_EQ(port.wait_until(daemon::MonoTime::of_ns(1 * kS)), daemon::Wake::kFrames);
     EXPECT_EQ(port.receive({&frame, 1}), 1u);
-    EXPECT_EQ(port.wait_until(1 * kS), daemon::Wake::kDeadline);
+    EXPECT_EQ(port.wait_until(daemon::MonoTime::of_ns(1 * kS)), daemon::Wake::kDeadline);
     return port.silent_until();
   };
   const ReplayPort::Receiver heard = [](daemon::MonoTime, const can::CanFrame&, std::uint8_t) {};
-  EXPECT_EQ(until(30 * kS, nullptr), 30 * kS);
-  EXPECT_EQ(until(1201 * kS, nullptr), 1201 * kS);
-  EXPECT_LE(until(30 * kS, heard), 1 * kS);
-  EXPECT_EQ(until(1201 * kS, heard), 1201 * kS);
+  EXPECT_EQ(until(30 * kS, nullptr).ns(), 30 * kS);
+  EXPECT_EQ(until(1201 * kS, nullptr).ns(), 1201 * kS);
+  EXPECT_LE(until(30 * kS, heard).ns(), 1 * kS);
+  EXPECT_EQ(until(1201 * kS, heard).ns(), 1201 * kS);
 }
 
 TEST(ReplayPort, StampsAreTheClock) {
   LogTimeline log = timeline({{{10 * kMs, 1}, {12 * kMs, 2}, {15 * kMs, 3}, {21 * kMs, 4}}});
   std::vector<std::int64_t> sent;
   ReplayPort port(
-      log, [&](daemon::MonoTime t, const can::CanFrame&, std::uint8_t) { sent.push_back(t); });
-  EXPECT_EQ(port.now(), 10 * kMs);
+      log, [&](daemon::MonoTime t, const can::CanFrame&, std::uint8_t) { sent.push_back(t.ns()); });
+  EXPECT_EQ(port.now().ns(), 10 * kMs);
   std::array<daemon::RxFrame, 2> two;
   EXPECT_EQ(port.receive(two), 1u);  // the first one has arrived
   EXPECT_EQ(two[0].frame.id.value, 1u);
-  EXPECT_EQ(port.wait_until(15 * kMs), daemon::Wake::kFrames);
+  EXPECT_EQ(port.wait_until(daemon::MonoTime::of_ns(15 * kMs)), daemon::Wake::kFrames);
   EXPECT_EQ(port.receive(two), 2u);  // due before or at the deadline
-  EXPECT_EQ(two[0].t, 12 * kMs);
-  EXPECT_EQ(two[1].t, 15 * kMs);
+  EXPECT_EQ(two[0].t.ns(), 12 * kMs);
+  EXPECT_EQ(two[1].t.ns(), 15 * kMs);
   EXPECT_LE(two[1].t, port.now());
   EXPECT_EQ(port.receive(two), 0u);
-  EXPECT_EQ(port.wait_until(15 * kMs), daemon::Wake::kDeadline);
-  EXPECT_EQ(port.now(), 15 * kMs);
-  EXPECT_EQ(port.wait_until(20 * kMs), daemon::Wake::kDeadline);
+  EXPECT_EQ(port.wait_until(daemon::MonoTime::of_ns(15 * kMs)), daemon::Wake::kDeadline);
+  EXPECT_EQ(port.now().ns(), 15 * kMs);
+  EXPECT_EQ(port.wait_until(daemon::MonoTime::of_ns(20 * kMs)), daemon::Wake::kDeadline);
   EXPECT_EQ(port.send({}), daemon::SendResult::kSent);
-  EXPECT_EQ(port.wait_until(25 * kMs), daemon::Wake::kFrames);
-  EXPECT_EQ(port.now(), 20 * kMs);
+  EXPECT_EQ(port.wait_until(daemon::MonoTime::of_ns(25 * kMs)), daemon::Wake::kFrames);
+  EXPECT_EQ(port.now().ns(), 20 * kMs);
   EXPECT_EQ(port.receive(two), 1u);  // what was sent is confirmed first, at once
   EXPECT_TRUE(two[0].own_echo);
-  EXPECT_EQ(two[0].t, 20 * kMs);
-  EXPECT_EQ(port.wait_until(25 * kMs), daemon::Wake::kFrames);
-  EXPECT_EQ(port.now(), 21 * kMs);
+  EXPECT_EQ(two[0].t.ns(), 20 * kMs);
+  EXPECT_EQ(port.wait_until(daemon::MonoTime::of_ns(25 * kMs)), daemon::Wake::kFrames);
+  EXPECT_EQ(port.now().ns(), 21 * kMs);
   EXPECT_EQ(port.receive(two), 1u);
   EXPECT_FALSE(two[0].own_echo);
-  EXPECT_EQ(port.wait_until(25 * kMs), daemon::Wake::kClosed);
-  EXPECT_EQ(port.now(), 21 * kMs);
+  EXPECT_EQ(port.wait_until(daemon::MonoTime::of_ns(25 * kMs)), daemon::Wake::kClosed);
+  EXPECT_EQ(port.now().ns(), 21 * kMs);
   EXPECT_EQ(sent, (Stamps{20 * kMs}));
 }
 
@@ -218,7 +218,7 @@ TEST(ReplayPort, SmallBatchesLoseNothing) {
   ReplayPort port(log, {});
   std::array<daemon::RxFrame, 1> one;
   std::uint32_t expected = 1;
-  while (port.wait_until(10) != daemon::Wake::kClosed) {
+  while (port.wait_until(daemon::MonoTime::of_ns(10)) != daemon::Wake::kClosed) {
     while (port.receive(one) == 1) EXPECT_EQ(one[0].frame.id.value, expected++);
   }
   EXPECT_EQ(expected, 6u);
@@ -227,7 +227,7 @@ TEST(ReplayPort, SmallBatchesLoseNothing) {
 TEST(ReplayPort, AnEmptyLogIsClosedAtOnce) {
   LogTimeline log = timeline({{}});
   ReplayPort port(log, {});
-  EXPECT_EQ(port.wait_until(1000), daemon::Wake::kClosed);
+  EXPECT_EQ(port.wait_until(daemon::MonoTime::of_ns(1000)), daemon::Wake::kClosed);
 }
 
 }  // namespace

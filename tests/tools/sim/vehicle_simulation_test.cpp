@@ -220,10 +220,10 @@ std::vector<can::StampedFrame> frames(const VehicleScenario& s, std::uint64_t se
   std::vector<can::StampedFrame> out;
   std::array<daemon::RxFrame, 16> batch;
   for (;;) {
-    const daemon::Wake wake = port.wait_until(std::llround(until_s * 1e9));
+    const daemon::Wake wake = port.wait_until(daemon::MonoTime::of_ns(std::llround(until_s * 1e9)));
     if (wake != daemon::Wake::kFrames) break;
     const std::size_t count = port.receive(batch);
-    for (std::size_t i = 0; i < count; ++i) out.push_back({batch[i].t, batch[i].frame});
+    for (std::size_t i = 0; i < count; ++i) out.push_back({batch[i].t.ns(), batch[i].frame});
   }
   return out;
 }
@@ -346,7 +346,7 @@ TEST(VehicleSimulation, AStateThatIsNoNumberIsNoticed) {
       {FaultKind::kTorqueStep, "", 2.0, false, 1.0, std::numeric_limits<double>::infinity()});
   VehiclePort port(s, 1);
   EXPECT_TRUE(port.finite());
-  while (port.wait_until(port.now() + 5'000'000) != daemon::Wake::kClosed) {
+  while (port.wait_until(port.now() + 5 * daemon::kMillisecond) != daemon::Wake::kClosed) {
     std::array<daemon::RxFrame, 16> batch;
     port.receive(batch);
   }

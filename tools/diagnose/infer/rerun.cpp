@@ -95,8 +95,8 @@ std::optional<daemon::ExperimentResult> estimate(const SignalTable& table, daemo
     now.primary_pressure_Pa = read_of(pressure_p, t_s);
     const estimator::CurveEstimate& curve =
         method->step(correction ? correction->correct(sample, now) : sample);
-    if (i == 0) out.start = sample.t_ns;
-    out.end = sample.t_ns;
+    if (i == 0) out.start = daemon::MonoTime::of_ns(sample.t_ns);
+    out.end = daemon::MonoTime::of_ns(sample.t_ns);
     out.stopped = curve.stop != estimator::StopReason::kNone;
     out.stop_reason = curve.stop;
     if (!curve.usable) continue;

@@ -8,39 +8,39 @@ namespace {
 TEST(FaultSet, ShowsAtOnceAndHolds) {
   FaultSet faults;
   EXPECT_EQ(faults.bits(), 0U);
-  faults.raise(Fault::kInputStale, 5);
+  faults.raise(Fault::kInputStale, MonoTime::of_ns(5));
   EXPECT_EQ(faults.bits(), fault_bit(Fault::kInputStale));
-  faults.expire(5 + FaultSet::kHold - 1);
+  faults.expire(MonoTime::of_ns(5) + FaultSet::kHold - kNanosecond);
   EXPECT_TRUE(faults.has(Fault::kInputStale));
-  faults.expire(5 + FaultSet::kHold);
+  faults.expire(MonoTime::of_ns(5) + FaultSet::kHold);
   EXPECT_FALSE(faults.has(Fault::kInputStale));
 }
 
 TEST(FaultSet, RaisingAgainProlongs) {
   FaultSet faults;
-  faults.raise(Fault::kInputRange, 0);
-  faults.raise(Fault::kInputRange, kSecond / 2);
-  faults.expire(kSecond);
+  faults.raise(Fault::kInputRange, MonoTime{});
+  faults.raise(Fault::kInputRange, MonoTime{kSecond / 2});
+  faults.expire(MonoTime{kSecond});
   EXPECT_TRUE(faults.has(Fault::kInputRange));
-  faults.expire(kSecond + kSecond / 2);
+  faults.expire(MonoTime{kSecond + kSecond / 2});
   EXPECT_FALSE(faults.has(Fault::kInputRange));
 }
 
 TEST(FaultSet, LatchedStays) {
   FaultSet faults;
   faults.latch(Fault::kFrameRefused);
-  faults.raise(Fault::kFrameRefused, 0);
-  faults.expire(100 * kSecond);
+  faults.raise(Fault::kFrameRefused, MonoTime{});
+  faults.expire(MonoTime{100 * kSecond});
   EXPECT_EQ(faults.bits(), fault_bit(Fault::kFrameRefused));
 }
 
 TEST(FaultSet, AForeignSenderIsGoneAfterTenSecondsOfSilence) {
   FaultSet faults;
-  faults.raise(Fault::kForeignSender, 0);
-  faults.raise(Fault::kForeignSender, 3 * kSecond);
-  faults.expire(13 * kSecond - 1);
+  faults.raise(Fault::kForeignSender, MonoTime{});
+  faults.raise(Fault::kForeignSender, MonoTime{3 * kSecond});
+  faults.expire(MonoTime{13 * kSecond} - kNanosecond);
   EXPECT_TRUE(faults.has(Fault::kForeignSender));
-  faults.expire(13 * kSecond);
+  faults.expire(MonoTime{13 * kSecond});
   EXPECT_FALSE(faults.has(Fault::kForeignSender));
 }
 
@@ -48,8 +48,9 @@ TEST(FaultSet, AFlickerChangesTheSetAtMostTwiceASecond) {
   FaultSet faults;
   int changes = 0;
   std::uint32_t last = 0;
-  for (MonoTime t = 0; t < 10 * kSecond; t += 5 * kMillisecond) {
-    if (t % (70 * kMillisecond) == 0 && (t / kSecond) % 3 != 2) {
+  for (MonoTime t{}; t < MonoTime{10 * kSecond}; t += 5 * kMillisecond) {
+    if (t.since_origin() % (70 * kMillisecond) == Duration{} &&
+        (t.since_origin() / kSecond) % 3 != 2) {
       faults.raise(Fault::kInputStale, t);
     }
     faults.expire(t);

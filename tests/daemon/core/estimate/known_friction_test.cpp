@@ -38,7 +38,7 @@ class Known : public testing::Test {
   }
   bool doubtful() const {
     FaultSet faults;
-    known_.raise_faults(1, curve_, faults);
+    known_.raise_faults(MonoTime::of_ns(1), curve_, faults);
     return faults.has(Fault::kResultDoubtful);
   }
 

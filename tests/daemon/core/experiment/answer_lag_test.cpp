@@ -43,7 +43,7 @@ Told told(const Actuator& actuator, const Course& course = {}, unsigned seed = 1
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   AnswerLag lag;
-  lag.begin(0, {4000.0, {0.06, 0.15}, {actuator.noise_N, actuator.step_N}, kSample});
+  lag.begin(MonoTime{}, {4000.0, {0.06, 0.15}, {actuator.noise_N, actuator.step_N}, kSample});
   std::vector<double> asked_N{4000.0};
   const auto dead = static_cast<std::size_t>(std::lround(actuator.dead_s / kSample_s));
   double force_N = asked_N[0];
@@ -51,7 +51,7 @@ Told told(const Actuator& actuator, const Course& course = {}, unsigned seed = 1
   const auto samples = static_cast<std::size_t>(std::lround(course.end_s / kSample_s));
   for (std::size_t i = 1; i <= samples; ++i) {
     const double t_s = static_cast<double>(i) * kSample_s;
-    const auto t = static_cast<MonoTime>(i) * kSample;
+    const auto t = MonoTime{i * kSample};
     force_N -=
         std::expm1(-kSample_s / actuator.lag_s) * (asked_N[i > dead ? i - 1 - dead : 0] - force_N);
     if (i == 100) lag.measure(t, 4000.0 - asked_N.back(), course.rate_N_per_s);
@@ -298,7 +298,7 @@ TEST(AnswerLag, IsTheSameByHand) {
     const double noise_N = course % 4 == 0 ? 1.0 : 30.0 * uniform(random);
     const double step_N = course % 3 == 0 ? 100.0 * uniform(random) : 0.0;
     const double lag_s = 0.02 + 0.9 * uniform(random), offset_N = 150.0 * normal(random);
-    const MonoTime begin = course * kSecond;
+    const MonoTime begin{course * kSecond};
     AnswerLag lag;
     const double dead_s = course % 2 == 0 ? 0.06 : 0.0, own_s = course % 2 == 0 ? 0.15 : 0.30;
     lag.begin(begin, {3000.0, {dead_s, own_s}, {noise_N, step_N}, kSample});
@@ -348,10 +348,10 @@ TEST(AnswerLag, IsTheSameByHand) {
 TEST(AnswerLag, TakesReadingsByTheirStamps) {
   const auto most_s = [](Duration old) {
     AnswerLag lag;
-    lag.begin(0, {4000.0, {0.06, 0.15}, {}, kSample});
+    lag.begin(MonoTime{}, {4000.0, {0.06, 0.15}, {}, kSample});
     double asked_N = 4000.0;
     for (int i = 1; i <= 200; ++i) {
-      const MonoTime t = i * kSample;
+      const MonoTime t{i * kSample};
       if (i == 100) lag.measure(t, 300.0, 600.0);
       // A force that answers as configured, but without dead time and bus.
       lag.read(t - old, asked_N);
@@ -360,7 +360,7 @@ TEST(AnswerLag, TakesReadingsByTheirStamps) {
     }
     return lag.most_s();
   };
-  EXPECT_LT(most_s(0), kOpen);
+  EXPECT_LT(most_s({}), kOpen);
   EXPECT_LT(most_s(60 * kMillisecond), kOpen);
   EXPECT_EQ(most_s(200 * kMillisecond), kOpen);
 }

@@ -19,7 +19,7 @@ struct Force {
   double noise_N = 0.0;
   double above_N = 0.0;  // by which the daemon reckons it higher than the controller
   bool near = false;
-  MonoTime on_floor_from = 1'000 * kSecond;
+  MonoTime on_floor_from{1'000 * kSecond};
 };
 
 // 3 s of a fall that rests where it is told to.
@@ -33,7 +33,7 @@ Shown shown(const Force& force, unsigned seed = 1) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   AnswerProof proof;
-  proof.begin(0, {kStart_N, kBand_N, {0.06, 0.15}, {force.noise_N, 1.0}, kSample});
+  proof.begin(MonoTime{}, {kStart_N, kBand_N, {0.06, 0.15}, {force.noise_N, 1.0}, kSample});
   EXPECT_TRUE(proof.falls());
   std::vector<double> asked_N{kStart_N};
   // Its own force, until what is asked for comes below it.
@@ -42,7 +42,7 @@ Shown shown(const Force& force, unsigned seed = 1) {
   double given_N = own_N;
   Shown out;
   for (std::size_t i = 1; i <= 600 && !out.late && !out.unshown; ++i) {
-    const auto t = static_cast<MonoTime>(i) * kSample;
+    const auto t = MonoTime{i * kSample};
     const double told_N = std::min(own_N, asked_N[i > dead ? i - 1 - dead : 0]);
     given_N -= std::expm1(-5e-3 / force.lag_s) * (told_N - given_N);
     const double read_N = given_N + force.above_N + force.noise_N * normal(random);
@@ -62,7 +62,7 @@ Shown shown(const Force& force, unsigned seed = 1) {
 TEST(AnswerProof, RestsWhereAForceThatFollowsMustHaveBegunToFall) {
   EXPECT_NEAR(shown({}).fallen_N, kBand_N, 3.1);
   EXPECT_NEAR(shown({.near = true}).fallen_N, 0.5 * kBand_N, 3.1);
-  EXPECT_NEAR(shown({.on_floor_from = 100 * kMillisecond}).fallen_N, 60.0, 3.1);
+  EXPECT_NEAR(shown({.on_floor_from = MonoTime{100 * kMillisecond}}).fallen_N, 60.0, 3.1);
 }
 
 TEST(AnswerProof, AForceThatAnswersAsConfiguredIsShownSoon) {
@@ -117,7 +117,7 @@ TEST(AnswerProof, IsTheSameByHand) {
   AnswerProof proof;
   int late = 0, unshown = 0, in_time = 0;
   for (int request = 0; request < 400; ++request) {
-    const MonoTime begin = request * 20 * kSecond;
+    const MonoTime begin{request * 20 * kSecond};
     const double noise_N = 60.0 * uniform(random), step_N = request % 3 == 0 ? 60.0 : 0.0;
     const double lag_s = 0.05 + 0.6 * uniform(random), above_N = 60.0 * normal(random);
     const bool near = request % 5 == 0;
@@ -179,7 +179,7 @@ TEST(AnswerProof, IsTheSameByHand) {
 TEST(AnswerProof, NothingIsKnownOfTheRequestBefore) {
   AnswerProof proof;
   for (int request = 0; request < 2; ++request) {
-    const MonoTime begin = request * 10 * kSecond;
+    const MonoTime begin{request * 10 * kSecond};
     proof.begin(begin, {kStart_N, kBand_N, {0.06, 0.15}, {}, kSample});
     EXPECT_TRUE(proof.falls());
     EXPECT_FALSE(proof.late() || proof.unshown() || proof.rests());

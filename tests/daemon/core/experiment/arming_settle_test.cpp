@@ -29,7 +29,7 @@ Config config(Control control = Control::kCommand) {
 
 Arming::Now coasting() {
   Arming::Now now;
-  now.t = kSecond;
+  now.t = MonoTime{kSecond};
   now.usable = true;
   now.omega_p_rad_s = 130.0;
   now.omega_s_rad_s = 130.0 * 2.25;
@@ -212,7 +212,8 @@ TEST_F(Settling, LooksEveryTenthOfASecond) {
     now_.slip_percent += 0.001;
     const Duration since = now_.t - held;
     const bool looked = arming_.obstacle().figure != figure;
-    EXPECT_EQ(looked, since >= 1500 * kMillisecond && since % (100 * kMillisecond) == 0) << since;
+    EXPECT_EQ(looked, since >= 1500 * kMillisecond && since % (100 * kMillisecond) == Duration{})
+        << since;
     looks += looked ? 1 : 0;
     figure = arming_.obstacle().figure;
     if (looked) {
@@ -277,7 +278,7 @@ TEST_F(Settling, WaitsBeyondThePatienceWhileThereIsTimeForIt) {
     now_.omega_s_rad_s = now_.omega_p_rad_s * 2.25;
     step(after);
   };
-  slowed(0);
+  slowed({});
   while (!inhibited(Inhibit::kWait) && now_.t < begun + 3 * kSecond) slowed(kSample);
   ASSERT_TRUE(inhibited(Inhibit::kWait));
   while (inhibited(Inhibit::kWait)) {

@@ -110,7 +110,7 @@ TEST_F(ArmingTest, EveryPreconditionAloneAtItsBoundary) {
     Arming arming(config());
     Arming::Now now = coasting();
     c.inside(now);
-    now.t = kSample;
+    now.t = MonoTime{kSample};
     arming.step(now);
     EXPECT_TRUE(arming.triggered()) << static_cast<int>(c.inhibit);
     c.outside(now);
@@ -196,8 +196,8 @@ TEST_F(ArmingTest, OutOfReachSaysSoAndRunsOutOfPatience) {
   c.experiment.secondary_pressure_floor_Pa = 1e5;
   Arming arming(c);
   now_.torque_Nm = -20.0;
-  MonoTime refused = 0;
-  while (refused == 0 && now_.t < 60 * kSecond) {
+  MonoTime refused{};
+  while (refused == MonoTime{} && now_.t < MonoTime{60 * kSecond}) {
     now_.t += kSample;
     arming.step(now_);
     if (arming.settled()) refused = now_.t;
@@ -205,8 +205,8 @@ TEST_F(ArmingTest, OutOfReachSaysSoAndRunsOutOfPatience) {
   EXPECT_EQ(arming.inhibits(), inhibit_bit(Inhibit::kUnreachable));
   EXPECT_TRUE(arming.triggered());
   EXPECT_FALSE(arming.cleared());
-  EXPECT_NEAR(static_cast<double>(refused),
-              static_cast<double>(Arming::kSettle + Arming::kPatience), 1e7);
+  EXPECT_NEAR(static_cast<double>(refused.ns()),
+              static_cast<double>((Arming::kSettle + Arming::kPatience).ns()), 1e7);
 }
 
 // After a tip-in the controller takes its force back at its own pace: what falls by itself is not

@@ -41,7 +41,7 @@ struct Drive {
   double ratio() const { return low ? 0.405 : 2.25; }
   Arming::Now now(Duration held) const {
     Arming::Now now;
-    now.t = kSecond + held;
+    now.t = MonoTime{kSecond + held};
     now.usable = true;
     now.omega_p_rad_s = at_rad_s(seconds(held));
     now.omega_s_rad_s = now.omega_p_rad_s * ratio();
@@ -210,7 +210,7 @@ void compare(const Drive& drive, int* count) {
   const double last_rad_s = drive.at_rad_s(seconds(expected.decided));
   if (last_rad_s < 105.0) return;
   Arming arming(drive.car);
-  for (Duration held = 0; held <= expected.decided; held += kSample) {
+  for (Duration held{}; held <= expected.decided; held += kSample) {
     ASSERT_FALSE(arming.cleared()) << held;
     ASSERT_EQ(arming.inhibits() & ~inhibit_bit(Inhibit::kInputs), 0U) << held;
     arming.step(drive.now(held));

@@ -30,7 +30,7 @@ class Followed : public testing::Test {
  protected:
   void SetUp() override { begin(4000.0); }
   void begin(double force_N) {
-    now_ = {kSecond, 140.0, 315.0, -30.0, force_N, 0.05};
+    now_ = {MonoTime{kSecond}, 140.0, 315.0, -30.0, force_N, 0.05};
     told_N_ = force_N;
     request_ = ClampRequest(Config{});
     request_.begin(now_, plan(), kFloor_N, {});
@@ -137,7 +137,7 @@ TEST_F(Followed, HasChangedByMoreThanTheBand) {
   EXPECT_FALSE(request_.changed_since(begun + 361 * kMillisecond));   // 372 N
   EXPECT_FALSE(request_.changed_since(begun + 1000 * kMillisecond));  // nothing
   EXPECT_TRUE(request_.changed_since(begun));
-  EXPECT_TRUE(request_.changed_since(0));
+  EXPECT_TRUE(request_.changed_since(MonoTime{}));
 }
 
 // A force 1.26 s ago is still known, one before is not: 252 N of 200 N/s, beyond 105 + 80 + 42.
@@ -147,7 +147,7 @@ TEST_F(Followed, HasChangedSlowly) {
   EXPECT_NEAR(request_.follow_band_N(), 105.0 + 80.0 + 42.0, 1e-6);
   EXPECT_TRUE(request_.changed_since(now_.t - 1260 * kMillisecond));
   EXPECT_FALSE(request_.changed_since(now_.t - 1130 * kMillisecond));  // 224 N
-  EXPECT_TRUE(request_.changed_since(kSecond));
+  EXPECT_TRUE(request_.changed_since(MonoTime{kSecond}));
 }
 
 // After its end the slip comes to the ratio's, with a mean of 0.2 s: half of it has gone after 28
@@ -259,7 +259,7 @@ TEST(CoolDown, AtTheEdges) {
   };
   for (const Case& c : {Case{30.0, 120}, Case{10.0, 200}}) {
     ClampRequest request{Config{}};
-    MonoTime t = 1000 * kSecond;  // the machine has been up, the daemon has not
+    MonoTime t{1000 * kSecond};  // the machine has been up, the daemon has not
     const auto travel = [&](Duration step, double speed_m_s) {
       t += step;
       request.travel(t, speed_m_s);
@@ -278,7 +278,7 @@ TEST(CoolDown, AtTheEdges) {
 // The first one came near the belt's peak, slipped beyond it, rested on its floor and was not
 // followed. The second, to a low floor or from it, does what a first one does.
 TEST(SecondRequest, KnowsNothingOfTheFirst) {
-  const ClampRequest::Now start{kSecond, 140.0, 315.0, -30.0, 4000.0, 0.08};
+  const ClampRequest::Now start{MonoTime{kSecond}, 140.0, 315.0, -30.0, 4000.0, 0.08};
   constexpr double kHighFloor_N = 3950.0;
   for (const double floor_N : {kFloor_N, kHighFloor_N}) {
     ClampRequest fresh{Config{}}, second{Config{}};

@@ -27,7 +27,7 @@ class Stops : public testing::Test {
     plan_.mu_expected = 0.11;
     plan_.mu_least = 0.085;
     plan_.primary_radius_m = 0.05;
-    now_ = {kSecond, 100.0, 100.0 * kRatio, -50.0, 4000.0, 0.05};
+    now_ = {MonoTime{kSecond}, 100.0, 100.0 * kRatio, -50.0, 4000.0, 0.05};
     floor_N_ = kFloor_N;
   }
   void begin() {
@@ -262,7 +262,7 @@ TEST_F(Stops, AForceThatAnswersLate) {
   config_.estimator.ramp_rate_max_N_per_s = 600.0;
   plan_.crossing.ramp_top_N_per_s = 200.0;
   for (const bool noisy : {false, true}) {
-    now_ = {kSecond, 100.0, 100.0 * kRatio, -50.0, 4000.0, 0.05};
+    now_ = {MonoTime{kSecond}, 100.0, 100.0 * kRatio, -50.0, 4000.0, 0.05};
     now_.mu_star = 0.0936;  // near the peak
     begin();
     double given_N = 4000.0;

@@ -32,7 +32,7 @@ class Request : public testing::Test {
  protected:
   void SetUp() override {
     request_ = ClampRequest(Config{});
-    now_ = {kSecond, 140.0, 315.0, -30.0, 4000.0, 0.05};
+    now_ = {MonoTime{kSecond}, 140.0, 315.0, -30.0, 4000.0, 0.05};
     request_.begin(now_, plan(), kFloor, {});
   }
   // One sample; the controller follows unless told otherwise.
@@ -269,7 +269,7 @@ TEST_F(Request, AnAnswerThatIsLaterThanConfiguredStops) {
   for (const double noise_N : {0.0, 20.0, 2000.0}) {
     for (const double lag_s : {0.21, 0.60}) {
       for (const double offset_N : {-100.0, 0.0, 100.0}) {
-        now_ = {kSecond, 140.0, 315.0, -30.0, 4000.0, 0.05};
+        now_ = {MonoTime{kSecond}, 140.0, 315.0, -30.0, 4000.0, 0.05};
         request_ = ClampRequest(Config{});
         request_.begin(now_, plan(), kFloor, {noise_N, 1.0});
         double given_N = 4000.0;
@@ -298,7 +298,7 @@ TEST_F(Request, TimeStops) {
   still.mu_expected = 0.05;  // near the peak from the first sample on
   still.mu_least = 0.05;
   request_.begin(now_, still, kFloor, {});
-  while (now_.t < kSecond + limits::kRequestLongest - kSample) {
+  while (now_.t < MonoTime{kSecond + limits::kRequestLongest - kSample}) {
     ASSERT_EQ(sample(), StopReason::kNone);
   }
   EXPECT_EQ(sample(), StopReason::kTime);
@@ -455,9 +455,9 @@ TEST_F(Request, StuckWhenTheForceStaysDownUnderLoad) {
 TEST_F(Request, CoolsDownInTimeAndDistanceAlsoAfterTheStart) {
   ClampRequest fresh{Config{}};
   EXPECT_FALSE(fresh.cooled());
-  MonoTime t = 0;
+  MonoTime t{};
   const auto travel = [&](double seconds, double speed_m_s) {
-    for (const MonoTime end = t + static_cast<MonoTime>(seconds * 1e9); t < end;) {
+    for (const MonoTime end = t + Duration::of_s(seconds); t < end;) {
       t += kSecond;
       fresh.travel(t, speed_m_s);
     }

@@ -38,7 +38,7 @@ std::optional<Told> told(const Drive& drive, unsigned seed = 1) {
   const auto to = static_cast<int>(std::lround(drive.to_s / 5e-3));
   for (int i = from; i < to; ++i) {
     const double t_s = 5e-3 * i;
-    now.t = 10 * kSecond + i * kSample;
+    now.t = MonoTime{10 * kSecond + i * kSample};
     if ((i - from) % 2 == 0) {
       now.accelerator = drive.pedal(t_s) + drive.pedal_noise * normal(random);
       now.torque_Nm = drive.torque_Nm(t_s) + drive.torque_noise_Nm * normal(random);
@@ -116,7 +116,7 @@ TEST(DriveChanges, ATorqueIsUnsettledByLess) {
     const auto torque_Nm = rises_by(step_Nm);
     int unsettled = 0;
     for (int i = -800; i < 60; ++i) {
-      const MonoTime t = 10 * kSecond + i * kSample;
+      const MonoTime t{10 * kSecond + i * kSample};
       const Stop ends = changes.step({t, 0.2, torque_Nm(5e-3 * i) + 0.05 * normal(random), t});
       if (i < -400) continue;
       ASSERT_FALSE(ends) << i;
@@ -156,7 +156,7 @@ TEST(DriveChanges, GoesByItsMeans) {
   DriveChanges changes;
   double torque_Nm = 40.0, course_Nm = 40.0, scatter_Nm2 = 0.0, scatter_Nm = 0.0, pedal = 0.1;
   double read_Nm = 40.0;
-  MonoTime t = kSecond, read_at = t;
+  MonoTime t{kSecond}, read_at = t;
   EXPECT_FALSE(changes.step({t, pedal, read_Nm, read_at}));
   int moves = 0, steps = 0;
   for (int i = 1; i < 4000; ++i) {
@@ -166,7 +166,7 @@ TEST(DriveChanges, GoesByItsMeans) {
     if (comes) {
       read_Nm = 40.0 + 15.0 * std::sin(0.02 * i) + (i > 2000 ? 0.3 : 0.02) * normal(random);
       if (i % 300 == 0) read_Nm += 8.0;
-      const double over_s = 1e-9 * static_cast<double>(t - read_at);
+      const double over_s = 1e-9 * static_cast<double>((t - read_at).ns());
       read_at = t;
       scatter_Nm = std::sqrt(scatter_Nm2);
       follow(torque_Nm, read_Nm, over_s / 0.02);
@@ -202,8 +202,9 @@ TEST(DriveChanges, GoesByItsMeans) {
 // The first value is where both begin.
 TEST(DriveChanges, BeginsWhereItFindsThem) {
   DriveChanges changes;
-  EXPECT_FALSE(changes.step({kSecond, 0.9, 200.0, kSecond}));
-  EXPECT_FALSE(changes.step({kSecond + kSample, 0.9, 200.0, kSecond + kSample}));
+  EXPECT_FALSE(changes.step({MonoTime{kSecond}, 0.9, 200.0, MonoTime{kSecond}}));
+  EXPECT_FALSE(
+      changes.step({MonoTime{kSecond + kSample}, 0.9, 200.0, MonoTime{kSecond + kSample}}));
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ class Returned : public testing::Test {
     own_.end();
   }
   OwnForce own_;
-  MonoTime t_ = kSecond;
+  MonoTime t_{kSecond};
   std::mt19937 random_{1};
   std::normal_distribution<double> normal_;
 };

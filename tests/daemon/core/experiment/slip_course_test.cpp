@@ -27,13 +27,13 @@ struct Ramp {
   }
   void run(int samples) {
     for (int i = 0; i < samples; ++i) {
-      const double slip = kRate_1_s * seconds(t) + noise_ * normal_(random_);
+      const double slip = kRate_1_s * seconds(t.since_origin()) + noise_ * normal_(random_);
       course.step(t, kRatio * (1.0 + slip));
       t += sample_;
     }
   }
   SlipCourse course;
-  MonoTime t = 0;
+  MonoTime t{};
 
  private:
   Duration sample_;
@@ -58,7 +58,7 @@ TEST(SlipCourse, SlipLowersTheRatioInDriveAndRaisesItInOverrun) {
   course.begin(kRatio, kDrive_Nm);
   EXPECT_NEAR(course.slip_at(1.02 * kRatio), -0.02, 1e-12);
   for (int i = 0; i < 40; ++i)
-    course.step(i * kSample, kRatio * (1.0 - 0.03 * seconds(i * kSample)));
+    course.step(MonoTime{i * kSample}, kRatio * (1.0 - 0.03 * seconds(i * kSample)));
   EXPECT_NEAR(course.rate_1_s(), 0.03, 1e-9);
 }
 
@@ -91,8 +91,8 @@ TEST(SlipCourse, ForgetsItsRateOverAGapAndEverythingAtTheNextBeginning) {
 TEST(SlipCourse, KeepsTheLargestSlip) {
   SlipCourse course;
   course.begin(kRatio, kOverrun_Nm);
-  for (int i = 0; i < 10; ++i) course.step(i * kSample, 1.03 * kRatio);
-  for (int i = 10; i < 20; ++i) course.step(i * kSample, kRatio);
+  for (int i = 0; i < 10; ++i) course.step(MonoTime{i * kSample}, 1.03 * kRatio);
+  for (int i = 10; i < 20; ++i) course.step(MonoTime{i * kSample}, kRatio);
   EXPECT_NEAR(course.slip(), 0.0, 1e-12);
   EXPECT_NEAR(course.slip_max(), 0.03, 1e-12);
 }
@@ -102,8 +102,8 @@ TEST(SlipCourse, ItsRateIsThatOfTheLast60Milliseconds) {
   for (const Duration sample : {kMillisecond, kSample, 10 * kMillisecond}) {
     SlipCourse course;
     course.begin(kRatio, kOverrun_Nm);
-    const MonoTime bend = 300 * kMillisecond, end = bend + SlipCourse::kRateOver;
-    for (MonoTime t = 0; t <= end; t += sample) {
+    const MonoTime bend{300 * kMillisecond}, end = bend + SlipCourse::kRateOver;
+    for (MonoTime t{}; t <= end; t += sample) {
       const double slip = t > bend ? 0.04 * seconds(t - bend) : 0.0;
       if (t == end) {
         EXPECT_LT(course.rate_1_s(), 0.04 - 1e-6) << sample;
@@ -194,8 +194,8 @@ TEST(SlipCourse, IsWhatSumsOverAllSamplesOfTheRequestSay) {
     ByHand hand;
     for (int i = 0; i < 400; ++i) {
       const double slip = 0.02 + 1e-4 * i + (i < 250 ? 1e-4 : 1e-3) * normal(random);
-      course.step(i * sample, kRatio * (1.0 + slip));
-      hand.step(i * sample, slip);
+      course.step(MonoTime{i * sample}, kRatio * (1.0 + slip));
+      hand.step(MonoTime{i * sample}, slip);
       ASSERT_NEAR(course.slip(), hand.mean_slip, 1e-12) << sample << ' ' << i;
       ASSERT_NEAR(course.rate_1_s(), hand.rate, 1e-9) << sample << ' ' << i;
       if (hand.deviation() == kUnknown) {

@@ -51,7 +51,7 @@ class Monitor : public testing::Test {
   SafetyLimits limits_;
   SafetyMonitor monitor_{limits_};
   SafetySignals signals_{true, 140.0, 300.0, -30.0, 0.0784, 0.0, 3000.0};
-  MonoTime t_ = 0;
+  MonoTime t_{};
 };
 
 TEST_F(Monitor, AllowsAQuietRamp) {
@@ -304,7 +304,7 @@ TEST_F(Monitor, TheDebounceIsTenMilliseconds) {
     return monitor_.check(t_ + since, now, 2500.0);
   };
   EXPECT_EQ(at(kMillisecond), SafetyVerdict::kAllowed);
-  EXPECT_EQ(at(11 * kMillisecond - 1), SafetyVerdict::kAllowed);
+  EXPECT_EQ(at(11 * kMillisecond - kNanosecond), SafetyVerdict::kAllowed);
   EXPECT_EQ(at(11 * kMillisecond), SafetyVerdict::kSlip);
 }
 
@@ -317,9 +317,9 @@ TEST_F(Monitor, ThePauseBeginsWhereTheRequestHadToEnd) {
   const MonoTime withdrawn = t_;
   for (int i = 0; i < 100; ++i) sample(2990.0);
   sample(0.0);
-  EXPECT_EQ(monitor_.check(withdrawn + limits_.pause_min - 1, signals_, 3000.0),
+  EXPECT_EQ(monitor_.check(withdrawn + limits_.pause_min - kNanosecond, signals_, 3000.0),
             SafetyVerdict::kPause);
-  EXPECT_EQ(monitor_.check(withdrawn + limits_.pause_min - 1, signals_, 0.0),
+  EXPECT_EQ(monitor_.check(withdrawn + limits_.pause_min - kNanosecond, signals_, 0.0),
             SafetyVerdict::kAllowed);
   EXPECT_EQ(monitor_.check(withdrawn + limits_.pause_min, signals_, 3000.0),
             SafetyVerdict::kAllowed);

@@ -315,7 +315,7 @@ PollLimits two_identifiers() {
 TEST(TxGatePoll, OnlyTheListedRequestOnItsBus) {
   const auto permits = [](const can::CanFrame& frame, std::uint8_t bus) {
     TxGate gate({}, Control::kCommand, kAnyRequest, two_identifiers());
-    return gate.permits(frame, bus, 0);
+    return gate.permits(frame, bus, MonoTime{});
   };
   for (std::uint32_t id = 0; id <= can::kStandardIdMax; ++id) {
     for (const std::uint8_t bus : {std::uint8_t{0}, std::uint8_t{1}}) {
@@ -338,14 +338,14 @@ TEST(TxGatePoll, SeveralListedIdentifiersOfOneService) {
   limits.requests[2] = {0, {0x7E1, false}, 0x0003, 50 * kMillisecond, 0x21};
   limits.requests[3] = {0, {0x7E2, false}, 0x1103, 50 * kMillisecond};
   limits.size = 4;
-  MonoTime t = 0;
+  MonoTime t{};
   TxGate gate({}, Control::kObserve, {}, limits);
   const auto permits = [&](std::initializer_list<std::uint8_t> bytes, Duration later = kSecond) {
     return gate.permits(request_of(0x7E1, bytes), 0, t += later);
   };
   EXPECT_TRUE(permits({0x05, 0x22, 0x11, 0x01, 0x11, 0x02}));
-  EXPECT_TRUE(permits({0x30, 0, 0}, 0));
-  EXPECT_FALSE(permits({0x30, 0, 0}, 0));  // one for the whole request
+  EXPECT_TRUE(permits({0x30, 0, 0}, Duration{}));
+  EXPECT_FALSE(permits({0x30, 0, 0}, Duration{}));  // one for the whole request
   EXPECT_TRUE(permits({0x02, 0x21, 0x03}));
   EXPECT_FALSE(permits({0x05, 0x22, 0x11, 0x01, 0x11, 0x01}));              // twice
   EXPECT_FALSE(permits({0x05, 0x22, 0x11, 0x01, 0x11, 0x03}));              // another ECU's
@@ -358,13 +358,13 @@ TEST(TxGatePoll, SeveralListedIdentifiersOfOneService) {
   // Each keeps its own period.
   EXPECT_TRUE(permits({0x03, 0x22, 0x11, 0x02}));
   EXPECT_FALSE(permits({0x05, 0x22, 0x11, 0x01, 0x11, 0x02}, 10 * kMillisecond));
-  EXPECT_TRUE(permits({0x03, 0x22, 0x11, 0x01}, 0));
+  EXPECT_TRUE(permits({0x03, 0x22, 0x11, 0x01}, Duration{}));
 }
 
 // Every pair of the first two bytes, and every data identifier: no other service passes.
 TEST(TxGatePoll, OnlyReadingAndOnlyTheListedIdentifier) {
   TxGate gate({}, Control::kCommand, kAnyRequest, two_identifiers());
-  MonoTime t = 0;
+  MonoTime t{};
   for (unsigned first = 0; first < 256; ++first) {
     for (unsigned second = 0; second < 256; ++second) {
       const bool listed = first == 0x03 && second == 0x22;
@@ -397,47 +397,48 @@ TEST(TxGatePoll, OnlyReadingAndOnlyTheListedIdentifier) {
 
 TEST(TxGatePoll, NoneWithoutAllowance) {
   TxGate gate({}, Control::kCommand, kAnyRequest);
-  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x03, 0x22, 0x11, 0x01}), 0, kSecond));
-  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x30, 0, 0}), 0, kSecond));
+  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x03, 0x22, 0x11, 0x01}), 0, MonoTime{kSecond}));
+  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x30, 0, 0}), 0, MonoTime{kSecond}));
 }
 
 TEST(TxGatePoll, NoMoreOftenThanItsPeriod) {
   const can::CanFrame request = request_of(0x7E1, {0x03, 0x22, 0x11, 0x01});
   TxGate gate({}, Control::kObserve, {}, two_identifiers());
   int passed = 0;
-  for (MonoTime t = 0; t < 10 * kSecond; t += kMillisecond) passed += gate.permits(request, 0, t);
+  for (MonoTime t{}; t < MonoTime{10 * kSecond}; t += kMillisecond)
+    passed += gate.permits(request, 0, t);
   EXPECT_GE(passed, 200);
   EXPECT_LE(passed, 202);
   // Early by half a period, and not a tick more.
   TxGate early({}, Control::kObserve, {}, two_identifiers());
-  EXPECT_TRUE(early.permits(request, 0, kSecond));
-  EXPECT_FALSE(early.permits(request, 0, kSecond + 25 * kMillisecond - 1));
-  EXPECT_TRUE(early.permits(request, 0, kSecond + 25 * kMillisecond));
+  EXPECT_TRUE(early.permits(request, 0, MonoTime{kSecond}));
+  EXPECT_FALSE(early.permits(request, 0, MonoTime{kSecond + 25 * kMillisecond} - kNanosecond));
+  EXPECT_TRUE(early.permits(request, 0, MonoTime{kSecond + 25 * kMillisecond}));
   // One that was late lets the next come on the grid, not earlier.
-  EXPECT_TRUE(gate.permits(request, 0, 20 * kSecond + 20 * kMillisecond));
-  EXPECT_FALSE(gate.permits(request, 0, 20 * kSecond + 40 * kMillisecond));
-  EXPECT_TRUE(gate.permits(request, 0, 20 * kSecond + 50 * kMillisecond));
+  EXPECT_TRUE(gate.permits(request, 0, MonoTime{20 * kSecond + 20 * kMillisecond}));
+  EXPECT_FALSE(gate.permits(request, 0, MonoTime{20 * kSecond + 40 * kMillisecond}));
+  EXPECT_TRUE(gate.permits(request, 0, MonoTime{20 * kSecond + 50 * kMillisecond}));
 }
 
 TEST(TxGatePoll, OneFlowControlForARequest) {
   TxGate gate({}, Control::kObserve, {}, two_identifiers());
   const can::CanFrame flow = request_of(0x7E1, {0x30, 0, 0});
-  EXPECT_FALSE(gate.permits(flow, 0, 0));
-  EXPECT_TRUE(gate.permits(request_of(0x7E1, {0x03, 0x22, 0x11, 0x01}), 0, 0));
-  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x31, 0, 0}), 0, 1));  // wait
-  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x30, 1, 0}), 0, 1));
-  EXPECT_TRUE(gate.permits(flow, 0, 1));
-  EXPECT_FALSE(gate.permits(flow, 0, 2));
+  EXPECT_FALSE(gate.permits(flow, 0, MonoTime{}));
+  EXPECT_TRUE(gate.permits(request_of(0x7E1, {0x03, 0x22, 0x11, 0x01}), 0, MonoTime{}));
+  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x31, 0, 0}), 0, MonoTime::of_ns(1)));  // wait
+  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x30, 1, 0}), 0, MonoTime::of_ns(1)));
+  EXPECT_TRUE(gate.permits(flow, 0, MonoTime::of_ns(1)));
+  EXPECT_FALSE(gate.permits(flow, 0, MonoTime::of_ns(2)));
   EXPECT_EQ(gate.refused(), 4U);
 }
 
 TEST(TxGatePoll, FlowControlGoesWhereTheRequestWent) {
   TxGate gate({}, Control::kObserve, {}, two_identifiers());
-  ASSERT_TRUE(gate.permits(request_of(0x7E1, {0x03, 0x22, 0x11, 0x01}), 0, 0));
-  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x30, 0, 0}), 1, 1));
-  EXPECT_FALSE(gate.permits(request_of(0x7E2, {0x30, 0, 0}), 0, 1));
-  EXPECT_FALSE(gate.permits(request_of(0x18DA10F1, {0x30, 0, 0}), 1, 1));
-  EXPECT_TRUE(gate.permits(request_of(0x7E1, {0x30, 0, 0}), 0, 1));
+  ASSERT_TRUE(gate.permits(request_of(0x7E1, {0x03, 0x22, 0x11, 0x01}), 0, MonoTime{}));
+  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x30, 0, 0}), 1, MonoTime::of_ns(1)));
+  EXPECT_FALSE(gate.permits(request_of(0x7E2, {0x30, 0, 0}), 0, MonoTime::of_ns(1)));
+  EXPECT_FALSE(gate.permits(request_of(0x18DA10F1, {0x30, 0, 0}), 1, MonoTime::of_ns(1)));
+  EXPECT_TRUE(gate.permits(request_of(0x7E1, {0x30, 0, 0}), 0, MonoTime::of_ns(1)));
 }
 
 // As many as the list holds, and as many of them as a frame holds.
@@ -449,10 +450,11 @@ TEST(TxGatePoll, AFullListAndAFullRequest) {
   }
   limits.size = PollLimits::kMost;
   TxGate gate({}, Control::kObserve, {}, limits);
-  EXPECT_TRUE(gate.permits(request_of(0x7E1, {0x07, 0x22, 0x11, 0, 0x11, 1, 0x11, 31}), 0, 0));
-  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x03, 0x22, 0x11, 32}), 0, 0));
-  EXPECT_FALSE(gate.permits(request_of(0x7E2, {0x30, 0, 0}), 0, 1));
-  EXPECT_TRUE(gate.permits(request_of(0x7E1, {0x30, 0, 0}), 0, 1));
+  EXPECT_TRUE(
+      gate.permits(request_of(0x7E1, {0x07, 0x22, 0x11, 0, 0x11, 1, 0x11, 31}), 0, MonoTime{}));
+  EXPECT_FALSE(gate.permits(request_of(0x7E1, {0x03, 0x22, 0x11, 32}), 0, MonoTime{}));
+  EXPECT_FALSE(gate.permits(request_of(0x7E2, {0x30, 0, 0}), 0, MonoTime::of_ns(1)));
+  EXPECT_TRUE(gate.permits(request_of(0x7E1, {0x30, 0, 0}), 0, MonoTime::of_ns(1)));
 }
 
 }  // namespace

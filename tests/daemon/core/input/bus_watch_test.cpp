@@ -22,10 +22,10 @@ TEST(BusWatch, OnlyWhatIsNeededMustBeUp) {
 TEST(BusWatch, ALinkThatIsDownIsAFault) {
   BusWatch buses;
   FaultSet faults;
-  buses.raise_faults(1, faults);
+  buses.raise_faults(MonoTime::of_ns(1), faults);
   EXPECT_EQ(faults.bits(), 0U);
   buses.on_link(1, BusState::kDown);
-  buses.raise_faults(1, faults);
+  buses.raise_faults(MonoTime::of_ns(1), faults);
   EXPECT_EQ(faults.bits(), fault_bit(Fault::kBusDown));
 }
 

@@ -159,7 +159,7 @@ bool wrong(double period_ms, double jitter_ms, int frames, Duration expected = 1
   bool found = false;
   for (int i = 0; i < frames; ++i) {
     const double late_ms = i % 5 == 0 ? jitter_ms : 0.0;
-    guard.count(static_cast<MonoTime>((1000.0 + i * period_ms + late_ms) * 1e6));
+    guard.count(MonoTime{Duration::of_ms(1000.0 + i * period_ms + late_ms)});
     found = found || guard.wrong_rate();
   }
   return found;
@@ -181,7 +181,7 @@ TEST(FrameGuard, HalfAsOftenIsFound) {
 
 TEST(FrameGuard, APauseIsNoWrongRate) {
   FrameGuard guard(10 * kMillisecond, nullptr);
-  MonoTime t = 0;
+  MonoTime t{};
   for (int i = 0; i < 100; ++i) {
     t += i == 50 ? kSecond : 10 * kMillisecond;
     guard.count(t);
@@ -192,7 +192,7 @@ TEST(FrameGuard, APauseIsNoWrongRate) {
 // Ten times as often until the pause: does the wrong rate outlive it?
 bool outlives(Duration period, Duration pause) {
   FrameGuard guard(period, nullptr);
-  MonoTime t = 0;
+  MonoTime t{};
   for (int i = 0; i < 40; ++i) guard.count(t += period / 10);
   EXPECT_TRUE(guard.wrong_rate());
   guard.count(t + pause);
@@ -202,14 +202,14 @@ bool outlives(Duration period, Duration pause) {
 TEST(FrameGuard, WhenAPauseBeginsTheCountAnew) {
   // 50 ms, or 2.5 periods where that is longer.
   EXPECT_TRUE(outlives(10 * kMillisecond, 50 * kMillisecond));
-  EXPECT_FALSE(outlives(10 * kMillisecond, 50 * kMillisecond + 1));
+  EXPECT_FALSE(outlives(10 * kMillisecond, 50 * kMillisecond + kNanosecond));
   EXPECT_TRUE(outlives(40 * kMillisecond, 100 * kMillisecond));
-  EXPECT_FALSE(outlives(40 * kMillisecond, 100 * kMillisecond + 1));
+  EXPECT_FALSE(outlives(40 * kMillisecond, 100 * kMillisecond + kNanosecond));
 }
 
 TEST(FrameGuard, WithoutAPeriodNoRateIsWrong) {
   FrameGuard guard;
-  for (MonoTime t = 1; t < 100; ++t) guard.count(t);
+  for (int i = 1; i < 100; ++i) guard.count(MonoTime::of_ns(i));
   EXPECT_FALSE(guard.wrong_rate());
 }
 
@@ -278,14 +278,14 @@ TEST(FrameGuard, NothingIsTakenFromABadFrame) {
   const auto take = [&](MonoTime t, const can::CanFrame& frame) {
     return monitor.on_frame({.t = t, .frame = frame}, faults);
   };
-  EXPECT_EQ(take(10, frame_of(1, 50)), FrameUse::kTaken);
+  EXPECT_EQ(take(MonoTime::of_ns(10), frame_of(1, 50)), FrameUse::kTaken);
   EXPECT_EQ(monitor.history(Role::kEngineSpeed).newest_value(), 50.0);
-  EXPECT_EQ(take(20, frame_of(1, 60)), FrameUse::kBad);
-  EXPECT_EQ(take(30, frame_of(2, 60, 0x121)), FrameUse::kBad);
+  EXPECT_EQ(take(MonoTime::of_ns(20), frame_of(1, 60)), FrameUse::kBad);
+  EXPECT_EQ(take(MonoTime::of_ns(30), frame_of(2, 60, 0x121)), FrameUse::kBad);
   EXPECT_EQ(monitor.history(Role::kEngineSpeed).newest_value(), 50.0);
   EXPECT_TRUE(faults.has(Fault::kInputProtection));
   EXPECT_FALSE(monitor.suspect());
-  EXPECT_EQ(take(40, frame_of(9, 60)), FrameUse::kBad);
+  EXPECT_EQ(take(MonoTime::of_ns(40), frame_of(9, 60)), FrameUse::kBad);
   EXPECT_TRUE(monitor.suspect());
 }
 

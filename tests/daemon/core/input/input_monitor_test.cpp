@@ -78,7 +78,7 @@ TEST(InputMonitor, EveryIdentifierLengthAndKind) {
         const FrameUse expected = !named                                 ? FrameUse::kForeign
                                   : kind == kStandard && length == right ? FrameUse::kTaken
                                                                          : FrameUse::kBad;
-        ASSERT_EQ(bench.monitor.on_frame(at(1, frame), bench.faults), expected)
+        ASSERT_EQ(bench.monitor.on_frame(at(MonoTime::of_ns(1), frame), bench.faults), expected)
             << id << " " << int{length} << " " << kind;
       }
     }
@@ -100,9 +100,11 @@ TEST(InputMonitor, ExtendedIdentifiersAreFoundAmongMany) {
   for (const RoleBinding& binding : config.roles) {
     can::CanFrame frame = raw_frame(1);
     frame.id = binding.id;
-    EXPECT_EQ(bench.monitor.on_frame(at(1, frame), bench.faults), FrameUse::kTaken);
+    EXPECT_EQ(bench.monitor.on_frame(at(MonoTime::of_ns(1), frame), bench.faults),
+              FrameUse::kTaken);
     frame.id.value ^= 0x1000000;
-    EXPECT_EQ(bench.monitor.on_frame(at(1, frame), bench.faults), FrameUse::kForeign);
+    EXPECT_EQ(bench.monitor.on_frame(at(MonoTime::of_ns(1), frame), bench.faults),
+              FrameUse::kForeign);
   }
 }
 
@@ -129,12 +131,15 @@ struct GroupBench : Bench {
 
 TEST(InputMonitor, J1939FramesAreTakenByParameterGroup) {
   GroupBench bench(one_group_signal(0xFE));
-  EXPECT_EQ(bench.from(0x00, 7, 1, 0x0CF00300), FrameUse::kForeign);  // another group
-  EXPECT_EQ(bench.from(0x00, 7, 1, 0x0DF00400), FrameUse::kForeign);  // another data page
+  EXPECT_EQ(bench.from(0x00, 7, MonoTime::of_ns(1), 0x0CF00300),
+            FrameUse::kForeign);  // another group
+  EXPECT_EQ(bench.from(0x00, 7, MonoTime::of_ns(1), 0x0DF00400),
+            FrameUse::kForeign);  // another data page
   EXPECT_FALSE(bench.has_value());
-  EXPECT_EQ(bench.from(0x31, 7, 2, 0x0CF00400), FrameUse::kTaken);
+  EXPECT_EQ(bench.from(0x31, 7, MonoTime::of_ns(2), 0x0CF00400), FrameUse::kTaken);
   EXPECT_EQ(bench.value(), 7.0);
-  EXPECT_EQ(bench.from(0x31, 8, 3, 0x18F00400), FrameUse::kTaken);  // another priority
+  EXPECT_EQ(bench.from(0x31, 8, MonoTime::of_ns(3), 0x18F00400),
+            FrameUse::kTaken);  // another priority
   EXPECT_EQ(bench.value(), 8.0);
 }
 
@@ -142,49 +147,49 @@ TEST(InputMonitor, J1939DestinationsDoNotCount) {
   Config config = one_group_signal(0x03);
   config.roles[0].id = {0x0C000003, true};  // TSC1, to address 0x00
   GroupBench bench(config);
-  EXPECT_EQ(bench.from(0x03, 5, 1, 0x0C00FF00), FrameUse::kTaken);
-  EXPECT_EQ(bench.from(0x03, 5, 2, 0x0C01FF00), FrameUse::kForeign);
+  EXPECT_EQ(bench.from(0x03, 5, MonoTime::of_ns(1), 0x0C00FF00), FrameUse::kTaken);
+  EXPECT_EQ(bench.from(0x03, 5, MonoTime::of_ns(2), 0x0C01FF00), FrameUse::kForeign);
 }
 
 TEST(InputMonitor, J1939FollowsTheFirstSourceThatGivesAValueUntilItIsStale) {
   GroupBench bench(one_group_signal(0xFE));
-  bench.from(0x0F, 0xFF, 0);  // not available
+  bench.from(0x0F, 0xFF, MonoTime{});  // not available
   EXPECT_FALSE(bench.has_value());
-  bench.from(0x31, 10, 1 * kMillisecond);
-  bench.from(0x0F, 20, 2 * kMillisecond);
+  bench.from(0x31, 10, MonoTime{1 * kMillisecond});
+  bench.from(0x0F, 20, MonoTime{2 * kMillisecond});
   EXPECT_EQ(bench.value(), 10.0);
-  bench.monitor.update(100 * kMillisecond, bench.faults);
+  bench.monitor.update(MonoTime{100 * kMillisecond}, bench.faults);
   ASSERT_EQ(bench.monitor.quality(Role::kEngineSpeed), SignalQuality::kStale);
-  bench.from(0x0F, 0xFF, 101 * kMillisecond);  // not available: nothing to follow
+  bench.from(0x0F, 0xFF, MonoTime{101 * kMillisecond});  // not available: nothing to follow
   EXPECT_EQ(bench.value(), 10.0);
-  bench.from(0x0F, 21, 102 * kMillisecond);
+  bench.from(0x0F, 21, MonoTime{102 * kMillisecond});
   EXPECT_EQ(bench.value(), 21.0);
-  bench.from(0x31, 11, 103 * kMillisecond);  // back again: too late
+  bench.from(0x31, 11, MonoTime{103 * kMillisecond});  // back again: too late
   EXPECT_EQ(bench.value(), 21.0);
   double before = 0.0;  // nothing of the former source is left
-  EXPECT_FALSE(
-      bench.monitor.history(Role::kEngineSpeed).value_at(50 * kMillisecond, kMillisecond, before));
+  EXPECT_FALSE(bench.monitor.history(Role::kEngineSpeed)
+                   .value_at(MonoTime{50 * kMillisecond}, kMillisecond, before));
 }
 
 TEST(InputMonitor, J1939SourceOfTheDbcComesBeforeOthers) {
   GroupBench bench(one_group_signal(0x00));
-  bench.from(0x31, 10, 1 * kMillisecond);
+  bench.from(0x31, 10, MonoTime{1 * kMillisecond});
   EXPECT_EQ(bench.value(), 10.0);  // any source will do while it is the only one
-  bench.from(0x00, 20, 2 * kMillisecond);
-  bench.from(0x31, 11, 3 * kMillisecond);
+  bench.from(0x00, 20, MonoTime{2 * kMillisecond});
+  bench.from(0x31, 11, MonoTime{3 * kMillisecond});
   EXPECT_EQ(bench.value(), 20.0);
 }
 
 TEST(InputMonitor, J1939SourceThatIsNotFollowedCausesNoFaults) {
   GroupBench bench(one_group_signal(0xFE));
-  bench.from(0x31, 10, 1 * kMillisecond);
-  bench.from(0x0F, 0xFF, 2 * kMillisecond);
+  bench.from(0x31, 10, MonoTime{1 * kMillisecond});
+  bench.from(0x0F, 0xFF, MonoTime{2 * kMillisecond});
   can::CanFrame shorter = raw_frame(1, 4);
   shorter.id = {0x18F0040F, true};
-  EXPECT_EQ(bench.monitor.on_frame(at(3 * kMillisecond, shorter), bench.faults),
+  EXPECT_EQ(bench.monitor.on_frame(at(MonoTime{3 * kMillisecond}, shorter), bench.faults),
             FrameUse::kForeign);
   EXPECT_EQ(bench.faults.bits(), 0U);
-  bench.from(0x31, 0xFF, 4 * kMillisecond);
+  bench.from(0x31, 0xFF, MonoTime{4 * kMillisecond});
   EXPECT_TRUE(bench.faults.has(Fault::kInputRange));
 }
 
@@ -197,10 +202,10 @@ TEST(InputMonitor, J1939SourcesOfAnotherMessageAreNotThisOnes) {
   config.roles[1].sources.reset();
   config.roles[1].sources.set(0x31);
   GroupBench bench(config);
-  bench.from(0x31, 10, 1);
+  bench.from(0x31, 10, MonoTime::of_ns(1));
   EXPECT_FALSE(bench.has_value());
   EXPECT_EQ(bench.monitor.history(Role::kVehicleSpeed).newest_value(), 10.0);
-  bench.from(0x05, 20, 2);
+  bench.from(0x05, 20, MonoTime::of_ns(2));
   EXPECT_EQ(bench.value(), 20.0);
   EXPECT_EQ(bench.monitor.history(Role::kVehicleSpeed).newest_value(), 10.0);
 }
@@ -218,7 +223,7 @@ TEST(InputMonitor, FdLengthsAreThoseOfTheWire) {
       Bench bench(config);
       can::CanFrame frame = raw_frame(1, sent);
       frame.fd = true;
-      EXPECT_EQ(bench.monitor.on_frame(at(1, frame), bench.faults),
+      EXPECT_EQ(bench.monitor.on_frame(at(MonoTime::of_ns(1), frame), bench.faults),
                 sent == wire ? FrameUse::kTaken : FrameUse::kBad)
           << length << " " << int{sent};
     }
@@ -232,7 +237,7 @@ TEST(InputMonitor, EveryRawValueAgainstTheRange) {
     Bench bench(one_signal(Role::kSecondaryPressure, signal_def(16, can::ValueType::kUnsigned,
                                                                 scale, offset, minimum, maximum)));
     for (std::uint32_t raw = 0; raw <= 0xFFFF; ++raw) {
-      const MonoTime t = MonoTime{raw} * kMillisecond;
+      const MonoTime t{raw * kMillisecond};
       bench.faults = {};
       bench.monitor.on_frame(at(t, raw_frame(raw)), bench.faults);
       const bool inside = raw >= 10 && raw <= 64000;
@@ -251,20 +256,20 @@ TEST(InputMonitor, AllOnesWithoutARangeIsNotAvailable) {
     const std::uint64_t ones = (std::uint64_t{1} << length) - 1;
     Bench bench(
         one_signal(Role::kSecondaryPressure, signal_def(length, can::ValueType::kUnsigned)));
-    bench.monitor.on_frame(at(1, raw_frame(ones)), bench.faults);
+    bench.monitor.on_frame(at(MonoTime::of_ns(1), raw_frame(ones)), bench.faults);
     EXPECT_TRUE(bench.faults.has(Fault::kInputRange)) << length;
     EXPECT_TRUE(bench.monitor.history(Role::kSecondaryPressure).empty());
-    bench.monitor.on_frame(at(2, raw_frame(ones - 1)), bench.faults);
+    bench.monitor.on_frame(at(MonoTime::of_ns(2), raw_frame(ones - 1)), bench.faults);
     EXPECT_FALSE(bench.monitor.history(Role::kSecondaryPressure).empty());
     // In a range that includes it, it is a value; in a signed signal it is -1.
     Bench ranged(one_signal(
         Role::kSecondaryPressure,
         signal_def(length, can::ValueType::kUnsigned, 1.0, 0.0, 0.0, static_cast<double>(ones))));
-    ranged.monitor.on_frame(at(1, raw_frame(ones)), ranged.faults);
+    ranged.monitor.on_frame(at(MonoTime::of_ns(1), raw_frame(ones)), ranged.faults);
     EXPECT_FALSE(ranged.monitor.history(Role::kSecondaryPressure).empty()) << length;
     Bench negative(
         one_signal(Role::kSecondaryPressure, signal_def(length, can::ValueType::kSigned)));
-    negative.monitor.on_frame(at(1, raw_frame(ones)), negative.faults);
+    negative.monitor.on_frame(at(MonoTime::of_ns(1), raw_frame(ones)), negative.faults);
     ASSERT_FALSE(negative.monitor.history(Role::kSecondaryPressure).empty()) << length;
     EXPECT_EQ(negative.monitor.history(Role::kSecondaryPressure).newest_value(), -1.0);
   }
@@ -272,13 +277,14 @@ TEST(InputMonitor, AllOnesWithoutARangeIsNotAvailable) {
 
 TEST(InputMonitor, FloatsThatAreNoNumbers) {
   Bench bench(one_signal(Role::kPrimarySpeed, signal_def(64, can::ValueType::kFloat64)));
-  MonoTime t = 0;
+  MonoTime t{};
   for (const double value :
        {1.5, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
         -std::numeric_limits<double>::infinity(), -0.0,
         std::numeric_limits<double>::denorm_min()}) {
     bench.faults = {};
-    bench.monitor.on_frame(at(++t, raw_frame(std::bit_cast<std::uint64_t>(value))), bench.faults);
+    bench.monitor.on_frame(at(t += kNanosecond, raw_frame(std::bit_cast<std::uint64_t>(value))),
+                           bench.faults);
     EXPECT_EQ(bench.faults.has(Fault::kInputNotFinite), !std::isfinite(value)) << value;
     const SignalHistory& history = bench.monitor.history(Role::kPrimarySpeed);
     EXPECT_EQ(history.newest() == t, std::isfinite(value)) << value;
@@ -289,7 +295,7 @@ TEST(InputMonitor, FlagsAreZeroOrOne) {
   for (std::uint64_t raw = 0; raw < 4; ++raw) {
     Bench bench(one_signal(Role::kExperimentActive,
                            signal_def(2, can::ValueType::kUnsigned, 1.0, 0.0, 0.0, 3.0)));
-    bench.monitor.on_frame(at(1, raw_frame(raw)), bench.faults);
+    bench.monitor.on_frame(at(MonoTime::of_ns(1), raw_frame(raw)), bench.faults);
     EXPECT_EQ(bench.monitor.history(Role::kExperimentActive).empty(), raw > 1) << raw;
     EXPECT_EQ(bench.faults.has(Fault::kInputRange), raw > 1) << raw;
   }
@@ -307,7 +313,8 @@ TEST(InputMonitor, MultiplexedSignalsAreTakenWhereTheyAreSelected) {
     for (std::uint64_t page = 0; page < 16; ++page) {
       Bench bench(config);
       const auto frame = raw_frame(1000 | inner << 32 | page << 40);
-      EXPECT_EQ(bench.monitor.on_frame(at(1, frame), bench.faults), FrameUse::kTaken);
+      EXPECT_EQ(bench.monitor.on_frame(at(MonoTime::of_ns(1), frame), bench.faults),
+                FrameUse::kTaken);
       const bool selected = page == 1 && ((inner >= 3 && inner <= 5) || inner == 9);
       ASSERT_EQ(!bench.monitor.history(Role::kPrimarySpeed).empty(), selected);
       EXPECT_EQ(bench.faults.bits(), 0U);
@@ -321,29 +328,29 @@ TEST(InputMonitor, StaleAfterFiftyMillisecondsOrTwoAndAHalfPeriods) {
         std::pair{1000.0, 2500.0}}) {
     Bench bench(
         one_signal(Role::kPrimarySpeed, signal_def(16, can::ValueType::kUnsigned), 8, period_ms));
-    bench.monitor.update(0, bench.faults);
+    bench.monitor.update(MonoTime{}, bench.faults);
     EXPECT_EQ(bench.monitor.quality(Role::kPrimarySpeed), SignalQuality::kMissing);
     EXPECT_EQ(bench.monitor.quality(Role::kSecondarySpeed), SignalQuality::kUnbound);
-    bench.monitor.on_frame(at(100, raw_frame(5)), bench.faults);
-    const auto limit = static_cast<Duration>(limit_ms * 1e6);
-    bench.monitor.update(100 + limit, bench.faults);
+    bench.monitor.on_frame(at(MonoTime::of_ns(100), raw_frame(5)), bench.faults);
+    const auto limit = Duration::of_ms(limit_ms);
+    bench.monitor.update(MonoTime::of_ns(100) + limit, bench.faults);
     EXPECT_EQ(bench.monitor.quality(Role::kPrimarySpeed), SignalQuality::kValid) << period_ms;
     EXPECT_FALSE(bench.faults.has(Fault::kInputStale));
-    bench.monitor.update(101 + limit, bench.faults);
+    bench.monitor.update(MonoTime::of_ns(101) + limit, bench.faults);
     EXPECT_EQ(bench.monitor.quality(Role::kPrimarySpeed), SignalQuality::kStale) << period_ms;
     EXPECT_TRUE(bench.faults.has(Fault::kInputStale));
     EXPECT_TRUE(bench.monitor.any_lost());
-    bench.monitor.on_frame(at(102 + limit, raw_frame(5)), bench.faults);
-    bench.monitor.update(102 + limit, bench.faults);
+    bench.monitor.on_frame(at(MonoTime::of_ns(102) + limit, raw_frame(5)), bench.faults);
+    bench.monitor.update(MonoTime::of_ns(102) + limit, bench.faults);
     EXPECT_EQ(bench.monitor.quality(Role::kPrimarySpeed), SignalQuality::kValid);
   }
 }
 
 TEST(InputMonitor, WhatNeverComesIsMissingAfterTenPeriods) {
   Bench bench(one_signal(Role::kPrimarySpeed, signal_def(16, can::ValueType::kUnsigned)));
-  const MonoTime start = 5 * kSecond;
+  const MonoTime start{5 * kSecond};
   bench.monitor.update(start, bench.faults);
-  bench.monitor.update(start + 100 * kMillisecond - 1, bench.faults);
+  bench.monitor.update(start + 100 * kMillisecond - kNanosecond, bench.faults);
   EXPECT_FALSE(bench.faults.has(Fault::kInputMissing));
   bench.monitor.update(start + 100 * kMillisecond, bench.faults);
   EXPECT_TRUE(bench.faults.has(Fault::kInputMissing));
@@ -352,9 +359,9 @@ TEST(InputMonitor, WhatNeverComesIsMissingAfterTenPeriods) {
 
 TEST(InputMonitor, ThePeriodIsLearnedFromTheMiddleOfEightIntervals) {
   Bench bench(one_signal(Role::kPrimarySpeed, signal_def(16, can::ValueType::kUnsigned), 8, {}));
-  MonoTime t = 0;
+  MonoTime t{};
   int frames = 0;
-  for (const Duration interval : {0, 40, 44, 39, 200, 41, 1, 40, 40}) {
+  for (const int interval : {0, 40, 44, 39, 200, 41, 1, 40, 40}) {
     EXPECT_FALSE(bench.monitor.period(Role::kPrimarySpeed).has_value()) << frames;
     t += interval * kMillisecond;
     bench.monitor.on_frame(at(t, raw_frame(static_cast<std::uint64_t>(++frames))), bench.faults);
@@ -373,18 +380,18 @@ TEST(InputMonitor, ThePeriodIsLearnedFromTheMiddleOfEightIntervals) {
 
 TEST(InputMonitor, StampsThatRunBackwardsAreCountedAndHeldBack) {
   Bench bench(one_signal(Role::kPrimarySpeed, signal_def(16, can::ValueType::kUnsigned)));
-  bench.monitor.on_frame(at(10 * kSecond, raw_frame(1)), bench.faults);
+  bench.monitor.on_frame(at(MonoTime{10 * kSecond}, raw_frame(1)), bench.faults);
   EXPECT_FALSE(bench.faults.has(Fault::kTimeStamp));
   for (const Duration back : {1 * kMillisecond, 10 * kSecond}) {
     bench.faults = {};
-    bench.monitor.on_frame(at(10 * kSecond - back, raw_frame(2)), bench.faults);
+    bench.monitor.on_frame(at(MonoTime{10 * kSecond - back}, raw_frame(2)), bench.faults);
     EXPECT_TRUE(bench.faults.has(Fault::kTimeStamp));
-    EXPECT_EQ(bench.monitor.history(Role::kPrimarySpeed).newest(), 10 * kSecond);
+    EXPECT_EQ(bench.monitor.history(Role::kPrimarySpeed).newest(), MonoTime{10 * kSecond});
     EXPECT_EQ(bench.monitor.history(Role::kPrimarySpeed).newest_value(), 2.0);
   }
   // Later than the one that ran back, and still not in turn.
   bench.faults = {};
-  bench.monitor.on_frame(at(10 * kSecond - kMillisecond, raw_frame(3)), bench.faults);
+  bench.monitor.on_frame(at(MonoTime{10 * kSecond - kMillisecond}, raw_frame(3)), bench.faults);
   EXPECT_TRUE(bench.faults.has(Fault::kTimeStamp));
 }
 
@@ -401,16 +408,16 @@ struct Speeds {
   SignalQuality primary() const { return bench.monitor.quality(Role::kPrimarySpeed); }
   SignalQuality secondary() const { return bench.monitor.quality(Role::kSecondarySpeed); }
   Bench bench;
-  MonoTime t = 0;
+  MonoTime t{};
 };
 
 TEST(InputMonitor, ASpeedThatStandsStillWhileTheOtherMovesIsFrozen) {
   Speeds speeds;
   for (int i = 0; i < 100; ++i) speeds.drive(105.0 + 0.1 * (i % 3), 236.0 + 0.2 * (i % 5));
   EXPECT_EQ(speeds.primary(), SignalQuality::kValid);
-  MonoTime frozen_at = 0;
+  MonoTime frozen_at{};
   const MonoTime from = speeds.t;
-  for (int i = 0; i < 100 && frozen_at == 0; ++i) {
+  for (int i = 0; i < 100 && frozen_at == MonoTime{}; ++i) {
     speeds.drive(105.0, 236.0 - 4.0 * i);  // gone down by 15 % after 9 steps
     if (speeds.primary() == SignalQuality::kFrozen) frozen_at = speeds.t;
   }
@@ -441,9 +448,10 @@ TEST(InputMonitor, AllValidNeedsEveryRequiredRole) {
   for (unsigned word = 0; word < 8; ++word) {
     Bench one(test::vehicle_config());
     for (std::size_t i = 0; i < 3; ++i) {
-      if ((word >> i & 1U) != 0) one.monitor.on_frame(at(1, frames[i]), one.faults);
+      if ((word >> i & 1U) != 0)
+        one.monitor.on_frame(at(MonoTime::of_ns(1), frames[i]), one.faults);
     }
-    one.monitor.update(2, one.faults);
+    one.monitor.update(MonoTime::of_ns(2), one.faults);
     EXPECT_EQ(one.monitor.all_valid(), word == 7) << word;
   }
 }
@@ -469,7 +477,7 @@ class Spikes : public testing::Test {
     for (int i = 0; i < frames; ++i) tell(kSpeed + noise());
   }
   Bench bench_;
-  MonoTime t_ = kSecond;
+  MonoTime t_{kSecond};
   std::uint64_t state_ = 1;
 };
 
@@ -516,7 +524,7 @@ TEST_F(Spikes, NoneAreSeenBeforeTheNoiseIsKnown) {
 TEST(InputMonitor, SlowSpikesAreShort) {
   Bench bench(
       one_signal(Role::kSecondaryPressure, signal_def(16, can::ValueType::kUnsigned), 8, 50.0));
-  MonoTime t = kSecond;
+  MonoTime t{kSecond};
   const auto tell = [&](std::uint64_t raw) {
     t += 50 * kMillisecond;
     bench.monitor.on_frame(at(t, raw_frame(raw)), bench.faults);

@@ -86,8 +86,8 @@ TEST(Roles, UnitStepAndDelay) {
   binding.delay_ms = 2.5;
   Bench bench({binding});
   EXPECT_EQ(bench.monitor.course(Role::kPrimarySpeed).resolution(), 0.5);
-  EXPECT_EQ(bench.monitor.delay(Role::kPrimarySpeed), 2'500'000);
-  bench.tell(kId, 100, 1);
+  EXPECT_EQ(bench.monitor.delay(Role::kPrimarySpeed), 2500 * kMicrosecond);
+  bench.tell(kId, 100, MonoTime::of_ns(1));
   EXPECT_EQ(bench.value(Role::kPrimarySpeed), -2.0 * (0.25 * 100.0 + 5.0) + 7.0);
 }
 
@@ -97,7 +97,7 @@ TEST(Roles, ASpikeIsMeasuredInSteps) {
     RoleBinding binding = bound(Role::kPrimarySpeed, kId, signal_def(16, 0.5, 40.0));
     binding.factor = 20.0;
     Bench bench({binding});
-    MonoTime t = kSecond;
+    MonoTime t{kSecond};
     for (int i = 0; i < 100; ++i) bench.tell(kId, 1000, t += 10 * kMillisecond);
     bench.tell(kId, 1000 + steps, t += 10 * kMillisecond);
     EXPECT_EQ(bench.value(Role::kPrimarySpeed) != 20.0 * (0.5 * 1000.0 + 40.0), taken) << steps;
@@ -116,8 +116,8 @@ TEST(Roles, SpikesForSixtyMilliseconds) {
     RoleBinding binding = bound(Role::kSecondaryPressure, kId);
     binding.period_ms = c.period_ms;
     Bench bench({binding});
-    const auto period = static_cast<Duration>(c.period_ms * 1e6);
-    MonoTime t = kSecond;
+    const auto period = Duration::of_ms(c.period_ms);
+    MonoTime t{kSecond};
     for (int i = 0; i < 100; ++i) bench.tell(kId, 1000, t += period);
     int left_out = 0;
     while (left_out < 10) {
@@ -136,11 +136,11 @@ TEST(Roles, TheLastStepOfARangeIsInside) {
   binding.minimum = 0.0;
   binding.maximum = 29999999.2;
   Bench bench({binding});
-  bench.tell(kId, 299'999'992, 1, 4);
+  bench.tell(kId, 299'999'992, MonoTime::of_ns(1), 4);
   EXPECT_TRUE(bench.has(Role::kSecondaryPressure));
-  bench.tell(kId, 299'999'993, 2, 4);
+  bench.tell(kId, 299'999'993, MonoTime::of_ns(2), 4);
   EXPECT_TRUE(bench.faults.has(Fault::kInputRange));
-  EXPECT_EQ(bench.monitor.history(Role::kSecondaryPressure).newest(), 1);
+  EXPECT_EQ(bench.monitor.history(Role::kSecondaryPressure).newest(), MonoTime::of_ns(1));
 }
 
 TEST(Roles, AValueThatIsTooLargeForItsUnit) {
@@ -150,7 +150,7 @@ TEST(Roles, AValueThatIsTooLargeForItsUnit) {
   binding.message_length = 8;
   binding.factor = 1e5;
   Bench bench({binding});
-  bench.tell(kId, std::bit_cast<std::uint64_t>(1e304), 1, 8);
+  bench.tell(kId, std::bit_cast<std::uint64_t>(1e304), MonoTime::of_ns(1), 8);
   EXPECT_FALSE(bench.has(Role::kSecondaryPressure));
   EXPECT_TRUE(bench.faults.has(Fault::kInputNotFinite));
 }
@@ -159,34 +159,36 @@ TEST(Roles, AValueThatIsTooLargeForItsUnit) {
 
 TEST(Roles, TheFirstAndTheLastStandardIdentifier) {
   Bench bench({bound(Role::kEngineSpeed, {0, false}), bound(Role::kVehicleSpeed, {0x7FF, false})});
-  EXPECT_EQ(bench.tell({0, false}, 7, 1), FrameUse::kTaken);
+  EXPECT_EQ(bench.tell({0, false}, 7, MonoTime::of_ns(1)), FrameUse::kTaken);
   EXPECT_EQ(bench.value(Role::kEngineSpeed), 7.0);
-  EXPECT_EQ(bench.tell({0x7FF, false}, 8, 2), FrameUse::kTaken);
+  EXPECT_EQ(bench.tell({0x7FF, false}, 8, MonoTime::of_ns(2)), FrameUse::kTaken);
   EXPECT_EQ(bench.value(Role::kVehicleSpeed), 8.0);
-  EXPECT_EQ(bench.tell({0x800, false}, 9, 3), FrameUse::kForeign);  // 11 bits end before
-  EXPECT_EQ(bench.tell({0, true}, 9, 3), FrameUse::kForeign);
+  EXPECT_EQ(bench.tell({0x800, false}, 9, MonoTime::of_ns(3)),
+            FrameUse::kForeign);  // 11 bits end before
+  EXPECT_EQ(bench.tell({0, true}, 9, MonoTime::of_ns(3)), FrameUse::kForeign);
 }
 
 TEST(Roles, TheSameIdentifierOnTwoBuses) {
   RoleBinding other = bound(Role::kVehicleSpeed, kId);
   other.bus = 1;
   Bench bench({bound(Role::kEngineSpeed, kId), other});
-  EXPECT_EQ(bench.tell(kId, 7, 1, 2, 0), FrameUse::kTaken);
+  EXPECT_EQ(bench.tell(kId, 7, MonoTime::of_ns(1), 2, 0), FrameUse::kTaken);
   EXPECT_EQ(bench.value(Role::kEngineSpeed), 7.0);
   EXPECT_FALSE(bench.has(Role::kVehicleSpeed));
-  EXPECT_EQ(bench.tell(kId, 8, 2, 2, 1), FrameUse::kTaken);
+  EXPECT_EQ(bench.tell(kId, 8, MonoTime::of_ns(2), 2, 1), FrameUse::kTaken);
   EXPECT_EQ(bench.value(Role::kEngineSpeed), 7.0);
   EXPECT_EQ(bench.value(Role::kVehicleSpeed), 8.0);
-  EXPECT_EQ(bench.tell(kId, 9, 3, 2, 2), FrameUse::kForeign);  // a bus that is not there
+  EXPECT_EQ(bench.tell(kId, 9, MonoTime::of_ns(3), 2, 2),
+            FrameUse::kForeign);  // a bus that is not there
   // Each bus has its own time.
-  EXPECT_EQ(bench.tell(kId, 9, 1, 2, 0), FrameUse::kTaken);
+  EXPECT_EQ(bench.tell(kId, 9, MonoTime::of_ns(1), 2, 0), FrameUse::kTaken);
   EXPECT_FALSE(bench.faults.has(Fault::kTimeStamp));
 }
 
 TEST(Roles, TwoStampsMayBeTheSame) {
   Bench bench({bound(Role::kEngineSpeed, kId)});
-  bench.tell(kId, 7, 5);
-  bench.tell(kId, 8, 5);
+  bench.tell(kId, 7, MonoTime::of_ns(5));
+  bench.tell(kId, 8, MonoTime::of_ns(5));
   EXPECT_EQ(bench.faults.bits(), 0U);
 }
 
@@ -200,11 +202,11 @@ TEST(Roles, ExtendedIdentifiersThatFallTogether) {
   }
   Bench bench(roles);
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    EXPECT_EQ(bench.tell({ids[i], true}, 100 + i, 1), FrameUse::kTaken);
+    EXPECT_EQ(bench.tell({ids[i], true}, 100 + i, MonoTime::of_ns(1)), FrameUse::kTaken);
     EXPECT_EQ(bench.value(static_cast<Role>(i)), 100.0 + static_cast<double>(i));
   }
-  EXPECT_EQ(bench.tell({0x18FF00C5, true}, 1, 2), FrameUse::kForeign);
-  EXPECT_EQ(bench.tell({0x18FF00A1, true}, 1, 2), FrameUse::kForeign);
+  EXPECT_EQ(bench.tell({0x18FF00C5, true}, 1, MonoTime::of_ns(2)), FrameUse::kForeign);
+  EXPECT_EQ(bench.tell({0x18FF00A1, true}, 1, MonoTime::of_ns(2)), FrameUse::kForeign);
 }
 
 // --- J1939: which of several sources ---
@@ -224,23 +226,23 @@ TEST(Sources, ThatOfTheDbcComesFirstUnlessItIsTheNullAddress) {
   for (const Case& c : {Case{0x00, true}, Case{0xC8, true}, Case{0xFD, true}, Case{0xFE, false},
                         Case{0xFF, false}}) {
     Bench bench({by_group(Role::kVehicleSpeed, c.dbc_source)});
-    bench.tell(from(0x31), 10, 1 * kMillisecond);
-    bench.tell(from(c.dbc_source), 20, 2 * kMillisecond);
+    bench.tell(from(0x31), 10, MonoTime{1 * kMillisecond});
+    bench.tell(from(c.dbc_source), 20, MonoTime{2 * kMillisecond});
     EXPECT_EQ(bench.value(Role::kVehicleSpeed), c.comes_first ? 20.0 : 10.0) << c.dbc_source;
   }
 }
 
 TEST(Sources, AShortFrameOfTheFollowedOneIsBad) {
   Bench bench({by_group(Role::kVehicleSpeed, 0xFE)});
-  bench.tell(from(0x31), 10, 1);
-  EXPECT_EQ(bench.tell(from(0x31), 10, 2, 1), FrameUse::kBad);
+  bench.tell(from(0x31), 10, MonoTime::of_ns(1));
+  EXPECT_EQ(bench.tell(from(0x31), 10, MonoTime::of_ns(2), 1), FrameUse::kBad);
   EXPECT_TRUE(bench.faults.has(Fault::kInputFrame));
 }
 
 // The course of its values, what is no spike, and its period: of the new source alone.
 TEST(Sources, NothingOfTheFormerOneStays) {
   Bench bench({by_group(Role::kPrimarySpeed, 0x00)});
-  MonoTime t = kSecond;
+  MonoTime t{kSecond};
   for (int i = 0; i < 100; ++i) bench.tell(from(0x31), 1000, t += 10 * kMillisecond);
   bench.tell(from(0x00), 3000, t += 10 * kMillisecond);
   EXPECT_EQ(bench.value(Role::kPrimarySpeed), 3000.0);
@@ -277,7 +279,7 @@ TEST(Rate, IsJudgedWhereItIsKnown) {
   for (const Case& c : {Case{bound(Role::kVehicleSpeed, kId), kId, true}, Case{paged, kId, false},
                         Case{by_group(Role::kVehicleSpeed, 0xFE), from(0x31), false}}) {
     Bench bench({c.binding});
-    MonoTime t = kSecond;
+    MonoTime t{kSecond};
     for (int i = 0; i < 50; ++i) {
       EXPECT_EQ(bench.tell(c.id, 7, t += 2 * kMillisecond), FrameUse::kTaken);
     }
@@ -302,7 +304,7 @@ class Learning : public testing::Test {
   }
   std::optional<Duration> period() const { return bench_->monitor.period(Role::kPrimarySpeed); }
   std::unique_ptr<Bench> bench_ = std::make_unique<Bench>(std::vector{unknown_period()});
-  MonoTime t_ = kSecond;
+  MonoTime t_{kSecond};
 };
 
 // Nine values have eight intervals between them; two stamps that are the same have none.
@@ -330,7 +332,7 @@ TEST_F(Learning, IsStaleAfterASecondAndBeginsAnew) {
     return bench_->monitor.quality(Role::kPrimarySpeed);
   };
   EXPECT_EQ(quality_after(kSecond), SignalQuality::kLearning);
-  EXPECT_EQ(quality_after(kSecond + 1), SignalQuality::kStale);
+  EXPECT_EQ(quality_after(kSecond + kNanosecond), SignalQuality::kStale);
   t_ += 2 * kSecond;
   tell({0, 20, 20, 20, 20, 20, 20});  // with the silence seven intervals
   EXPECT_FALSE(period());
@@ -355,15 +357,16 @@ TEST(Diagnostic, AnAnswerIsTakenForEachRoleThatItHolds) {
   const std::vector<RoleBinding> roles{asked(Role::kOilTemperature, 0),
                                        asked(Role::kVehicleSpeed, 8)};
   Bench bench(roles);
-  EXPECT_EQ(bench.tell({0, false}, 7, 1), FrameUse::kForeign);  // it has no message
-  EXPECT_EQ(bench.tell(kResponse, 0x17'2A'01'11'62'05, 1, 8), FrameUse::kTaken);
+  EXPECT_EQ(bench.tell({0, false}, 7, MonoTime::of_ns(1)),
+            FrameUse::kForeign);  // it has no message
+  EXPECT_EQ(bench.tell(kResponse, 0x17'2A'01'11'62'05, MonoTime::of_ns(1), 8), FrameUse::kTaken);
   EXPECT_EQ(bench.value(Role::kOilTemperature), 42.0);
   EXPECT_EQ(bench.value(Role::kVehicleSpeed), 23.0);
   EXPECT_EQ(bench.faults.bits(), 0U);
-  EXPECT_EQ(bench.tell({0x123, false}, 7, 1), FrameUse::kForeign);
+  EXPECT_EQ(bench.tell({0x123, false}, 7, MonoTime::of_ns(1)), FrameUse::kForeign);
 
   Bench shorter(roles);
-  EXPECT_EQ(shorter.tell(kResponse, 0x2A'01'11'62'04, 1, 8), FrameUse::kBad);
+  EXPECT_EQ(shorter.tell(kResponse, 0x2A'01'11'62'04, MonoTime::of_ns(1), 8), FrameUse::kBad);
   EXPECT_EQ(shorter.value(Role::kOilTemperature), 42.0);
   EXPECT_FALSE(shorter.has(Role::kVehicleSpeed));
   EXPECT_TRUE(shorter.faults.has(Fault::kInputFrame));
@@ -380,15 +383,15 @@ TEST(Roles, TheNewestValueOrAnother) {
   };
   EXPECT_EQ(ask(Role::kVehicleSpeed), std::pair(-1.0, true));     // no such role: nothing is lost
   EXPECT_EQ(ask(Role::kOilTemperature), std::pair(-1.0, false));  // none has come
-  bench.tell(kId, 80, kSecond);
-  bench.monitor.update(kSecond, bench.faults);
+  bench.tell(kId, 80, MonoTime{kSecond});
+  bench.monitor.update(MonoTime{kSecond}, bench.faults);
   EXPECT_EQ(ask(Role::kOilTemperature), std::pair(80.0, true));
   EXPECT_EQ(bench.monitor.value_if_known(Role::kOilTemperature), 80.0);
   EXPECT_EQ(bench.monitor.value_if_known(Role::kVehicleSpeed), 0.0);
   bool fresh = false;  // what is not fresh does not become so
   bench.monitor.value_or(Role::kOilTemperature, 0.0, fresh);
   EXPECT_FALSE(fresh);
-  bench.monitor.update(2 * kSecond, bench.faults);
+  bench.monitor.update(MonoTime{2 * kSecond}, bench.faults);
   EXPECT_EQ(ask(Role::kOilTemperature), std::pair(80.0, false));  // the last, and old
   EXPECT_EQ(bench.monitor.value_if_known(Role::kOilTemperature), 0.0);
 }

@@ -44,7 +44,7 @@ Config config() {
 class Bus {
  public:
   struct Told {
-    MonoTime t = 0;
+    MonoTime t{};
     double value = 0.0;
   };
   void tick() { t_ += kPeriod; }
@@ -76,7 +76,7 @@ class Bus {
                                            ValueCourse(0.1, true), ValueCourse(500.0, false)};
 
  private:
-  MonoTime t_ = kSecond;
+  MonoTime t_{kSecond};
 };
 
 // How far a signal has moved since then, less three deviations of its noise and one step; nothing
@@ -90,8 +90,7 @@ double moved(const Bus& bus, std::size_t signal, MonoTime since) {
   double then = told[after].value;
   if (told[after].t > since) {
     const Bus::Told &from = told[after - 1], &to = told[after];
-    then = std::lerp(from.value, to.value,
-                     static_cast<double>(since - from.t) / static_cast<double>(to.t - from.t));
+    then = std::lerp(from.value, to.value, fraction(since - from.t, to.t - from.t));
   }
   const double by = told.back().value - then;
   const double sure =
@@ -105,7 +104,7 @@ double expected_motion(const Bus& bus, std::size_t signal, const InputMonitor::W
   const MonoTime since = bus.course[signal].since();
   if (signal == kPressure) {
     const MonoTime from = since > watch.request_begun ? since : watch.request_begun;
-    const double falling_s = 1e-9 * static_cast<double>(bus.t() - from - watch.answer);
+    const double falling_s = 1e-9 * static_cast<double>((bus.t() - from - watch.answer).ns());
     return falling_s > 0.0 ? falling_s * watch.fall_Pa_per_s : 0.0;
   }
   if (signal == kEngine) return std::abs(moved(bus, kPrimary, since));
@@ -149,9 +148,10 @@ void drive(std::mt19937_64& random, Counts& counts) {
   watch.on = draw(0.0, 1.0) > 0.1;
   watch.slopes = draw(0.0, 1.0) > 0.5;
   watch.torque_sign = draw(0.0, 1.0) > 0.5 ? 1.0 : -1.0;
-  watch.request_begun = kSecond + 1500 * kMillisecond + std::llround(draw(-3e8, 3e8));
+  watch.request_begun =
+      MonoTime{kSecond + 1500 * kMillisecond} + Duration::of_ns(std::llround(draw(-3e8, 3e8)));
   watch.fall_Pa_per_s = draw(0.0, 1e5);
-  watch.answer = std::llround(draw(0.0, 3e8));
+  watch.answer = Duration::of_ns(std::llround(draw(0.0, 3e8)));
   bus.monitor.watch(watch);
 
   std::array<std::optional<MonoTime>, kSignals> stands;

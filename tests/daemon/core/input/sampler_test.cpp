@@ -50,7 +50,7 @@ struct Errors {  // largest, over all samples
   double slip_percent = 0.0;
   double pressure_mean = 0.0;
   std::size_t samples = 0, usable = 0;
-  Duration delay = 0;
+  Duration delay{};
 };
 
 Errors sample_all(const std::vector<Channel>& channels, bool periods_known = true,
@@ -75,7 +75,8 @@ Errors sample_all(const std::vector<Channel>& channels, bool periods_known = tru
       if (lost && lost(channel.id, i)) continue;
       const double t_ms = measured_s * 1e3 + jitter_ms * uniform(random);
       const double told_s = measured_s - 1e-3 * channel.late_ms;
-      arrivals.push_back({std::llround(t_ms * 1e6), channel.id, channel.truth(told_s)});
+      arrivals.push_back(
+          {MonoTime::of_ns(std::llround(t_ms * 1e6)), channel.id, channel.truth(told_s)});
     }
   }
   std::stable_sort(arrivals.begin(), arrivals.end(),
@@ -87,8 +88,8 @@ Errors sample_all(const std::vector<Channel>& channels, bool periods_known = tru
   };
   Errors errors;
   std::size_t next = 0;
-  MonoTime last = std::numeric_limits<MonoTime>::min();
-  for (MonoTime t = 0; t < std::llround(duration_s * 1e9); t += 5 * kMillisecond) {
+  MonoTime last = MonoTime::min();
+  for (MonoTime t{}; t < MonoTime::of_ns(std::llround(duration_s * 1e9)); t += 5 * kMillisecond) {
     for (; next < arrivals.size() && arrivals[next].t <= t; ++next) {
       RxFrame frame{.t = arrivals[next].t, .frame = {}};
       frame.frame.id = {arrivals[next].id, false};
@@ -103,11 +104,11 @@ Errors sample_all(const std::vector<Channel>& channels, bool periods_known = tru
     const estimator::VariatorSample& sample = sampler.sample(t, errors.usable == 0);
     ++errors.samples;
     if (!sample.usable) continue;
-    EXPECT_GT(sample.t_ns, last);
+    EXPECT_GT(MonoTime::of_ns(sample.t_ns), last);
     if (errors.usable != 0 && !lost) {
-      EXPECT_EQ(sample.t_ns - last, 5 * kMillisecond);
+      EXPECT_EQ(MonoTime::of_ns(sample.t_ns) - last, 5 * kMillisecond);
     }
-    last = sample.t_ns;
+    last = MonoTime::of_ns(sample.t_ns);
     ++errors.usable;
     const double s = static_cast<double>(sample.t_ns) * 1e-9;
     const auto keep = [](double& worst, double error) { worst = std::max(worst, std::abs(error)); };
@@ -121,7 +122,7 @@ Errors sample_all(const std::vector<Channel>& channels, bool periods_known = tru
     keep(errors.torque, sample.torque_Nm - truth(Role::kEngineTorque, s));
   }
   errors.pressure_mean /= static_cast<double>(std::max<std::size_t>(errors.usable, 1));
-  errors.delay = sampler.delay().value_or(0);
+  errors.delay = sampler.delay().value_or(Duration{});
   return errors;
 }
 
@@ -243,7 +244,8 @@ struct Steady {
     }
   }
   double value(Role role) const {
-    const double small = 1e-3 * std::sin(static_cast<double>(t));  // nothing real is quite still
+    const double small =
+        1e-3 * std::sin(static_cast<double>(t.ns()));  // nothing real is quite still
     switch (role) {
       case Role::kPrimarySpeed:
         return 100.0 + small;
@@ -260,36 +262,36 @@ struct Steady {
   InputMonitor inputs{config};
   Sampler sampler{inputs, true};
   FaultSet faults;
-  MonoTime t = kMillisecond;
+  MonoTime t{kMillisecond};
 };
 
 TEST(Sampler, TheDelayStaysWhileItMayNotChange) {
   Steady car(true);
-  car.run_to(kSecond);
+  car.run_to(MonoTime{kSecond});
   ASSERT_TRUE(car.inputs.all_valid());
-  EXPECT_FALSE(car.sampler.sample(kSecond, false).usable);
+  EXPECT_FALSE(car.sampler.sample(MonoTime{kSecond}, false).usable);
   EXPECT_FALSE(car.sampler.delay());
-  EXPECT_TRUE(car.sampler.sample(kSecond, true).usable);
+  EXPECT_TRUE(car.sampler.sample(MonoTime{kSecond}, true).usable);
   EXPECT_EQ(car.sampler.delay(), 10 * kMillisecond);
 }
 
 TEST(Sampler, OneInstantIsOneSampleAndWhatIsUnusableChangesNoValue) {
   Steady car(true);
-  car.run_to(kSecond);
-  ASSERT_TRUE(car.sampler.sample(kSecond, true).usable);
+  car.run_to(MonoTime{kSecond});
+  ASSERT_TRUE(car.sampler.sample(MonoTime{kSecond}, true).usable);
   const double omega_p_rad_s = car.sampler.newest().omega_p_rad_s;
-  EXPECT_FALSE(car.sampler.sample(kSecond, true).usable);
-  EXPECT_FALSE(car.sampler.sample(kSecond - 50 * kMillisecond, true).usable);
+  EXPECT_FALSE(car.sampler.sample(MonoTime{kSecond}, true).usable);
+  EXPECT_FALSE(car.sampler.sample(MonoTime{kSecond - 50 * kMillisecond}, true).usable);
   EXPECT_EQ(car.sampler.newest().omega_p_rad_s, omega_p_rad_s);
-  EXPECT_EQ(car.sampler.newest().t_ns, kSecond - 10 * kMillisecond);
-  EXPECT_TRUE(car.sampler.sample(kSecond + 5 * kMillisecond, true).usable);
+  EXPECT_EQ(car.sampler.newest().t_ns, (kSecond - 10 * kMillisecond).ns());
+  EXPECT_TRUE(car.sampler.sample(MonoTime{kSecond + 5 * kMillisecond}, true).usable);
 }
 
 TEST(Sampler, NoSampleOfInputsThatEnded) {
   Steady car(true);
-  car.run_to(kSecond);
-  ASSERT_TRUE(car.sampler.sample(kSecond, true).usable);
-  const MonoTime later = 2 * kSecond;
+  car.run_to(MonoTime{kSecond});
+  ASSERT_TRUE(car.sampler.sample(MonoTime{kSecond}, true).usable);
+  const MonoTime later{2 * kSecond};
   car.inputs.update(later, car.faults);
   ASSERT_FALSE(car.inputs.all_valid());
   EXPECT_FALSE(car.sampler.sample(later, true).usable);
@@ -306,7 +308,7 @@ TEST(Sampler, WithoutAPrimarySpeedThereIsNoSample) {
 
 TEST(SignalHistory, ABurstAfterAPauseIsNoSlope) {
   SignalHistory history;
-  MonoTime t = 0;
+  MonoTime t{};
   for (int i = 0; i < 20; ++i) history.add(t += 5 * kMillisecond, 100.0);
   t += 40 * kMillisecond;
   for (const double value : {100.5, 99.5, 99.5, 100.5, 101.0}) {
@@ -320,29 +322,29 @@ TEST(SignalHistory, ABurstAfterAPauseIsNoSlope) {
 TEST(SignalHistory, KeepsItsOrder) {
   SignalHistory history;
   double value = 0.0;
-  EXPECT_FALSE(history.value_at(0, kSecond, value));
-  history.add(100, 1.0);
-  EXPECT_TRUE(history.value_at(100, kSecond, value));
+  EXPECT_FALSE(history.value_at(MonoTime{}, kSecond, value));
+  history.add(MonoTime::of_ns(100), 1.0);
+  EXPECT_TRUE(history.value_at(MonoTime::of_ns(100), kSecond, value));
   EXPECT_EQ(value, 1.0);
-  EXPECT_FALSE(history.value_at(500, kSecond, value));  // one value has no slope
-  EXPECT_FALSE(history.value_at(99, kSecond, value));
-  history.add(100, 2.0);  // the same stamp again: the newer value counts
+  EXPECT_FALSE(history.value_at(MonoTime::of_ns(500), kSecond, value));  // one value has no slope
+  EXPECT_FALSE(history.value_at(MonoTime::of_ns(99), kSecond, value));
+  history.add(MonoTime::of_ns(100), 2.0);  // the same stamp again: the newer value counts
   EXPECT_EQ(history.newest_value(), 2.0);
-  history.add(50, 3.0);  // and so for one from the past
-  EXPECT_EQ(history.newest(), 100);
+  history.add(MonoTime::of_ns(50), 3.0);  // and so for one from the past
+  EXPECT_EQ(history.newest(), MonoTime::of_ns(100));
   EXPECT_EQ(history.newest_value(), 3.0);
-  history.add(200, 5.0);
-  EXPECT_TRUE(history.value_at(150, kSecond, value));
+  history.add(MonoTime::of_ns(200), 5.0);
+  EXPECT_TRUE(history.value_at(MonoTime::of_ns(150), kSecond, value));
   EXPECT_EQ(value, 4.0);
-  EXPECT_TRUE(history.value_at(250, kSecond, value));
+  EXPECT_TRUE(history.value_at(MonoTime::of_ns(250), kSecond, value));
   EXPECT_EQ(value, 6.0);
-  EXPECT_TRUE(history.value_at(5000, 100, value));
+  EXPECT_TRUE(history.value_at(MonoTime::of_ns(5000), Duration::of_ns(100), value));
   EXPECT_EQ(value, 7.0);  // no further than it may reach
-  for (int i = 0; i < 1000; ++i) history.add(300 + i, i);
+  for (int i = 0; i < 1000; ++i) history.add(MonoTime::of_ns(300 + i), i);
   // 128 values are kept: the oldest, and what lies before it.
-  EXPECT_TRUE(history.value_at(1299 - 127, kSecond, value));
+  EXPECT_TRUE(history.value_at(MonoTime::of_ns(1299 - 127), kSecond, value));
   EXPECT_EQ(value, 872.0);
-  EXPECT_FALSE(history.value_at(1299 - 128, kSecond, value));
+  EXPECT_FALSE(history.value_at(MonoTime::of_ns(1299 - 128), kSecond, value));
 }
 
 // By hand: the line through the last four of five values has the slope 1.4 a unit of time, and is
@@ -350,15 +352,15 @@ TEST(SignalHistory, KeepsItsOrder) {
 TEST(SignalHistory, FollowsTheLineOfTheLastFourForTwiceTheirSpan) {
   SignalHistory history;
   for (const auto& [t, value] : {std::pair{0, 50.0}, {1, 0.0}, {2, 2.0}, {3, 1.0}, {4, 5.0}}) {
-    history.add(t, value);
+    history.add(MonoTime::of_ns(t), value);
   }
   constexpr double kSlope = (-1.5 * 0.0 - 0.5 * 2.0 + 0.5 * 1.0 + 1.5 * 5.0) / 5.0;
   double value = 0.0;
-  EXPECT_TRUE(history.value_at(6, 1000, value));
+  EXPECT_TRUE(history.value_at(MonoTime::of_ns(6), Duration::of_ns(1000), value));
   EXPECT_NEAR(value, 5.0 + 2 * kSlope, 1e-12);
-  EXPECT_TRUE(history.value_at(10, 1000, value));
+  EXPECT_TRUE(history.value_at(MonoTime::of_ns(10), Duration::of_ns(1000), value));
   EXPECT_NEAR(value, 5.0 + 6 * kSlope, 1e-12);
-  EXPECT_TRUE(history.value_at(11, 1000, value));
+  EXPECT_TRUE(history.value_at(MonoTime::of_ns(11), Duration::of_ns(1000), value));
   EXPECT_NEAR(value, 5.0 + 6 * kSlope, 1e-12);
 }
 

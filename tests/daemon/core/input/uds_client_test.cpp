@@ -50,7 +50,7 @@ can::CanFrame frame_of(can::CanId id, const Bytes& bytes) {
 }
 
 struct Sent {
-  MonoTime t = 0;
+  MonoTime t{};
   Bytes bytes;
 };
 
@@ -61,10 +61,8 @@ class Bench {
   explicit Bench(const Config& config) : client(config) {
     PollLimits limits;
     for (const RoleBinding& role : config.roles) {
-      limits.requests[limits.size++] = {
-          role.bus, role.uds->request, role.uds->identifier,
-          static_cast<Duration>(*role.period_ms * static_cast<double>(kMillisecond)),
-          role.uds->service};
+      limits.requests[limits.size++] = {role.bus, role.uds->request, role.uds->identifier,
+                                        Duration::of_ms(*role.period_ms), role.uds->service};
     }
     if (config.diagnostics == Diagnostics::kPoll) gate = TxGate({}, Control::kObserve, {}, limits);
   }
@@ -99,14 +97,14 @@ class Bench {
   }
   std::vector<double> times_ms() const {
     std::vector<double> all;
-    for (const Sent& each : sent) all.push_back(static_cast<double>(each.t) / 1e6);
+    for (const Sent& each : sent) all.push_back(static_cast<double>(each.t.ns()) / 1e6);
     return all;
   }
 
   UdsClient client;
   TxGate gate{{}, Control::kObserve};
   std::array<bool, kBusMax> up{true, true};
-  MonoTime t = 0;
+  MonoTime t{};
   std::vector<Sent> sent;
   std::vector<UdsReading> readings;
   std::vector<Bytes> data;
@@ -130,7 +128,7 @@ TEST(UdsClient, ListeningSendsNothingAndTakesEveryonesAnswers) {
   ASSERT_EQ(bench.readings.size(), 1U);
   EXPECT_EQ(bench.data[0], (Bytes{0x09, 0xC4}));
   EXPECT_EQ(bench.readings[0].roles[0], Role::kSecondaryPressure);
-  EXPECT_EQ(bench.readings[0].t, kSecond + kMillisecond);
+  EXPECT_EQ(bench.readings[0].t, MonoTime{kSecond + kMillisecond});
 }
 
 // Four values of an ECU, two bytes each, in two requests: three identifiers fit in a frame.
@@ -222,7 +220,7 @@ TEST(UdsClient, PollsAtItsPeriod) {
   EXPECT_EQ(bench.readings.size(), 20U);
   for (std::size_t i = 0; i < 20; ++i) {
     EXPECT_EQ(bench.sent[i].bytes, (Bytes{0x03, 0x22, 0x11, 0x01, 0xCC, 0xCC, 0xCC, 0xCC}));
-    EXPECT_EQ(bench.sent[i].t, static_cast<MonoTime>(i) * 50 * kMillisecond);
+    EXPECT_EQ(bench.sent[i].t, MonoTime{i * 50 * kMillisecond});
   }
   EXPECT_EQ(bench.client.counters().answers, 20U);
   EXPECT_EQ(bench.gate.refused(), 0U);
@@ -411,22 +409,22 @@ TEST(UdsClient, TheSignalIsValidOnlyWhileAnswersCome) {
   Pipeline pipeline(kOnePressure);
   const Role role = Role::kSecondaryPressure;
   std::uint64_t requests = 0;
-  for (MonoTime t = 0; t < 10 * kSecond; t += kStep) {
+  for (MonoTime t{}; t < MonoTime{10 * kSecond}; t += kStep) {
     Outbox outbox;
     pipeline.on_sample(t, outbox);
     for (std::size_t i = 0; i < outbox.size; ++i) {
       if (outbox.frames[i].id != kRequest) continue;
       ++requests;
-      const Bytes answer = t < 5 * kSecond ? Bytes{0x05, 0x62, 0x11, 0x01, 0x01, 0xF4}
-                                           : Bytes{0x03, 0x7F, 0x22, 0x22};
+      const Bytes answer = t < MonoTime{5 * kSecond} ? Bytes{0x05, 0x62, 0x11, 0x01, 0x01, 0xF4}
+                                                     : Bytes{0x03, 0x7F, 0x22, 0x22};
       pipeline.on_frame({.t = t + kMillisecond, .frame = frame_of(kResponse, answer)});
     }
     const SignalObservation seen = pipeline.signal(role);
-    if (t >= kStep && t < 5 * kSecond) {
+    if (t >= MonoTime{kStep} && t < MonoTime{5 * kSecond}) {
       ASSERT_EQ(seen.quality, SignalQuality::kValid) << t;
       ASSERT_EQ(seen.value, 500e3);
     }
-    if (t > 5 * kSecond + 130 * kMillisecond) {
+    if (t > MonoTime{5 * kSecond + 130 * kMillisecond}) {
       ASSERT_EQ(seen.quality, SignalQuality::kStale) << t;
     }
   }
@@ -440,14 +438,17 @@ TEST(UdsClient, AnAnswerThatIsTooShortIsABadFrameAndNoValue) {
   config.diagnostics = Diagnostics::kListen;
   Pipeline pipeline(config);
   Outbox outbox;
-  pipeline.on_sample(0, outbox);
-  pipeline.on_frame({.t = 1, .frame = frame_of(kResponse, {0x04, 0x62, 0x11, 0x01, 0x01})});
+  pipeline.on_sample(MonoTime{}, outbox);
+  pipeline.on_frame(
+      {.t = MonoTime::of_ns(1), .frame = frame_of(kResponse, {0x04, 0x62, 0x11, 0x01, 0x01})});
   EXPECT_EQ(pipeline.counters().frames_bad, 1U);
   EXPECT_FALSE(pipeline.signal(Role::kSecondaryPressure).seen);
   // All ones: not available.
-  pipeline.on_frame({.t = 2, .frame = frame_of(kResponse, {0x05, 0x62, 0x11, 0x01, 0xFF, 0xFF})});
+  pipeline.on_frame({.t = MonoTime::of_ns(2),
+                     .frame = frame_of(kResponse, {0x05, 0x62, 0x11, 0x01, 0xFF, 0xFF})});
   EXPECT_FALSE(pipeline.signal(Role::kSecondaryPressure).seen);
-  pipeline.on_frame({.t = 3, .frame = frame_of(kResponse, {0x05, 0x62, 0x11, 0x01, 0x00, 0x01})});
+  pipeline.on_frame({.t = MonoTime::of_ns(3),
+                     .frame = frame_of(kResponse, {0x05, 0x62, 0x11, 0x01, 0x00, 0x01})});
   EXPECT_EQ(pipeline.signal(Role::kSecondaryPressure).value, 1000.0);
 }
 
@@ -461,23 +462,28 @@ TEST(FurtherBus, ItsTroubleIsAFault) {
     Pipeline pipeline(config);
     EXPECT_EQ(pipeline.bus_count(), 2U);
     Outbox outbox;
-    pipeline.on_frame({.t = 0, .frame = frame_of(kResponse, {0x05, 0x62, 0x11, 0x01, 0, 1})});
+    pipeline.on_frame(
+        {.t = MonoTime{}, .frame = frame_of(kResponse, {0x05, 0x62, 0x11, 0x01, 0, 1})});
     EXPECT_FALSE(pipeline.signal(role).seen);  // that was bus 0
     pipeline.on_frame(
-        {.t = 0, .frame = frame_of(kResponse, {0x05, 0x62, 0x11, 0x01, 0, 1}), .bus = 1});
+        {.t = MonoTime{}, .frame = frame_of(kResponse, {0x05, 0x62, 0x11, 0x01, 0, 1}), .bus = 1});
     EXPECT_TRUE(pipeline.signal(role).seen);
-    EXPECT_EQ(pipeline.on_sample(0, outbox).faults & fault_bit(Fault::kBusDown), 0U);
-    pipeline.on_bus_state(BusState::kDown, kStep, 1);
-    EXPECT_NE(pipeline.on_sample(kStep, outbox).faults & fault_bit(Fault::kBusDown), 0U);
+    EXPECT_EQ(pipeline.on_sample(MonoTime{}, outbox).faults & fault_bit(Fault::kBusDown), 0U);
+    pipeline.on_bus_state(BusState::kDown, MonoTime{kStep}, 1);
+    EXPECT_NE(pipeline.on_sample(MonoTime{kStep}, outbox).faults & fault_bit(Fault::kBusDown), 0U);
     can::CanFrame off;
     off.error = true;
     off.id = {0x40, false};
     off.length = 8;
-    pipeline.on_frame({.t = kStep, .frame = off, .bus = 1});
-    EXPECT_NE(pipeline.on_sample(2 * kStep, outbox).faults & fault_bit(Fault::kBusOff), 0U);
+    pipeline.on_frame({.t = MonoTime{kStep}, .frame = off, .bus = 1});
+    EXPECT_NE(pipeline.on_sample(MonoTime{2 * kStep}, outbox).faults & fault_bit(Fault::kBusOff),
+              0U);
     // Our own identifier on the further bus is not ours.
-    pipeline.on_frame({.t = kStep, .frame = frame_of({0x6A1, false}, Bytes(8)), .bus = 1});
-    EXPECT_EQ(pipeline.on_sample(3 * kStep, outbox).faults & fault_bit(Fault::kForeignSender), 0U);
+    pipeline.on_frame(
+        {.t = MonoTime{kStep}, .frame = frame_of({0x6A1, false}, Bytes(8)), .bus = 1});
+    EXPECT_EQ(
+        pipeline.on_sample(MonoTime{3 * kStep}, outbox).faults & fault_bit(Fault::kForeignSender),
+        0U);
   }
 }
 

@@ -21,16 +21,16 @@ double live_for_s(double sigma, double level, double rest_s) {
     for (int i = 0; i < 12; ++i) sum += static_cast<double>(random() >> 11) * 0x1p-53;
     return sum - 6.0;
   };
-  MonoTime t = 0;
+  MonoTime t{};
   double value = 0.0;
   for (int i = 0; i < 600; ++i) {
     value = std::round(level + sigma * normal());
     course.add(t += kPeriod, value);
   }
   const MonoTime begun = t;
-  while (t - begun < static_cast<Duration>(rest_s * 1e9)) {
+  while (t - begun < Duration::of_s(rest_s)) {
     course.add(t += kPeriod, value);
-    if (course.stands_still(0.0, true)) return static_cast<double>(t - begun) * 1e-9;
+    if (course.stands_still(0.0, true)) return static_cast<double>((t - begun).ns()) * 1e-9;
   }
   return rest_s;
 }

@@ -60,8 +60,8 @@ Observed run_guarded(const Config& config, const std::vector<can::StampedFrame>&
   Sink sink(pipeline, planted);
   std::thread vehicle([&] {
     for (const can::StampedFrame& each : frames) {
-      while (feeder->now() < each.t_ns) {
-        if (feeder->wait_until(each.t_ns) != Wake::kFrames) continue;
+      while (feeder->now().ns() < each.t_ns) {
+        if (feeder->wait_until(MonoTime::of_ns(each.t_ns)) != Wake::kFrames) continue;
         std::array<RxFrame, 16> ignored;
         feeder->receive(ignored);
       }

@@ -33,9 +33,10 @@ Config config_of(const std::string& trigger) {
 }
 
 // The flag experiment_permitted is set until this instant.
-Frames permitted(Frames frames, MonoTime until = INT64_MAX) {
+Frames permitted(Frames frames, MonoTime until = MonoTime::max()) {
   for (can::StampedFrame& each : frames) {
-    if (each.frame.id == can::CanId{0x103, false} && each.t_ns < until) each.frame.data[0] |= 4;
+    if (each.frame.id == can::CanId{0x103, false} && each.t_ns < until.ns())
+      each.frame.data[0] |= 4;
   }
   return frames;
 }
@@ -92,7 +93,7 @@ TEST(Observe, TheForceBackEndsTheFlagAndTheNextRampIsMeasured) {
   drive.overrun = true;
   drive.duration_s = 9.0;
   Frames frames = drive_frames(drive);
-  drive.start_ns += 9 * kSecond;
+  drive.start_ns += (9 * kSecond).ns();
   frames = permitted(joined(frames, drive_frames(drive)));
   const Observed seen = observe("coast_down", frames);
   ASSERT_EQ(seen.results.size(), 2U);
@@ -104,14 +105,14 @@ TEST(Observe, TheForceBackEndsTheFlagAndTheNextRampIsMeasured) {
     return std::find_if(seen.reports.begin(), seen.reports.end(),
                         [&](const SampleReport& report) { return report.t >= t; });
   };
-  EXPECT_TRUE(at(drive.start_ns - 20 * kMillisecond)->macro_slip_stop);
-  EXPECT_FALSE(at(drive.start_ns + 500 * kMillisecond)->macro_slip_stop);
+  EXPECT_TRUE(at(MonoTime::of_ns(drive.start_ns) - 20 * kMillisecond)->macro_slip_stop);
+  EXPECT_FALSE(at(MonoTime::of_ns(drive.start_ns) + 500 * kMillisecond)->macro_slip_stop);
 }
 
 TEST(Observe, TheCarEndsItWithItsReason) {
   Drive drive;
   drive.overrun = true;
-  const MonoTime until = drive.start_ns + 4 * kSecond;
+  const MonoTime until = MonoTime::of_ns(drive.start_ns) + 4 * kSecond;
   const Observed seen = observe("coast_down", permitted(drive_frames(drive), until));
   ASSERT_EQ(seen.results.size(), 1U);
   EXPECT_EQ(seen.results[0].outcome, Outcome::kInconclusive);
@@ -127,7 +128,8 @@ TEST(Observe, ASignalOfTheConditionsThatIsLostAborts) {
   drive.overrun = true;
   Frames frames = permitted(drive_frames(drive));
   std::erase_if(frames, [&](const can::StampedFrame& each) {
-    return each.frame.id == can::CanId{0x103, false} && each.t_ns > drive.start_ns + 4 * kSecond;
+    return each.frame.id == can::CanId{0x103, false} &&
+           each.t_ns > drive.start_ns + (4 * kSecond).ns();
   });
   const Observed seen = observe("coast_down", frames);
   ASSERT_EQ(seen.results.size(), 1U);
@@ -152,7 +154,7 @@ TEST(Observe, ARampLateInALongSteadyDriveIsMeasured) {
   drive.ramp_N_per_s = 0.0;
   drive.duration_s = 300.0;
   const Frames before = drive_frames(drive);
-  drive.start_ns += 300 * kSecond;
+  drive.start_ns += (300 * kSecond).ns();
   drive.ramp_N_per_s = 300.0;
   drive.duration_s = 12.0;
   const Observed seen = observe("steady", permitted(joined(before, drive_frames(drive))));

@@ -26,7 +26,7 @@ TEST(PipelineSetup, TheMonitorHasTheConfigurationsLimits) {
   EXPECT_DOUBLE_EQ(limits.spring_force_N, 640.0);
   EXPECT_DOUBLE_EQ(limits.centrifugal_N_s2, 0.011);
   EXPECT_DOUBLE_EQ(limits.floor_force_N, 3600.0);
-  EXPECT_EQ(limits.pause_min, 7'250'000'000);
+  EXPECT_EQ(limits.pause_min, 7250 * kMillisecond);
 }
 
 TEST(PipelineSetup, WhatIsAssumedIsReadInTheMiddleWhereItIsOnlyWatched) {
@@ -62,7 +62,7 @@ TEST(PipelineSetup, AReplaySendsNoClampFrame) {
   Pipeline live(config), replay(config, RecordedRequests({}));
   const auto clamp_frames = [&](Pipeline& pipeline) {
     std::ptrdiff_t count = 0;
-    for (MonoTime t = kSecond; t < 2 * kSecond; t += 5 * kMillisecond) {
+    for (MonoTime t{kSecond}; t < MonoTime{2 * kSecond}; t += 5 * kMillisecond) {
       Outbox outbox;
       pipeline.on_sample(t, outbox);
       const auto end = outbox.frames.begin() + static_cast<std::ptrdiff_t>(outbox.size);

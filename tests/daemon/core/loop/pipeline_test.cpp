@@ -276,12 +276,12 @@ TEST(Pipeline, ShutdownEndsAnExperimentWithItsReason) {
 TEST(Pipeline, ALostInputAbortsWithinItsStaleTime) {
   for (const std::uint32_t id : {0x100U, 0x101U, 0x12345678U}) {
     auto frames = drive_frames({});
-    const MonoTime silent = frames.front().t_ns + 3 * kSecond;
-    MonoTime last = 0;
+    const MonoTime silent = MonoTime::of_ns(frames.front().t_ns) + 3 * kSecond;
+    MonoTime last{};
     std::erase_if(frames, [&](const can::StampedFrame& each) {
       if (each.frame.id.value != id) return false;
-      if (each.t_ns < silent) last = each.t_ns;
-      return each.t_ns >= silent;
+      if (MonoTime::of_ns(each.t_ns) < silent) last = MonoTime::of_ns(each.t_ns);
+      return MonoTime::of_ns(each.t_ns) >= silent;
     });
     const Played run = run_frames(test::vehicle_config(), frames);
     ASSERT_EQ(run.results.size(), 1U) << id;
@@ -290,7 +290,7 @@ TEST(Pipeline, ALostInputAbortsWithinItsStaleTime) {
     EXPECT_EQ(result.stop_reason, StopReason::kInputs);
     EXPECT_EQ(result.peak.kind, PeakKind::kNone);
     EXPECT_GT(result.end - last, 50 * kMillisecond);
-    EXPECT_LE(result.end - last, 55 * kMillisecond + 1);
+    EXPECT_LE(result.end - last, 55 * kMillisecond + kNanosecond);
     const auto stop = std::find_if(run.sent.begin(), run.sent.end(), [](const auto& each) {
       return each.frame.id.value == 0x6A1 && value_of(each.frame, "MacroSlipStop") == 1.0;
     });
@@ -305,9 +305,9 @@ TEST(Pipeline, ALostInputAbortsWithinItsStaleTime) {
 // Every frame comes, but a primary speed of zero gives no sample: the abort says so.
 TEST(Pipeline, AReadingThatGivesNoSampleIsNamedAsTheCause) {
   auto frames = drive_frames({});
-  const MonoTime stopped = frames.front().t_ns + 3 * kSecond;
+  const MonoTime stopped = MonoTime::of_ns(frames.front().t_ns) + 3 * kSecond;
   for (can::StampedFrame& each : frames) {
-    if (each.frame.id.value == 0x100U && each.t_ns >= stopped) {
+    if (each.frame.id.value == 0x100U && each.t_ns >= stopped.ns()) {
       each.frame = test::speeds_frame(0.0, 300.0);
     }
   }
@@ -323,9 +323,9 @@ TEST(Pipeline, AReadingThatGivesNoSampleIsNamedAsTheCause) {
 
 TEST(Pipeline, AShortGapDoesNotAbort) {
   auto frames = drive_frames({});
-  const MonoTime from = frames.front().t_ns + 3 * kSecond;
+  const MonoTime from = MonoTime::of_ns(frames.front().t_ns) + 3 * kSecond;
   std::erase_if(frames, [&](const can::StampedFrame& each) {
-    return each.t_ns >= from && each.t_ns < from + 24 * kMillisecond;
+    return each.t_ns >= from.ns() && each.t_ns < (from + 24 * kMillisecond).ns();
   });
   const Played run = run_frames(test::vehicle_config(), frames);
   ASSERT_EQ(run.results.size(), 1U);
@@ -336,16 +336,17 @@ TEST(Pipeline, LinkDownAbortsWithReasonBus) {
   const Config config = test::vehicle_config();
   Pipeline pipeline(config);
   Outbox outbox;
-  MonoTime t = 0;
+  MonoTime t{};
   ExperimentResult result;
   for (const can::StampedFrame& each : drive_frames({})) {
-    for (; t < each.t_ns; t = (t == 0 ? each.t_ns : t + 5 * kMillisecond)) {
-      if (t > 3 * kSecond) pipeline.on_bus_state(BusState::kDown, t);
+    for (; t < MonoTime::of_ns(each.t_ns);
+         t = (t == MonoTime{} ? MonoTime::of_ns(each.t_ns) : t + 5 * kMillisecond)) {
+      if (t > MonoTime{3 * kSecond}) pipeline.on_bus_state(BusState::kDown, t);
       outbox.size = 0;
       const SampleReport& report = pipeline.on_sample(t, outbox);
       if (report.new_result) result = report.result;
     }
-    pipeline.on_frame({.t = each.t_ns, .frame = each.frame});
+    pipeline.on_frame({.t = MonoTime::of_ns(each.t_ns), .frame = each.frame});
   }
   EXPECT_EQ(result.outcome, Outcome::kAborted);
   EXPECT_EQ(result.stop_reason, StopReason::kBus);
@@ -356,7 +357,7 @@ TEST(Pipeline, SignalTriggerRunsOneExperimentEachTime) {
   drive.active_from_ms = 500;
   drive.active_to_ms = 11'000;
   auto frames = drive_frames(drive);
-  drive.start_ns += 12 * kSecond;
+  drive.start_ns += (12 * kSecond).ns();
   drive.active_from_ms = 1000;
   drive.active_to_ms = 2000;
   const auto second = drive_frames(drive);
@@ -364,15 +365,15 @@ TEST(Pipeline, SignalTriggerRunsOneExperimentEachTime) {
   const Played run = run_frames(test::vehicle_config(signal_toml()), frames);
   ASSERT_EQ(run.results.size(), 2U);
   EXPECT_EQ(run.results[0].outcome, Outcome::kCompleted);
-  const MonoTime start = frames.front().t_ns;
-  EXPECT_NEAR(static_cast<double>(run.results[0].start - start), 0.507e9, 6e6);
+  const MonoTime start = MonoTime::of_ns(frames.front().t_ns);
+  EXPECT_NEAR(static_cast<double>((run.results[0].start - start).ns()), 0.507e9, 6e6);
   EXPECT_EQ(run.results[1].outcome, Outcome::kInconclusive);
   EXPECT_EQ(run.results[1].stop_reason, StopReason::kNone);
   EXPECT_FALSE(run.results[1].stopped);
 
   // The flag falls when the first experiment is over, and nothing is one outside.
   for (const SampleReport& report : run.reports) {
-    const double ms = static_cast<double>(report.t - start) / 1e6;
+    const double ms = static_cast<double>((report.t - start).ns()) / 1e6;
     if (ms < 500 || (ms > 11'070 && ms < 13'000)) {
       EXPECT_FALSE(report.in_experiment) << ms;
       EXPECT_FALSE(report.macro_slip_stop) << ms;
@@ -400,10 +401,10 @@ TEST(Pipeline, PeriodsAndCountersAndProtection) {
     counters[id] = counter;
     times[id].push_back(each.t);
   }
-  std::map<std::uint32_t, Duration> longest{{0x6A0, 100}, {0x6A1, 100}, {0x6A3, 1000}};
+  std::map<std::uint32_t, int> longest_ms{{0x6A0, 100}, {0x6A1, 100}, {0x6A3, 1000}};
   for (const auto& [id, at] : times) {
     for (std::size_t i = 1; i < at.size(); ++i) {
-      EXPECT_LE(at[i] - at[i - 1], longest[id] * kMillisecond) << id << " " << at[i];
+      EXPECT_LE(at[i] - at[i - 1], longest_ms[id] * kMillisecond) << id << " " << at[i];
     }
   }
   // Slip every 10 ms in the experiment, every 100 ms outside.
@@ -420,7 +421,7 @@ TEST(Pipeline, PeriodsAndCountersAndProtection) {
 
 TEST(Pipeline, StatusLeavesAtOnceOnAChangeOnly) {
   const Played run = run_frames(test::vehicle_config(), drive_frames({}));
-  MonoTime last = -1;
+  MonoTime last = MonoTime::of_ns(-1);
   std::uint64_t content = 0;
   const auto content_of = [](const can::CanFrame& frame) {
     std::uint64_t bits = 0;
@@ -429,7 +430,7 @@ TEST(Pipeline, StatusLeavesAtOnceOnAChangeOnly) {
   };
   for (const auto& each : of_id(run, 0x6A3)) {
     const std::uint64_t now = content_of(each.frame);
-    if (last >= 0 && now == content && each.t != run.sent.back().t) {
+    if (last >= MonoTime{} && now == content && each.t != run.sent.back().t) {
       EXPECT_EQ(each.t - last, kSecond);
     }
     last = each.t;
@@ -453,7 +454,7 @@ TEST(Pipeline, ALateLoopSendsTheSameBytes) {
     MonoTime now() noexcept override { return inner_.now(); }
     Wake wait_until(MonoTime deadline) noexcept override {
       // Every 100th wait is 30 ms late, and finds what came meanwhile.
-      late_ = ++waits_ % 100 == 0 ? 30 * kMillisecond : 0;
+      late_ = ++waits_ % 100 == 0 ? 30 * kMillisecond : Duration{};
       return inner_.wait_until(deadline + late_);
     }
     std::size_t receive(std::span<RxFrame> out) noexcept override { return inner_.receive(out); }
@@ -467,7 +468,7 @@ TEST(Pipeline, ALateLoopSendsTheSameBytes) {
    private:
     test::FramePlayer inner_;
     int waits_ = 0;
-    Duration late_ = 0;
+    Duration late_{};
   };
   const Config config = test::vehicle_config();
   const Played punctual = run_frames(config, drive_frames({}));
@@ -495,7 +496,7 @@ TEST(Pipeline, SamplesThatAreLostAbortAndTheLoopGoesOn) {
     MonoTime now() noexcept override { return now_; }
     Wake wait_until(MonoTime deadline) noexcept override {
       if (++waits_ > 100) return Wake::kClosed;
-      now_ = deadline + (waits_ == 50 ? 10 * kSecond : 0);
+      now_ = deadline + (waits_ == 50 ? 10 * kSecond : Duration{});
       return Wake::kDeadline;
     }
     std::size_t receive(std::span<RxFrame>) noexcept override { return 0; }
@@ -508,7 +509,7 @@ TEST(Pipeline, SamplesThatAreLostAbortAndTheLoopGoesOn) {
 
    private:
     int waits_ = 0;
-    MonoTime now_ = 0;
+    MonoTime now_{};
   };
   SleepyPort port;
   test::ReportKeeper keeper;
@@ -536,7 +537,7 @@ TEST(Pipeline, APortThatAnnouncesFramesItHasNotDoesNotStopTheSamples) {
 
    private:
     int waits_ = 0;
-    MonoTime now_ = 0;
+    MonoTime now_{};
   };
   EmptyPort port;
   test::ReportKeeper keeper;
@@ -552,20 +553,22 @@ TEST(Pipeline, OwnIdentifiersAreNoInputAndAForeignSenderIsAFaultForTenSeconds) {
   can::CanFrame own;
   own.id = {0x6A1, false};
   own.length = 8;
-  pipeline.on_frame({.t = 1, .frame = own, .own_echo = true});
-  EXPECT_EQ(pipeline.on_sample(5, outbox).faults, 0U);
+  pipeline.on_frame({.t = MonoTime::of_ns(1), .frame = own, .own_echo = true});
+  EXPECT_EQ(pipeline.on_sample(MonoTime::of_ns(5), outbox).faults, 0U);
   can::CanFrame extended = own;
   extended.id.extended = true;
-  pipeline.on_frame({.t = 6, .frame = extended});
+  pipeline.on_frame({.t = MonoTime::of_ns(6), .frame = extended});
   outbox.size = 0;
-  EXPECT_EQ(pipeline.on_sample(10, outbox).faults, 0U);
-  pipeline.on_frame({.t = 11, .frame = own});
+  EXPECT_EQ(pipeline.on_sample(MonoTime::of_ns(10), outbox).faults, 0U);
+  pipeline.on_frame({.t = MonoTime::of_ns(11), .frame = own});
   outbox.size = 0;
-  EXPECT_EQ(pipeline.on_sample(15, outbox).faults, fault_bit(Fault::kForeignSender));
-  for (MonoTime t = kSecond; t < 20 * kSecond; t += kSecond) {
+  EXPECT_EQ(pipeline.on_sample(MonoTime::of_ns(15), outbox).faults,
+            fault_bit(Fault::kForeignSender));
+  for (MonoTime t{kSecond}; t < MonoTime{20 * kSecond}; t += kSecond) {
     outbox.size = 0;
     const SampleReport& report = pipeline.on_sample(t, outbox);
-    EXPECT_EQ((report.faults & fault_bit(Fault::kForeignSender)) != 0, t <= 10 * kSecond) << t;
+    EXPECT_EQ((report.faults & fault_bit(Fault::kForeignSender)) != 0, t <= MonoTime{10 * kSecond})
+        << t;
     EXPECT_EQ(report.foreign_identifier, 0x6A1U);
   }
   EXPECT_EQ(pipeline.counters().frames, 3U);
@@ -575,14 +578,14 @@ TEST(Pipeline, OwnIdentifiersAreNoInputAndAForeignSenderIsAFaultForTenSeconds) {
 TEST(Pipeline, NoFrameOfTheWholeStandardSpaceUpsetsIt) {
   Pipeline pipeline(test::vehicle_config());
   Outbox outbox;
-  MonoTime t = 0;
+  MonoTime t{};
   for (std::uint32_t id = 0; id <= 0x7FF; ++id) {
     for (std::uint8_t length = 0; length <= 8; ++length) {
       can::CanFrame frame;
       frame.id = {id, false};
       frame.length = length;
       frame.data.fill(0xFF);
-      pipeline.on_frame({.t = ++t, .frame = frame});
+      pipeline.on_frame({.t = t += kNanosecond, .frame = frame});
     }
   }
   EXPECT_EQ(pipeline.counters().frames, 2048U * 9U);

@@ -99,10 +99,10 @@ TEST(Reload, IsInForceAtTheNextSampleAndCountersGoOn) {
   const Config before = test::vehicle_config(toml("signal"));
   const Config after = test::vehicle_config(other_identifiers());
   ReloadSlot slot;
-  MonoTime offered = 0;
+  MonoTime offered{};
   int collected = 0;
   const Played run = run_with(before, drive(0, 0), slot, [&](const SampleReport& report) {
-    if (offered == 0 && report.t >= 3 * kSecond) {
+    if (offered == MonoTime{} && report.t >= MonoTime{3 * kSecond}) {
       EXPECT_EQ(slot.offer(reload_of(after)), nullptr);
       offered = report.t;
     }
@@ -134,9 +134,9 @@ TEST(Reload, WaitsForTheEndOfAnExperimentAndItsResultStands) {
   const Config after = test::vehicle_config(other_identifiers());
   ReloadSlot slot;
   bool offered = false;
-  MonoTime in_force = 0;
+  MonoTime in_force{};
   const Played run = run_with(before, drive(1000, 9500), slot, [&](const SampleReport& report) {
-    if (!offered && report.in_experiment && report.t >= 4 * kSecond) {
+    if (!offered && report.in_experiment && report.t >= MonoTime{4 * kSecond}) {
       slot.offer(reload_of(after));
       offered = true;
     }
@@ -145,8 +145,8 @@ TEST(Reload, WaitsForTheEndOfAnExperimentAndItsResultStands) {
   ASSERT_TRUE(offered);
   ASSERT_EQ(run.results.size(), 1U);
   EXPECT_EQ(run.results[0].outcome, Outcome::kCompleted);
-  ASSERT_NE(in_force, 0);
-  MonoTime over = 0;
+  ASSERT_NE(in_force, MonoTime{});
+  MonoTime over{};
   for (const SampleReport& report : run.reports) {
     if (report.in_experiment) over = report.t;
   }
@@ -189,22 +189,23 @@ TEST(Reload, AForeignSenderStaysAFault) {
   foreign.length = 8;
   // Just before the reload; ten seconds later it is forgotten.
   const auto at = std::find_if(frames.begin(), frames.end(), [](const can::StampedFrame& each) {
-    return each.t_ns > 3 * kSecond - 100 * kMillisecond;
+    return each.t_ns > (3 * kSecond - 100 * kMillisecond).ns();
   });
   frames.insert(at, {at->t_ns, foreign});
   ReloadSlot slot;
   bool offered = false;
   int reloads = 0;
   const Played run = run_with(config, frames, slot, [&](const SampleReport& report) {
-    if (report.t >= 3 * kSecond && !offered) {
+    if (report.t >= MonoTime{3 * kSecond} && !offered) {
       slot.offer(reload_of(config));
       offered = true;
     }
     if (slot.collect() != nullptr) ++reloads;
   });
   EXPECT_EQ(reloads, 1);
-  const auto after = std::find_if(run.reports.begin(), run.reports.end(),
-                                  [](const SampleReport& each) { return each.t > 8 * kSecond; });
+  const auto after =
+      std::find_if(run.reports.begin(), run.reports.end(),
+                   [](const SampleReport& each) { return each.t > MonoTime{8 * kSecond}; });
   ASSERT_NE(after, run.reports.end());
   EXPECT_NE(after->faults & fault_bit(Fault::kForeignSender), 0U);
 }
@@ -224,7 +225,7 @@ TEST(Reload, AHundredOfThemAllocateNothingOnTheLoopsThread) {
     void on_report(const SampleReport& report) noexcept override {
       next_.on_report(report);
       if (auto back = slot_.collect()) used_[taken++] = std::move(back);
-      if (offered == ready_.size() || report.t < 2 * kSecond) return;
+      if (offered == ready_.size() || report.t < MonoTime{2 * kSecond}) return;
       auto before = slot_.offer(std::move(ready_[offered++]));
       if (before != nullptr) used_[used_.size() - 1] = std::move(before);
     }

@@ -119,7 +119,7 @@ Course drive_belts(const Plan& plan) {
     const auto end_ns = static_cast<std::int64_t>(1e9 + static_cast<double>(i + 1) * kEach_s * 1e9);
     double least = 1e9, before = 1e9;
     bool doubtful = false;
-    for (; next_report < keeper.reports.size() && keeper.reports[next_report].t < end_ns;
+    for (; next_report < keeper.reports.size() && keeper.reports[next_report].t.ns() < end_ns;
          ++next_report) {
       const SampleReport& report = keeper.reports[next_report];
       doubtful = (report.faults & fault_bit(Fault::kResultDoubtful)) != 0;
@@ -127,13 +127,15 @@ Course drive_belts(const Plan& plan) {
     for (std::size_t k = 0; k < run.results.size(); ++k) {
       // The frames with and after the result of this drive, at the torque of their sample.
       const ExperimentResult& result = run.results[k];
-      if (result.end >= end_ns || result.end < end_ns - static_cast<std::int64_t>(kEach_s * 1e9)) {
+      if (result.end.ns() >= end_ns ||
+          result.end.ns() < end_ns - static_cast<std::int64_t>(kEach_s * 1e9)) {
         continue;
       }
       std::size_t at = 0;
       for (const test::SentFrame& sent : sent_frames) {
         const std::int64_t begin_ns = end_ns - static_cast<std::int64_t>(kEach_s * 1e9);
-        if (sent.frame.id.value != 0x6A0 || sent.t < begin_ns || sent.t >= end_ns) continue;
+        if (sent.frame.id.value != 0x6A0 || sent.t.ns() < begin_ns || sent.t.ns() >= end_ns)
+          continue;
         while (at + 1 < keeper.reports.size() && keeper.reports[at].t < sent.t) ++at;
         const SampleReport& report = keeper.reports[at];
         const bool told = report.result.end == result.end;

@@ -16,7 +16,7 @@
 namespace beltgrip::daemon {
 namespace {
 
-constexpr MonoTime kPeriod = 5 * kMillisecond;
+constexpr Duration kPeriod = 5 * kMillisecond;
 constexpr std::size_t kDriveOverdrive = 0;
 
 // A car at rest in its end stop; numbers of its own.
@@ -46,7 +46,8 @@ std::vector<CarriedWindow> windows_of(const std::vector<SampleReport>& reports) 
 
 std::vector<SampleReport> steady_drive(double seconds) {
   std::vector<SampleReport> reports;
-  for (MonoTime t = 0; t < std::llround(seconds * 1e9); t += kPeriod) reports.push_back(steady(t));
+  for (MonoTime t{}; t < MonoTime::of_ns(std::llround(seconds * 1e9)); t += kPeriod)
+    reports.push_back(steady(t));
   return reports;
 }
 
@@ -68,7 +69,7 @@ TEST(CarriedWatch, NoiseLiftsTheBoundInNoMoreThanTheStatedShare) {
     double noise = 0.0, highest = 0.0, highest_mean = 0.0, sum = 0.0;
     int windows = 0, above = 0, means_above = 0;
     const double fresh = std::sqrt(1.0 - each.keep * each.keep);
-    for (MonoTime t = 0; windows < kWindows; t += kPeriod) {
+    for (MonoTime t{}; windows < kWindows; t += kPeriod) {
       noise = each.keep * noise + fresh * (each.skewed ? tail(random) - 1.0 : normal(random));
       const CarriedWindow* window = watch.step(steady(t, kTruth * (1.0 + 0.03 * noise)));
       if (window == nullptr) continue;
@@ -98,7 +99,7 @@ TEST(CarriedWatch, AWindowIsTwoSecondsAtOneEndStopInOneDirection) {
   EXPECT_DOUBLE_EQ(window.mu_star_held, 0.08);
   EXPECT_NEAR(window.clamp_force_N, 5000.0, 1e-6);
   EXPECT_NEAR(window.torque_Nm, 64.0, 1e-9);
-  EXPECT_EQ(window.end, 2 * kSecond);
+  EXPECT_EQ(window.end, MonoTime{2 * kSecond});
 }
 
 TEST(CarriedWatch, WhatIsNotSteadySaysNothing) {
@@ -128,7 +129,7 @@ TEST(CarriedWatch, SlipThatGrowsIsNotCarried) {
   std::vector<SampleReport> reports = steady_drive(2.01);
   const auto grow = [&](double percent_per_s) {
     for (SampleReport& each : reports) {
-      each.curve.sigma_star_percent = 0.6 + percent_per_s * 1e-9 * static_cast<double>(each.t);
+      each.curve.sigma_star_percent = 0.6 + percent_per_s * 1e-9 * static_cast<double>(each.t.ns());
     }
   };
   grow(0.20);  // halves lie one second apart
@@ -161,7 +162,8 @@ TEST(CarriedWatch, AForceThatARequestLowersIsNotTheControllersOwn) {
 TEST(CarriedWatch, ALoadThatFallsCountsWithItsLowest) {
   std::vector<SampleReport> reports = steady_drive(2.01);
   for (SampleReport& each : reports) {
-    if (each.t >= kSecond && each.t < 1200 * kMillisecond) each.curve.mu_star = 0.05;
+    if (each.t >= MonoTime{kSecond} && each.t < MonoTime{1200 * kMillisecond})
+      each.curve.mu_star = 0.05;
   }
   ASSERT_EQ(windows_of(reports).size(), 1U);
   EXPECT_NEAR(windows_of(reports).front().mu_star_held, 0.05, 1e-12);

@@ -66,8 +66,8 @@ TEST(EventSink, WhatAloneKeepsAnExperimentFromBeginning) {
   };
   const std::uint32_t brake = inhibit_bit(Inhibit::kBrake), pedal = inhibit_bit(Inhibit::kPedal);
   EXPECT_TRUE(after(kSecond, brake).empty());
-  EXPECT_TRUE(after(kSecond - 1, brake).empty());
-  EXPECT_EQ(after(1, brake),
+  EXPECT_TRUE(after(kSecond - kNanosecond, brake).empty());
+  EXPECT_EQ(after(kNanosecond, brake),
             std::vector<std::string>{
                 "no experiment: brake: the brake is pressed; to do: coast without braking"});
   EXPECT_TRUE(after(kSecond, brake).empty());
@@ -194,7 +194,7 @@ TEST(ReasonsNow, SayTheFigureBesideTheLimit) {
   EXPECT_EQ(figure(Inhibit::kOil), "35 degC, limit 40 degC");
   EXPECT_EQ(figure(Inhibit::kCooldown), "limits 60 s and 1000 m");
   signals[static_cast<std::size_t>(Role::kAcceleratorPedal)] = {
-      .quality = SignalQuality::kValid, .seen = true, .value = 0.125, .t = 0};
+      .quality = SignalQuality::kValid, .seen = true, .value = 0.125, .t = {}};
   EXPECT_EQ(figure(Inhibit::kPedal), "12.5 %, limit 2 %");
   signals[static_cast<std::size_t>(Role::kSecondaryPressure)].quality = SignalQuality::kStale;
   EXPECT_EQ(figure(Inhibit::kInputs), "secondary_pressure stale");
@@ -251,18 +251,18 @@ TEST(LineBudget, TenLinesASecondAndWhatWasLeftOut) {
   unsigned more = 0;
   for (int i = 0; i < 100; ++i) {
     Event event;
-    event.t = 10 * kSecond + i * 5 * kMillisecond;
+    event.t = MonoTime{10 * kSecond + i * 5 * kMillisecond};
     event.id = EventId::kFaultRaised;
     lines += budget.take(event) ? 1 : 0;
     more += budget.left_out(event.t);
   }
   EXPECT_EQ(lines, static_cast<int>(LineBudget::kMost));
   Event stop;
-  stop.t = 10 * kSecond + 500 * kMillisecond;
+  stop.t = MonoTime{10 * kSecond + 500 * kMillisecond};
   stop.id = EventId::kStop;
   EXPECT_TRUE(budget.take(stop));
   Event later;
-  later.t = 12 * kSecond;
+  later.t = MonoTime{12 * kSecond};
   EXPECT_TRUE(budget.take(later));
   more += budget.left_out(later.t);
   EXPECT_EQ(more, 100U - LineBudget::kMost);

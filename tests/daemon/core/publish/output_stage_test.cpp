@@ -10,7 +10,7 @@ namespace beltgrip::daemon {
 namespace {
 
 constexpr Duration kTen = 10 * kMillisecond;
-constexpr MonoTime kStart = 7 * kSecond;
+constexpr MonoTime kStart{7 * kSecond};
 constexpr double kActing_N = 3300.0;
 
 // Floor 1000.2 + 0.01 * 2e5 = 3000.2 N; 600 N/s.
@@ -238,7 +238,7 @@ TEST(OutputStage, AClampFrameWaitsForItsOwnEcho) {
   const MonoTime sent = bench.t;
   EXPECT_EQ(bench.sample(), 1);
   EXPECT_EQ(bench.sample(), 1);  // the first that waits counts
-  EXPECT_FALSE(bench.stage.unconfirmed(sent + 2 * kTen - 1));
+  EXPECT_FALSE(bench.stage.unconfirmed(sent + 2 * kTen - kNanosecond));
   EXPECT_TRUE(bench.stage.unconfirmed(sent + 2 * kTen));
   bench.hear(0x6A1, true);
   EXPECT_TRUE(bench.stage.unconfirmed(sent + 2 * kTen));
@@ -246,7 +246,7 @@ TEST(OutputStage, AClampFrameWaitsForItsOwnEcho) {
   EXPECT_FALSE(bench.stage.unconfirmed(sent + 2 * kTen));
   const MonoTime again = bench.t;
   EXPECT_EQ(bench.sample(), 1);
-  EXPECT_FALSE(bench.stage.unconfirmed(again + 2 * kTen - 1));
+  EXPECT_FALSE(bench.stage.unconfirmed(again + 2 * kTen - kNanosecond));
   EXPECT_TRUE(bench.stage.unconfirmed(again + 2 * kTen));
 }
 
@@ -262,7 +262,7 @@ TEST(OutputStage, AFrameThatIsNeverConfirmedIsLostAfterASecond) {
   {
     Bench bench;
     bench.quiet();
-    EXPECT_EQ(told_again(bench, kStart + kSecond - 1), 0);
+    EXPECT_EQ(told_again(bench, kStart + kSecond - kNanosecond), 0);
   }
   {
     Bench bench;
@@ -293,7 +293,7 @@ TEST(OutputStage, AnotherGoesOnWhereOneEnded) {
   after.stage.go_on_from(before.stage);
   EXPECT_EQ(after.stage.refused(), 1U);
   // The first clamp frame waits on; counters go on.
-  EXPECT_FALSE(after.stage.unconfirmed(kStart + 2 * kTen - 1));
+  EXPECT_FALSE(after.stage.unconfirmed(kStart + 2 * kTen - kNanosecond));
   EXPECT_TRUE(after.stage.unconfirmed(kStart + 2 * kTen));
   after.t = before.t;
   after.now.status.outcome = Outcome::kAborted;  // leaves at once, with the next counter

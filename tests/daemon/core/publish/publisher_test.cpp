@@ -31,7 +31,7 @@ struct Bench {
 
 TEST(Publisher, TheFirstSampleSendsEverythingButClamp) {
   Bench bench;
-  const Outbox outbox = bench.at(0);
+  const Outbox outbox = bench.at(MonoTime{});
   EXPECT_EQ(outbox.size, 3U);
   EXPECT_EQ(count_of(outbox, 0x6A0), 1U);
   EXPECT_EQ(count_of(outbox, 0x6A1), 1U);
@@ -41,19 +41,19 @@ TEST(Publisher, TheFirstSampleSendsEverythingButClamp) {
 TEST(Publisher, PeriodsAtManySampleRates) {
   for (const double rate_hz : {100.0, 125.0, 143.0, 200.0, 300.0, 333.0, 500.0, 1000.0}) {
     for (const bool experiment : {false, true}) {
-      const auto period = static_cast<Duration>(std::llround(1e9 / rate_hz));
+      const auto period = period_of(rate_hz);
       Bench bench(period);
       bench.now.in_experiment = experiment;
       std::size_t slip = 0, status = 0, estimate = 0;
-      MonoTime last_slip = -1;
+      MonoTime last_slip = MonoTime::of_ns(-1);
       const Duration wanted = (experiment ? 10 : 100) * kMillisecond;
-      for (MonoTime t = 0; t < 10 * kSecond; t += period) {
+      for (MonoTime t{}; t < MonoTime{10 * kSecond}; t += period) {
         const Outbox outbox = bench.at(t);
         estimate += count_of(outbox, 0x6A0);
         status += count_of(outbox, 0x6A3);
         if (count_of(outbox, 0x6A1) == 0) continue;
-        if (last_slip >= 0) {
-          EXPECT_LE(std::abs(t - last_slip - wanted), period) << rate_hz;
+        if (last_slip >= MonoTime{}) {
+          EXPECT_LE(std::abs((t - last_slip - wanted).ns()), period.ns()) << rate_hz;
         }
         last_slip = t;
         ++slip;
@@ -68,28 +68,28 @@ TEST(Publisher, PeriodsAtManySampleRates) {
 
 TEST(Publisher, SlipLeavesAtOnceWhenTheStopFlagChanges) {
   Bench bench;
-  for (MonoTime t = 0; t <= 100 * kMillisecond; t += kFive) bench.at(t);
+  for (MonoTime t{}; t <= MonoTime{100 * kMillisecond}; t += kFive) bench.at(t);
   bench.now.slip.macro_slip_stop = true;
-  EXPECT_EQ(count_of(bench.at(105 * kMillisecond), 0x6A1), 1U);
-  EXPECT_EQ(count_of(bench.at(110 * kMillisecond), 0x6A1), 0U);
+  EXPECT_EQ(count_of(bench.at(MonoTime{105 * kMillisecond}), 0x6A1), 1U);
+  EXPECT_EQ(count_of(bench.at(MonoTime{110 * kMillisecond}), 0x6A1), 0U);
   bench.now.slip.macro_slip_stop = false;
-  EXPECT_EQ(count_of(bench.at(115 * kMillisecond), 0x6A1), 1U);
+  EXPECT_EQ(count_of(bench.at(MonoTime{115 * kMillisecond}), 0x6A1), 1U);
 }
 
 TEST(Publisher, EstimateLeavesAtOnceOnANewResultAndRestartsItsPeriod) {
   Bench bench;
-  for (MonoTime t = 0; t <= 100 * kMillisecond; t += kFive) bench.at(t);
+  for (MonoTime t{}; t <= MonoTime{100 * kMillisecond}; t += kFive) bench.at(t);
   bench.now.new_result = true;
-  EXPECT_EQ(count_of(bench.at(135 * kMillisecond), 0x6A0), 1U);
-  for (MonoTime t = 140 * kMillisecond; t < 235 * kMillisecond; t += kFive) {
+  EXPECT_EQ(count_of(bench.at(MonoTime{135 * kMillisecond}), 0x6A0), 1U);
+  for (MonoTime t{140 * kMillisecond}; t < MonoTime{235 * kMillisecond}; t += kFive) {
     EXPECT_EQ(count_of(bench.at(t), 0x6A0), 0U) << t;
   }
-  EXPECT_EQ(count_of(bench.at(235 * kMillisecond), 0x6A0), 1U);
+  EXPECT_EQ(count_of(bench.at(MonoTime{235 * kMillisecond}), 0x6A0), 1U);
 }
 
 TEST(Publisher, StatusLeavesAtOnceOnEachKindOfChange) {
   Bench bench;
-  MonoTime t = 0;
+  MonoTime t{};
   bench.at(t);
   const auto changed = [&] { return count_of(bench.at(t += kFive), 0x6A3) == 1; };
   EXPECT_FALSE(changed());
@@ -107,32 +107,32 @@ TEST(Publisher, StatusLeavesAtOnceOnEachKindOfChange) {
 
 TEST(Publisher, TheShortPeriodBeginsWithTheExperiment) {
   Bench bench;
-  for (MonoTime t = 0; t <= 120 * kMillisecond; t += kFive) bench.at(t);
+  for (MonoTime t{}; t <= MonoTime{120 * kMillisecond}; t += kFive) bench.at(t);
   bench.now.in_experiment = true;
-  MonoTime last = 0;
-  for (MonoTime t = 125 * kMillisecond; t <= 165 * kMillisecond; t += kFive) {
+  MonoTime last{};
+  for (MonoTime t{125 * kMillisecond}; t <= MonoTime{165 * kMillisecond}; t += kFive) {
     if (count_of(bench.at(t), 0x6A1) == 0) continue;
-    if (last == 0) {
-      EXPECT_LE(t, 135 * kMillisecond);
+    if (last == MonoTime{}) {
+      EXPECT_LE(t, MonoTime{135 * kMillisecond});
     } else {
       EXPECT_EQ(t - last, 10 * kMillisecond);
     }
     last = t;
   }
-  EXPECT_GE(last, 155 * kMillisecond);
+  EXPECT_GE(last, MonoTime{155 * kMillisecond});
 }
 
 TEST(Publisher, MissedSamplesAreNotCaughtUp) {
   Bench bench;
-  bench.at(0);
-  EXPECT_EQ(bench.at(10 * kSecond).size, 3U);
-  EXPECT_EQ(bench.at(10 * kSecond + kFive).size, 0U);
+  bench.at(MonoTime{});
+  EXPECT_EQ(bench.at(MonoTime{10 * kSecond}).size, 3U);
+  EXPECT_EQ(bench.at(MonoTime{10 * kSecond + kFive}).size, 0U);
 }
 
 TEST(Publisher, CountersRunFromZeroToFourteenEachForItself) {
   Bench bench;
   std::vector<std::uint8_t> counters;
-  for (MonoTime t = 0; counters.size() < 40; t += 100 * kMillisecond) {
+  for (MonoTime t{}; counters.size() < 40; t += 100 * kMillisecond) {
     const Outbox outbox = bench.at(t);
     for (std::size_t i = 0; i < outbox.size; ++i) {
       if (outbox.frames[i].id.value != 0x6A1) continue;
@@ -144,9 +144,9 @@ TEST(Publisher, CountersRunFromZeroToFourteenEachForItself) {
 
 TEST(Publisher, TheEndSendsEverythingOnceMore) {
   Bench bench;
-  bench.at(0);
+  bench.at(MonoTime{});
   Outbox outbox;
-  bench.publisher.collect_all(kFive, bench.now, outbox);
+  bench.publisher.collect_all(MonoTime{kFive}, bench.now, outbox);
   EXPECT_EQ(outbox.size, 3U);
 }
 
@@ -160,7 +160,7 @@ TEST(Publisher, ClampFramesWithControlCommandOnly) {
     }
     return count;
   };
-  MonoTime t = 0;
+  MonoTime t{};
   EXPECT_EQ(run(t, kSecond), 5U);  // at start
   bench.now.clamp = {true, 3000.0};
   EXPECT_EQ(count_of(bench.at(t), 0x6A2), 1U);  // at once
@@ -184,7 +184,7 @@ TEST(Publisher, AnotherGoesOnWhereOneEnded) {
   bench.now.slip.macro_slip_stop = true;
   bench.now.status.outcome = Outcome::kAborted;
   std::uint8_t counter = 0;
-  for (MonoTime t = 0; t <= 20 * kMillisecond; t += 4 * kMillisecond) {
+  for (MonoTime t{}; t <= MonoTime{20 * kMillisecond}; t += 4 * kMillisecond) {
     const Outbox outbox = bench.at(t);
     if (count_of(outbox, 0x6A2) > 0) counter = outbox.frames[0].data[1] & 15;
   }
@@ -192,8 +192,8 @@ TEST(Publisher, AnotherGoesOnWhereOneEnded) {
   next.now = bench.now;
   next.publisher.go_on_from(bench.publisher);
   // Nothing is due, nothing has changed, nothing begins.
-  EXPECT_EQ(next.at(24 * kMillisecond).size, 0U);
-  const Outbox outbox = next.at(28 * kMillisecond);
+  EXPECT_EQ(next.at(MonoTime{24 * kMillisecond}).size, 0U);
+  const Outbox outbox = next.at(MonoTime{28 * kMillisecond});
   EXPECT_EQ(outbox.size, 2U);  // clamp and slip
   EXPECT_EQ(outbox.frames[0].id.value, 0x6A2U);
   EXPECT_EQ(outbox.frames[0].data[1] & 15, counter + 1);
@@ -202,26 +202,26 @@ TEST(Publisher, AnotherGoesOnWhereOneEnded) {
 TEST(Publisher, HalfASampleBeforeItsInstantIsTheNearestSample) {
   Bench bench(4 * kMillisecond);
   bench.now.in_experiment = true;
-  bench.at(0);
-  EXPECT_EQ(count_of(bench.at(4 * kMillisecond), 0x6A1), 0U);
-  EXPECT_EQ(count_of(bench.at(8 * kMillisecond), 0x6A1), 1U);
+  bench.at(MonoTime{});
+  EXPECT_EQ(count_of(bench.at(MonoTime{4 * kMillisecond}), 0x6A1), 0U);
+  EXPECT_EQ(count_of(bench.at(MonoTime{8 * kMillisecond}), 0x6A1), 1U);
 }
 
 TEST(Publisher, ASampleAtTheNextInstantButOneIsNotCaughtUpEither) {
   Bench bench;
   bench.now.in_experiment = true;
-  bench.at(0);
-  EXPECT_EQ(count_of(bench.at(20 * kMillisecond), 0x6A1), 1U);
-  EXPECT_EQ(count_of(bench.at(25 * kMillisecond), 0x6A1), 0U);
+  bench.at(MonoTime{});
+  EXPECT_EQ(count_of(bench.at(MonoTime{20 * kMillisecond}), 0x6A1), 1U);
+  EXPECT_EQ(count_of(bench.at(MonoTime{25 * kMillisecond}), 0x6A1), 0U);
 }
 
 TEST(Publisher, WhileARequestStandsTheInactiveFramesAreNotTold) {
   Bench bench;
   bench.now.command = true;
-  for (MonoTime t = 0; t < kSecond; t += kFive) bench.at(t);
+  for (MonoTime t{}; t < MonoTime{kSecond}; t += kFive) bench.at(t);
   EXPECT_TRUE(bench.publisher.inactive_told());
   bench.now.clamp = {true, 3000.0};
-  for (MonoTime t = kSecond; t < 2 * kSecond; t += kFive) {
+  for (MonoTime t{kSecond}; t < MonoTime{2 * kSecond}; t += kFive) {
     bench.at(t);
     ASSERT_FALSE(bench.publisher.inactive_told()) << t;
   }
@@ -231,9 +231,9 @@ TEST(Publisher, TheEndTakesBackARequestThatStands) {
   Bench bench;
   bench.now.command = true;
   bench.now.clamp = {true, 3000.0};
-  bench.at(0);
+  bench.at(MonoTime{});
   Outbox last;
-  bench.publisher.collect_all(kFive, bench.now, last);
+  bench.publisher.collect_all(MonoTime{kFive}, bench.now, last);
   EXPECT_EQ(count_of(last, 0x6A2), 5U);
   const OwnFrames frames{FrameIdentifiers{}};
   for (std::size_t i = 0; i < 5; ++i) {
@@ -242,7 +242,7 @@ TEST(Publisher, TheEndTakesBackARequestThatStands) {
   }
   // All are told: no more leave.
   bench.now.clamp = {};
-  EXPECT_EQ(count_of(bench.at(kSecond), 0x6A2), 0U);
+  EXPECT_EQ(count_of(bench.at(MonoTime{kSecond}), 0x6A2), 0U);
 }
 
 }  // namespace

@@ -9,9 +9,9 @@
 namespace beltgrip::other {
 namespace {
 
-constexpr daemon::MonoTime kStart = daemon::kSecond;
+constexpr daemon::MonoTime kStart{daemon::kSecond};
 // Chosen: no sample at the instant of a frame.
-constexpr daemon::Duration kPhase = 700'000;  // ns
+constexpr daemon::Duration kPhase = daemon::Duration::of_ns(700'000);  // ns
 
 daemon::Config configuration(const std::string& trigger, const std::string& settings) {
   test::TemporaryDirectory folder;
@@ -34,7 +34,7 @@ VirtualDrive::VirtualDrive(const Kind& kind, std::size_t seed, const std::string
 
 void VirtualDrive::put(canid_t id, const Bytes& frame) {
   daemon::RxFrame received;
-  received.t = kStart + ticks() * static_cast<daemon::Duration>(kTick_s * 1e9);
+  received.t = kStart + ticks() * daemon::Duration::of_s(kTick_s);
   received.frame.id = {id & CAN_EFF_MASK, (id & CAN_EFF_FLAG) != 0};
   received.frame.length = static_cast<std::uint8_t>(frame.size());
   std::ranges::copy(frame, received.frame.data.begin());
@@ -42,7 +42,7 @@ void VirtualDrive::put(canid_t id, const Bytes& frame) {
 }
 
 void VirtualDrive::exchange() {
-  const daemon::MonoTime now = kStart + ticks() * static_cast<daemon::Duration>(kTick_s * 1e9);
+  const daemon::MonoTime now = kStart + ticks() * daemon::Duration::of_s(kTick_s);
   for (; next_sample_ < now; next_sample_ += 5 * daemon::kMillisecond) sample(next_sample_);
   for (const can::CanFrame& each : under_way_) {
     hear(each.id.value, Bytes(each.data.begin(), each.data.begin() + each.length));

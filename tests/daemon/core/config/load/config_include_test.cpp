@@ -47,7 +47,7 @@ class Include : public testing::Test {
     InputMonitor inputs(*result.config);
     FaultSet faults;
     RxFrame frame;
-    frame.t = 1;
+    frame.t = MonoTime::of_ns(1);
     frame.frame.id = {0x103, false};
     frame.frame.length = 2;
     frame.frame.data[0] = raw;
