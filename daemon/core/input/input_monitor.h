@@ -79,7 +79,7 @@ class InputMonitor {
   // Of the signal's own frames: configured, from the DBC, or learned; nothing until then. Learned,
   // it is the middle of kLearnIntervals; where the signal is multiplexed, the longest but one, as
   // pages need not come evenly.
-  std::optional<Duration> period(Role role) const noexcept { return row(role).period; }
+  const std::optional<Duration>& period(Role role) const noexcept { return row(role).period; }
   // Configured: how long before its stamp a value was true.
   Duration delay(Role role) const noexcept { return row(role).delay; }
 

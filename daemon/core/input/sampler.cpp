@@ -22,8 +22,9 @@ void Sampler::settle() noexcept {
 bool Sampler::read(Role role, MonoTime t, double& value) const noexcept {
   constexpr int kReachPeriods = 2;
   const Duration delay = inputs_.delay(role);
-  const Duration reach =
-      kReachPeriods * inputs_.period(role).value_or(Duration{}) + std::max(Duration{}, delay);
+  const std::optional<Duration>& period = inputs_.period(role);
+  Duration reach = period ? kReachPeriods * *period : Duration{};
+  if (delay > Duration{}) reach += delay;
   return inputs_.history(role).value_at(t + delay, reach, value);
 }
 

@@ -125,9 +125,9 @@ void judge_results(const LoopRun& run, CampaignVerdict& verdict) {
     out.outcome = refused ? "Refused" : daemon::outcome_name(result.outcome);
     out.stop_reason = daemon::stop_reason_name(result.stop_reason);
     out.cause = daemon::cause_text(result.stop_reason, result.cause);
-    const double start_s = static_cast<double>(result.start) * 1e-9;
+    const double start_s = static_cast<double>(result.start.ns()) * 1e-9;
     out.begin_s = start_s;
-    out.end_s = static_cast<double>(result.end) * 1e-9;
+    out.end_s = static_cast<double>(result.end.ns()) * 1e-9;
     for (const sim::RequestTruth& request : run.requests) {
       if (result.outcome != daemon::Outcome::kCompleted ||
           std::abs(request.begin_s - start_s) > kSame_s) {
