@@ -24,7 +24,7 @@ bool Sampler::read(Role role, MonoTime t, double& value) const noexcept {
   const Duration delay = inputs_.delay(role);
   const std::optional<Duration>& period = inputs_.period(role);
   Duration reach = period ? kReachPeriods * *period : Duration{};
-  if (delay > Duration{}) reach += delay;
+  reach += std::max<Duration>(delay, Duration{});
   return inputs_.history(role).value_at(t + delay, reach, value);
 }
 

@@ -17,6 +17,7 @@ class Writer:
     def __init__(self, path, text, first, without):
         self.path, self.text, self.next, self.without = path, text, first, without
         self.edits, self.mutants, self.order = [], [], 0
+        self.taken = set()  # extents: a comparison of times stands in the tree more than once
 
     def number(self, cursor, what, count=1):
         first = self.next
@@ -56,6 +57,12 @@ def is_number(cursor):
                     "UCHAR", "USHORT", "SHORT", "SCHAR", "CHAR_S", "CHAR_U")
 
 
+def time_type(cursor):
+    """Instant or Duration of daemon/core/base/mono_time.h; else nothing."""
+    name = cursor.type.get_canonical().spelling.removeprefix("const ").rstrip(" &")
+    return {"beltgrip::daemon::MonoTime": "Instant", "beltgrip::daemon::Duration": "Duration"}.get(name)
+
+
 def operator(writer, left, right):
     """Text between two operands, and where it stands: only if it is a bare operator."""
     begin, end = extent(left)[1], extent(right)[0]
@@ -84,6 +91,31 @@ def binary(writer, cursor):
             writer.around(*extent(each), f"::mutant::flip({k}, static_cast<bool>(", "))")
 
 
+def time_operator(writer, cursor):
+    """The same between instants and spans, where the changed one compiles, too."""
+    operands = list(cursor.get_children())
+    whole = extent(cursor)
+    if len(operands) != 3 or whole in writer.taken:
+        return
+    left, _, right = operands
+    kinds = (time_type(left), time_type(right))
+    sign, begin, end = operator(writer, left, right)
+    if sign in ORDER and None not in kinds:
+        k = writer.number(cursor, f"{sign} at its edge")
+        call = f"::mutant::order({k}, '{ORDER[sign]}', "
+    elif sign in ("+", "-") and kinds[1] == "Duration":
+        k = writer.number(cursor, {"+": "+ is -", "-": "- is +"}[sign])
+        call = f"::mutant::{ARITHMETIC[sign]}({k}, "
+    elif sign in ("*", "/") and kinds == ("Duration", None):
+        k = writer.number(cursor, f"{sign} left out")
+        call = f"::mutant::{ARITHMETIC[sign]}({k}, "
+    else:
+        return
+    writer.taken.add(whole)
+    writer.around(*whole, call, ")")
+    writer.replace(begin, end, ", ")
+
+
 def condition(writer, cursor):
     children = list(cursor.get_children())
     if not children or children[0].kind == Kind.DECL_STMT or children[0].kind == Kind.VAR_DECL:
@@ -102,7 +134,9 @@ def statement(writer, cursor):
 
 def constant(writer, cursor):
     told = cursor.referenced
-    if told is None or told.kind != Kind.VAR_DECL or not is_number(cursor):
+    if told is None or told.kind != Kind.VAR_DECL:
+        return
+    if not is_number(cursor) and time_type(cursor) != "Duration":
         return
     tokens = [each.spelling for each in told.get_tokens()]
     if "constexpr" not in tokens:
@@ -114,6 +148,8 @@ def constant(writer, cursor):
 
 def call(writer, cursor):
     begin, _ = extent(cursor)
+    if cursor.spelling not in ("min", "max"):
+        return
     for name, switch in (("std::min(", "Least"), ("std::max(", "Largest")):
         if writer.text.startswith(name, begin):
             k = writer.number(cursor, f"{name[:-1]} is the other")
@@ -140,6 +176,8 @@ def visit(writer, cursor, inside, parent):
             condition(writer, cursor)
         elif kind == Kind.DECL_REF_EXPR:
             constant(writer, cursor)
+        elif kind == Kind.CALL_EXPR and cursor.spelling.startswith("operator"):
+            time_operator(writer, cursor)
         elif kind == Kind.CALL_EXPR:
             call(writer, cursor)
     body = inside or (cursor.kind == Kind.COMPOUND_STMT)
