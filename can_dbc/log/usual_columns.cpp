@@ -122,8 +122,8 @@ class Columns {
     return count;
   }
   // Quicker where the compiler knows how many.
-  [[gnu::always_inline]] inline bool take_data(int count, std::uint64_t& bytes) noexcept {
-    constexpr int kByteChars = 3;
+  [[gnu::always_inline]] bool take_data(int count, std::uint64_t& bytes) noexcept {
+    constexpr std::ptrdiff_t kByteChars = 3;
     int wrong = 0;    // negative with the first that is no digit
     int between = 0;  // not 0 with the first that is no blank
     for (int i = 0; i < count; ++i) {
@@ -180,7 +180,7 @@ const char* read_usual_asc(std::string_view text, LogRecord& record) noexcept {
   assert(text.size() >= kUsualColumnsMost);
   constexpr int kPlaces = 9;  // of a second
   // Time, channel, identifier, direction, kind, length, data.
-  static_assert(7 * kColumnMost <= kUsualColumnsMost);
+  static_assert(std::size_t{7} * kColumnMost <= kUsualColumnsMost);
   Columns line(text);
   Frame frame;
   if (!line.blanks() || !line.time(kPlaces, frame.t_ns) || !line.blanks() ||
