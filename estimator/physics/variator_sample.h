@@ -12,6 +12,9 @@ struct VariatorSample {
   double secondary_pressure_Pa = 0.0;  // p_s, as measured
   double torque_Nm = 0.0;              // engine or primary torque, + = drive, - = overrun
   bool usable = false;                 // every field fresh, finite and in range
+  // By so much t_ns lies beyond the newest reading of the pressure: from there on p_s is foretold
+  // by its course. 0: read on both sides, or not known.
+  std::int64_t pressure_ahead_ns = 0;
 };
 
 }  // namespace beltgrip::estimator

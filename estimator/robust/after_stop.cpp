@@ -11,7 +11,8 @@ namespace {
 // For so long the belt is watched after the stop (follow_on.h); a clamp that is given back ends it
 // sooner.
 constexpr double kKeep_s = 0.5;
-// The force is judged in means over this; when it has risen, the group before may have as well.
+// The force is judged in means over this; a group that has not risen shows that what was read
+// before it had not.
 constexpr double kGroup_s = 0.02;
 constexpr double kForceDeviations = 3.0;
 // Further away slip moves on too fast for channels that are read one after the other. Measured on
@@ -32,7 +33,7 @@ AfterStop::AfterStop(double sample_rate_hz)
       per_group_(samples_in(kGroup_s, sample_rate_hz)) {}
 
 void AfterStop::reset() noexcept {
-  count_ = kept_ = group_begin_ = 0;
+  count_ = read_ = kept_ = group_begin_ = read_before_group_ = 0;
   begun_ = over_ = false;
   swing_slip_percent_ = 0.0;
   swing_samples_ = 0;
@@ -57,17 +58,22 @@ void AfterStop::begin(const ExperimentRecord& record) noexcept {
                                                 record.force().density(kGroup_s) / kGroup_s);
 }
 
-void AfterStop::step(const Cell& sample) noexcept {
+void AfterStop::step(const Cell& sample, double pressure_ahead_s) noexcept {
   if (!begun_) return;
   if (over_) return;
-  const double after_s = sample.t_s - stop_t_s_;
-  if (after_s >= kSwingFrom_s && after_s <= kSwingTo_s) {
-    swing_slip_percent_ += sample.slip_percent;
-    ++swing_samples_;
-  }
   samples_[count_++] = sample;
+  count_read(sample.t_s - pressure_ahead_s);
   if (count_ - group_begin_ == per_group_) judge_group();
   if (count_ == samples_.size()) over_ = true;
+}
+
+void AfterStop::count_read(double read_to_s) noexcept {
+  for (; read_ < count_ && samples_[read_].t_s <= read_to_s; ++read_) {
+    const double after_s = samples_[read_].t_s - stop_t_s_;
+    if (after_s < kSwingFrom_s || after_s > kSwingTo_s) continue;
+    swing_slip_percent_ += samples_[read_].slip_percent;
+    ++swing_samples_;
+  }
 }
 
 void AfterStop::judge_group() noexcept {
@@ -79,16 +85,16 @@ void AfterStop::judge_group() noexcept {
   const double samples = static_cast<double>(per_group_);
   if (force_N > force_limit_N_ * samples) {
     over_ = true;
-    kept_ = kept_ > per_group_ ? kept_ - per_group_ : 0;
     return;
   }
+  kept_ = read_before_group_;
   const double most_percent = std::min(stop_slip_percent_ + kRunAway_percent, kFrictionTo_percent);
   if (slip_percent > most_percent * samples) {
     over_ = true;
     return;
   }
-  kept_ = count_;
   group_begin_ = count_;
+  read_before_group_ = read_;
 }
 
 bool AfterStop::swung_back() const noexcept {

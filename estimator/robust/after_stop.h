@@ -16,8 +16,10 @@ class AfterStop {
   void reset() noexcept;
   // The stop has been decided, with this record.
   void begin(const ExperimentRecord& record) noexcept;
-  // One sample after it. Kept until the force rises, slip has run away or time is over.
-  void step(const Cell& sample) noexcept;
+  // One sample after it, its pressure foretold for so long. Kept until the force rises, slip has
+  // run away or time is over, and only what a later reading of the pressure has shown to lie before
+  // that.
+  void step(const Cell& sample, double pressure_ahead_s) noexcept;
   // Nothing more is kept.
   bool over() const noexcept { return over_; }
   // The samples of the curve, oldest first.
@@ -29,10 +31,12 @@ class AfterStop {
 
  private:
   void judge_group() noexcept;
+  void count_read(double read_to_s) noexcept;
 
   std::vector<Cell> samples_;
   std::size_t per_group_;
-  std::size_t count_ = 0, kept_ = 0, group_begin_ = 0;
+  std::size_t count_ = 0, read_ = 0, kept_ = 0, group_begin_ = 0;
+  std::size_t read_before_group_ = 0;
   bool begun_ = false, over_ = false;
   double stop_t_s_ = 0.0, stop_slip_percent_ = 0.0, force_limit_N_ = 0.0;
   double slip_before_percent_ = 0.0, slip_at_end_percent_ = 0.0, slip_noise_ = 0.0;

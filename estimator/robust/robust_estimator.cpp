@@ -98,7 +98,8 @@ class RobustEstimator final : public SlipCurveEstimator {
     publish(now);
     if (ended) {
       if (started_) {
-        after_stop_.step(cell_of(sample));
+        after_stop_.step(cell_of(sample),
+                         static_cast<double>(sample.pressure_ahead_ns) * kNanosecond_s);
         follow_on_.step(cell_of(sample));
       }
       stepped_ = true;

@@ -40,6 +40,9 @@ const estimator::VariatorSample& Sampler::sample(MonoTime t, bool may_settle) no
                 read(Role::kSecondaryPressure, at, next.secondary_pressure_Pa) &&
                 read(torque_, at, next.torque_Nm) && next.omega_p_rad_s > 0.0 && at > last_;
   if (!next.usable) return sample_;
+  const Duration ahead = at + inputs_.delay(Role::kSecondaryPressure) -
+                         inputs_.history(Role::kSecondaryPressure).newest();
+  next.pressure_ahead_ns = std::max<Duration>(ahead, Duration{}).ns();
   last_ = at;
   sample_ = next;
   return sample_;

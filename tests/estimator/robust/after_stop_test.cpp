@@ -36,7 +36,20 @@ class AfterTheStop : public testing::Test {
     for (int i = 1; i <= 120; ++i) {
       const double after_s = i / kRate_hz;
       after_.step(sample(4.0 - 1.0 / kRate_hz + after_s, slip_percent_per_s * after_s,
-                         returns_N_per_s * std::max(0.0, after_s - returns_after_s)));
+                         returns_N_per_s * std::max(0.0, after_s - returns_after_s)),
+                  0.0);
+    }
+  }
+  // The same, the pressure read every so often and foretold in between from the ramp of before. The
+  // newest reading is so old at the stop.
+  void go_on_read(double period_s, double age_s, double returns_after_s, double returns_N_per_s) {
+    for (int i = 1; i <= 120; ++i) {
+      const double after_s = i / kRate_hz;
+      const double ahead_s = std::fmod(after_s + age_s, period_s);
+      const double read_s = after_s - ahead_s;
+      after_.step(sample(4.0 - 1.0 / kRate_hz + after_s, 2.0 * after_s,
+                         returns_N_per_s * std::max(0.0, read_s - returns_after_s)),
+                  ahead_s);
     }
   }
 
@@ -57,6 +70,20 @@ TEST_F(AfterTheStop, NoneIsKeptFromWhereTheForceComesBack) {
   EXPECT_TRUE(after_.over());
   ASSERT_GT(after_.size(), 0U);
   EXPECT_LE(after_[after_.size() - 1].t_s, 4.0 + 0.06);
+}
+
+// The force is back long before a reading shows it.
+TEST_F(AfterTheStop, NoneIsKeptThatNoLaterReadingVouchesFor) {
+  go_on_read(0.1, 0.03, 0.09, 10000.0);
+  EXPECT_TRUE(after_.over());
+  ASSERT_GT(after_.size(), 0U);
+  EXPECT_LE(after_[after_.size() - 1].t_s, 4.0 + 0.075);  // the reading before it
+}
+
+TEST_F(AfterTheStop, SamplesAreKeptUpToTheLastReadingOfASlowPressure) {
+  go_on_read(0.1, 0.03, 10.0, 0.0);
+  EXPECT_TRUE(after_.over());
+  EXPECT_GE(static_cast<double>(after_.size()) / kRate_hz, 0.4 - 0.03);
 }
 
 TEST_F(AfterTheStop, NoneIsKeptWhereSlipRunsAway) {
@@ -87,9 +114,10 @@ class AfterARise : public AfterTheStop {
     for (int i = 1; i <= 100; ++i) {
       const double after_s = i / kRate_hz;
       const double back_percent = 100.0 * std::max(0.0, after_s - stays_s);
-      after_.step(sample(4.1 - 1.0 / kRate_hz + after_s,
-                         std::max(-1.0, kRise_percent - back_percent),
-                         returns_N_per_s * std::max(0.0, after_s - returns_after_s)));
+      after_.step(
+          sample(4.1 - 1.0 / kRate_hz + after_s, std::max(-1.0, kRise_percent - back_percent),
+                 returns_N_per_s * std::max(0.0, after_s - returns_after_s)),
+          0.0);
     }
   }
 };

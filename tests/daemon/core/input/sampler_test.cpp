@@ -49,6 +49,7 @@ struct Errors {  // largest, over all samples
   double omega_p = 0.0, omega_s = 0.0, pressure = 0.0, torque = 0.0;
   double slip_percent = 0.0;
   double pressure_mean = 0.0;
+  double pressure_ahead_s = 0.0;
   std::size_t samples = 0, usable = 0;
   Duration delay{};
 };
@@ -119,6 +120,7 @@ Errors sample_all(const std::vector<Channel>& channels, bool periods_known = tru
          100.0 * (sample.omega_s_rad_s / sample.omega_p_rad_s - omega_s / omega_p) / 2.25);
     keep(errors.pressure, sample.secondary_pressure_Pa - truth(Role::kSecondaryPressure, s));
     errors.pressure_mean += sample.secondary_pressure_Pa - truth(Role::kSecondaryPressure, s);
+    keep(errors.pressure_ahead_s, static_cast<double>(sample.pressure_ahead_ns) * 1e-9);
     keep(errors.torque, sample.torque_Nm - truth(Role::kEngineTorque, s));
   }
   errors.pressure_mean /= static_cast<double>(std::max<std::size_t>(errors.usable, 1));
@@ -164,6 +166,13 @@ TEST(Sampler, TheDelayIsThatOfTheSlowerSpeedAndASlowPressureAddsNone) {
   // The slowest pressure that is waited for, and the first that is not.
   EXPECT_EQ(sample_all(channels(10, 25, 10)).delay, 25 * kMillisecond);
   EXPECT_EQ(sample_all(channels(10, 26, 10)).delay, 10 * kMillisecond);
+}
+
+// Frames come at 1.9 ms and every 100 ms after, samples every 5 ms of instants 10 ms ago: the last
+// before a frame lies 88.1 ms beyond the one before.
+TEST(Sampler, ASampleTellsHowFarItsPressureIsForetold) {
+  EXPECT_EQ(sample_all(channels(10, 10, 10)).pressure_ahead_s, 0.0);
+  EXPECT_NEAR(sample_all(channels(10, 100, 10)).pressure_ahead_s, 0.0881, 1e-6);
 }
 
 TEST(Sampler, LearnedPeriodsGiveTheSame) {
