@@ -191,7 +191,7 @@ class Requests {
   LogSink& log_;
   ServiceNotify& service_;
   bool manager_waits_ = false;
-  MonoTime patience_ends_{};
+  MonoTime patience_ends_;
 };
 
 // At level debug, once a second.

@@ -145,7 +145,7 @@ class Columns {
 
 struct Frame {
   std::int64_t t_ns = 0;
-  std::string_view interface {};
+  std::string_view interface;
   CanId id{};
   std::uint8_t length = 0;
   std::uint64_t bytes = 0;

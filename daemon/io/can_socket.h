@@ -64,8 +64,8 @@ class CanSocket {
   std::uint8_t bus_;
   int socket_ = -1;
   BusState state_ = BusState::kActive;
-  MonoTime reopen_at_{};
-  Duration reopen_pause_{};
+  MonoTime reopen_at_;
+  Duration reopen_pause_;
 
   // One batch.
   std::array<mmsghdr, kBatch> headers_{};

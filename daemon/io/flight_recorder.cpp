@@ -123,7 +123,7 @@ class FlightRecorder::File {
   std::vector<char> packed_;
   std::uint64_t size_ = 0;
   std::string failed_;
-  MonoTime flush_at_{};
+  MonoTime flush_at_;
 };
 
 FlightRecorder::FlightRecorder(std::string folder, std::vector<std::string> interfaces,

@@ -88,12 +88,12 @@ class FlightRecorder {
   estimator::LearnedFriction learned_;
   bool has_learned_ = false;
   std::unique_ptr<File> file_;
-  MonoTime keep_until_{};
+  MonoTime keep_until_;
   bool in_experiment_ = false;
   std::uint32_t faults_ = 0;
   std::uint64_t dropped_ = 0;
   bool complained_ = false;
-  MonoTime retry_at_{};
+  MonoTime retry_at_;
   std::mutex mutex_;
   std::vector<Message> messages_;
   std::atomic<bool> ending_{false};

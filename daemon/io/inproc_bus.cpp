@@ -22,7 +22,7 @@ struct InprocBus::Slot {
   std::uint32_t dropped = 0;
   bool waiting = false;
   bool granted = false;  // virtual time: may run
-  MonoTime deadline{};
+  MonoTime deadline = MonoTime::origin();
   std::condition_variable wake;
 
   void put(const can::CanFrame& frame, MonoTime t, bool own) noexcept {

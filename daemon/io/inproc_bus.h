@@ -47,7 +47,7 @@ class InprocBus : public std::enable_shared_from_this<InprocBus> {
   std::mutex mutex_;
   std::vector<std::unique_ptr<Slot>> slots_;  // by order of connection; gaps stay empty
   Slot* running_ = nullptr;                   // virtual time: whose thread runs
-  MonoTime virtual_now_{};
+  MonoTime virtual_now_;
   bool closed_ = false;
 };
 

@@ -33,7 +33,7 @@ class LogSink {
   void set_level(int level);
   struct Logger;
   std::unique_ptr<Logger> logger_;
-  MonoTime second_{};
+  MonoTime second_;
   int lines_ = 0;
   std::uint64_t suppressed_ = 0;
 };

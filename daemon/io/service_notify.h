@@ -25,8 +25,8 @@ class ServiceNotify {
   void stopping();
 
  private:
-  Duration feed_period_{};  // 0: no watchdog
-  MonoTime feed_at_{};
+  Duration feed_period_;  // 0: no watchdog
+  MonoTime feed_at_;
   std::uint64_t samples_fed_ = 0;
   bool ready_ = false;
   std::string status_;

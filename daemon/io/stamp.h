@@ -36,10 +36,10 @@ class StampConverter {
   }
 
  private:
-  MonoTime monotonic_{};
+  MonoTime monotonic_;
   std::int64_t wall_ = 0;
-  Duration offset_{};
-  MonoTime newest_{};
+  Duration offset_;
+  MonoTime newest_;
   bool known_ = false;
   bool stepped_ = false;
 };

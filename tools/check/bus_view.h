@@ -89,15 +89,15 @@ class BusView final : public daemon::SampleSink {
   int mu_count_ = 0;
 
   std::optional<daemon::MonoTime> begin_;  // of the driving
-  daemon::MonoTime held_since_{};
+  daemon::MonoTime held_since_;
   bool held_ = false;
   bool settled_ = false;
-  daemon::Duration stale_{};
+  daemon::Duration stale_;
   std::array<std::uint64_t, daemon::kInhibitCount> unclear_samples_{};
   Opportunity now_;
   double best_reach_ = 0.0;
   std::uint32_t missing_ = 0;  // few conditions, all others hold
-  daemon::MonoTime missing_since_{}, newest_{};
+  daemon::MonoTime missing_since_, newest_;
   bool missing_counted_ = false;
 };
 

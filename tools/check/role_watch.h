@@ -76,7 +76,7 @@ struct Heard {
   std::uint64_t frames = 0;
   std::uint8_t length = 0;
   bool fd = false;
-  MonoTime first{}, last{};
+  MonoTime first = MonoTime::origin(), last = MonoTime::origin();
 };
 using Census = std::map<std::pair<std::uint8_t, can::CanId>, Heard>;
 
@@ -101,7 +101,7 @@ class RoleWatch {
   // What goes on from frame to frame within one log.
   struct State {
     bool heard = false;
-    MonoTime heard_at{};
+    MonoTime heard_at = MonoTime::origin();
     double begun_s = 0.0;
     bool behind_gap = false;
     std::optional<std::uint32_t> counter;
@@ -112,7 +112,7 @@ class RoleWatch {
     std::uint64_t same_values = 0;
     double other_at_same = 0.0;
     std::optional<std::uint64_t> raw;
-    MonoTime diagnostics{};
+    MonoTime diagnostics = MonoTime::origin();
     std::optional<MonoTime> asked_at;  // last
     bool waits = false;                // for its answer
   };

@@ -64,7 +64,7 @@ class Listener {
  private:
   daemon::Config whole_;
   std::unique_ptr<daemon::Port> port_;
-  MonoTime begin_{};
+  MonoTime begin_;
   MonoTime end_ = MonoTime::max();
   std::int64_t wall_offset_ = 0;
   std::array<daemon::RxFrame, 64> frames_;

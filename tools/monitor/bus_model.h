@@ -28,7 +28,7 @@ class Rate {
   std::array<double, kCells + 1> sums_{};
   std::int64_t newest_ = 0;  // number of its cell
   bool any_ = false;
-  daemon::MonoTime first_{};
+  daemon::MonoTime first_;
 };
 
 // Bits of a frame on the wire with the pause behind it, without stuff bits.

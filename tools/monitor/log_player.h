@@ -38,7 +38,7 @@ class LogPlayer {
   can::StampedFrame next_;
   bool has_next_ = false;
   std::optional<daemon::MonoTime> ended_at_;
-  daemon::MonoTime first_{}, now_{};
+  daemon::MonoTime first_, now_;
 };
 
 }  // namespace beltgrip::monitor

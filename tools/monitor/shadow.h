@@ -41,7 +41,7 @@ class Shadow {
   Sent sent_;
   daemon::Duration period_;
   bool begun_ = false;
-  daemon::MonoTime next_{};  // sample
+  daemon::MonoTime next_;  // sample
   daemon::BusState link_ = daemon::BusState::kActive, link_said_ = daemon::BusState::kActive;
   daemon::Outbox outbox_;
   daemon::CarriedWatch carried_watch_;

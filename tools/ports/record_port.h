@@ -60,7 +60,7 @@ class RecordPort final : public daemon::Port {
 
  private:
   struct Line {
-    daemon::MonoTime t{};
+    daemon::MonoTime t = daemon::MonoTime::origin();
     bool is_frame = false;
     can::CanFrame frame;
     bool sent = false;
@@ -81,8 +81,8 @@ class RecordPort final : public daemon::Port {
   bool has_next_ = false;
   bool ended_ = false;
   bool closed_ = false;
-  daemon::MonoTime now_{}, first_{}, limit_{};
-  daemon::MonoTime late_{};  // when the next sample was taken; 0: in time
+  daemon::MonoTime now_, first_, limit_;
+  daemon::MonoTime late_;  // when the next sample was taken; 0: in time
   std::uint32_t lost_ = 0;
   std::string further_;  // interface of bus 1; empty: there is none
   std::array<daemon::BusState, daemon::kBusMax> states_{};

@@ -40,7 +40,7 @@ class ReplayPort final : public daemon::Port {
   Receiver receiver_;
   can::StampedFrame next_;
   bool has_next_;
-  daemon::MonoTime now_{};
+  daemon::MonoTime now_;
   daemon::MonoTime limit_;  // frames up to here have arrived
   static constexpr std::size_t kEchoes = 32;
   struct Echo {
@@ -52,7 +52,7 @@ class ReplayPort final : public daemon::Port {
   struct Sent {
     can::CanFrame frame;
     std::uint8_t bus = 0;
-    daemon::MonoTime t{};
+    daemon::MonoTime t = daemon::MonoTime::origin();
   };
   static constexpr std::size_t kSent = 32;
   std::array<Sent, kSent> sent_;  // the last of each bus and identifier that the log has not shown

@@ -60,7 +60,7 @@ class LatencyHistogram {
 
   std::array<std::uint64_t, kClasses> counts_{};
   std::uint64_t count_ = 0;
-  Duration maximum_{};
+  Duration maximum_;
 };
 
 }  // namespace beltgrip::daemon

@@ -26,6 +26,7 @@ class Duration {
   static constexpr Duration max() noexcept {
     return Duration(std::numeric_limits<std::int64_t>::max());
   }
+  static constexpr Duration zero() noexcept { return {}; }
   constexpr std::int64_t ns() const noexcept { return ns_; }
 
   friend constexpr auto operator<=>(Duration, Duration) noexcept = default;
@@ -86,11 +87,12 @@ inline Duration period_of(double rate_hz) noexcept {
 
 class MonoTime {
  public:
-  constexpr MonoTime() noexcept = default;  // the Port's origin
+  constexpr MonoTime() noexcept = default;
   explicit constexpr MonoTime(Duration since_origin) noexcept : since_origin_(since_origin) {}
   static constexpr MonoTime of_ns(std::int64_t ns) noexcept {
     return MonoTime(Duration::of_ns(ns));
   }
+  static constexpr MonoTime origin() noexcept { return {}; }  // the Port's
   static constexpr MonoTime min() noexcept {
     return of_ns(std::numeric_limits<std::int64_t>::min());
   }

@@ -17,7 +17,7 @@ namespace beltgrip::daemon {
 inline constexpr std::size_t kBusMax = 2;
 
 struct RxFrame {
-  MonoTime t{};  // arrival, monotonic; never later than now()
+  MonoTime t = MonoTime::origin();  // arrival, monotonic; never later than now()
   can::CanFrame frame;
   bool own_echo = false;             // our own frame, confirmed as sent (a log's port leaves our
                                      // identifiers out: elsewhere they mean a foreign sender)

@@ -9,7 +9,7 @@ namespace beltgrip::daemon {
 struct EndedExperiment {
   estimator::Direction direction = estimator::Direction::kDrive;
   estimator::EndStop end_stop = estimator::EndStop::kOverdrive;
-  Duration duration{};
+  Duration duration = Duration::zero();
   bool ramped = true;             // else it was refused: the data hold no peak
   bool passed_a_peak = true;      // its slip is large enough for one, as far as is known
   bool ended_by_slip = false;     // the belt let go

@@ -80,17 +80,17 @@ class AnswerLag {
   double step_N_ = 0.0, rests_from_N_ = 0.0;
   double crept_ = 0.0;  // through so much of a step, at rest
   bool rests_ = false;
-  Duration enough_{};  // how long readings are taken before they tell
+  Duration enough_;  // how long readings are taken before they tell
   Duration period_ = kNanosecond;
   std::size_t quick_ = 0;  // of kQuick, those below the first of the others
   double offset_most_N_ = 0.0;
   Course asked_, answered_to_;        // what is asked for; and as answered without dead time
   std::size_t newest_at_ = 0;         // where the newest is that is kept,
-  MonoTime newest_{};                 // and its instant
+  MonoTime newest_;                   // and its instant
   unsigned skipped_ = 0, taken_ = 0;  // readings
-  MonoTime resumed_{};
+  MonoTime resumed_;
   bool measures_ = false;
-  MonoTime measures_since_{};
+  MonoTime measures_since_;
   double n_ = 0.0;
   std::array<double, kQuick + kLate> sums_N_{},
       squares_N2_{};  // of how far readings lie off each course

@@ -18,14 +18,14 @@ class AnswerProof {
     double follow_band_N = 0.0;  // by which a force that follows may be off it
     AnswerLag::Actuator configured;
     AnswerLag::Reading reading;
-    Duration sample{};
+    Duration sample = Duration::zero();
   };
   struct Now {
-    MonoTime t{};
+    MonoTime t = MonoTime::origin();
     double asked_N = 0.0;
-    MonoTime read_at{};   // the newest reading of the force,
-    double read_N = 0.0;  // and when it came
-    bool near = false;    // friction is what a peak may be expected at
+    MonoTime read_at = MonoTime::origin();  // the newest reading of the force,
+    double read_N = 0.0;                    // and when it came
+    bool near = false;                      // friction is what a peak may be expected at
     bool on_floor = false;
   };
   void begin(MonoTime t, const Setup& setup) noexcept;
@@ -55,8 +55,8 @@ class AnswerProof {
   Setup setup_;
   double late_s_ = 0.0, credible_s_ = 0.0;
   Rest rest_ = Rest::kComes;
-  MonoTime begun_{}, rests_since_{}, read_at_{};
-  Duration late_after_{};
+  MonoTime begun_, rests_since_, read_at_;
+  Duration late_after_;
   bool in_time_ = false, late_ = false;  // shown, once for all
 };
 

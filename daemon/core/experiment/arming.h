@@ -136,7 +136,7 @@ class Arming {
   explicit Arming(const Config& config);
 
   struct Now {
-    MonoTime t{};
+    MonoTime t = MonoTime::origin();
     bool usable = false;      // sample and curve
     bool beyond_box = false;  // of a learned term: why there is no curve
     bool cooled = true;
@@ -145,11 +145,11 @@ class Arming {
     double omega_s_rad_s = 0.0;
     double torque_Nm = 0.0;  // on the belt, signed
     double clamp_force_N = 0.0;
-    double slip_percent = 0.0;  // in the direction of the torque
-    double mu_max_known = 0.0;  // the last value; 0: none
-    SlipShown shown;            // at this direction and end stop
-    Duration stale{};           // how long the slowest input may be silent
-    bool watched = true;        // a speed that stands still would show
+    double slip_percent = 0.0;          // in the direction of the torque
+    double mu_max_known = 0.0;          // the last value; 0: none
+    SlipShown shown;                    // at this direction and end stop
+    Duration stale = Duration::zero();  // how long the slowest input may be silent
+    bool watched = true;                // a speed that stands still would show
     Conditions conditions;
   };
   // Every sample outside an experiment.
@@ -208,15 +208,15 @@ class Arming {
   bool looked_ = false;   // since the trigger holds
   bool cleared_ = false;  // as found by the last look
   std::uint32_t unclear_ = 0;
-  MonoTime held_since_{};
-  MonoTime next_look_{};
+  MonoTime held_since_;
+  MonoTime next_look_;
   double ratio_since_ = 0.0;
   double torque_since_ = 0.0;
   double omega_p_since_ = 0.0;
   double slip_percent_ = 0.0;
   double slip_samples_ = 0.0;
   SlipCourse slip_course_;  // for its noise
-  MonoTime last_{};         // sample while the trigger holds
+  MonoTime last_;           // sample while the trigger holds
   // Means of the own force over kForceBlock each since the trigger holds, newest at count - 1.
   static constexpr std::size_t kForceBlocks = 10;
   static constexpr Duration kForceBlock = 100 * kMillisecond;
@@ -224,7 +224,7 @@ class Arming {
   std::size_t force_count_ = 0;
   bool force_rests_ = false;  // as the last of them was complete
   double force_step_N_;       // least change that the pressure's signal can show
-  MonoTime block_since_{};
+  MonoTime block_since_;
   double block_sum_N_ = 0.0, block_samples_ = 0.0;
   CrossingSearch search_;   // if the request began now
   CrossingSearch later_;    // if it began a little later

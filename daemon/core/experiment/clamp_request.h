@@ -57,7 +57,7 @@ class ClampRequest {
   explicit ClampRequest(const Config& config);
 
   struct Now {
-    MonoTime t{};
+    MonoTime t = MonoTime::origin();
     double omega_p_rad_s = 0.0;
     double omega_s_rad_s = 0.0;
     double torque_Nm = 0.0;  // on the belt, signed
@@ -66,7 +66,7 @@ class ClampRequest {
     double omega_e_rad_s = 0.0;  // engine, lock-up closed; 0: not known
     double speed_m_s = 0.0;      // of the vehicle; 0: not known
     // The force as the pressure's newest value has it, and when that came.
-    MonoTime read_at{};
+    MonoTime read_at = MonoTime::origin();
     double read_N = 0.0;
   };
   void begin(const Now& now, const RequestPlan& plan, double floor_N,
@@ -132,11 +132,11 @@ class ClampRequest {
   bool followed_ = true;
   bool travelled_ = false;
   Stop stop_;
-  MonoTime begun_{};
-  MonoTime ended_{};
-  MonoTime last_{};
-  MonoTime off_since_{};
-  MonoTime last_travel_{};
+  MonoTime begun_;
+  MonoTime ended_;
+  MonoTime last_;
+  MonoTime off_since_;
+  MonoTime last_travel_;
   double rest_s_ = 0.0;
   double rest_m_ = 0.0;
   double force_N_ = 0.0;
@@ -154,7 +154,7 @@ class ClampRequest {
   RampLaw law_;
   bool far_ = true;     // the peak, still
   bool rides_ = false;  // on its floor, since then
-  MonoTime rides_since_{};
+  MonoTime rides_since_;
   double floor_first_N_ = 0.0;
   SlipCourse slip_;
   SlipDamage damage_;
@@ -162,7 +162,7 @@ class ClampRequest {
   Duration sample_;  // between two
   // The force asked for, every kCoursePeriod; newest at count - 1.
   struct Asked {
-    MonoTime t{};
+    MonoTime t = MonoTime::origin();
     double force_N = 0.0;
     double rate_N_per_s = 0.0;  // of its fall since the one before
   };
@@ -175,7 +175,7 @@ class ClampRequest {
   std::array<Asked, kAsked> asked_{};
   std::size_t asked_count_ = 0;
   double recent_least_N_per_s_ = 0.0;
-  MonoTime recent_until_{};
+  MonoTime recent_until_;
   double slip_after_ = 0.0;  // mean of the last kSlipAfter
 };
 

@@ -13,10 +13,10 @@ namespace beltgrip::daemon {
 class DriveChanges {
  public:
   struct Now {
-    MonoTime t{};
+    MonoTime t = MonoTime::origin();
     double accelerator = 0.0;  // 0 to 1
     double torque_Nm = 0.0;
-    MonoTime torque_at{};  // when it came
+    MonoTime torque_at = MonoTime::origin();  // when it came
   };
   // Every sample, also without a request: what is usual is known then.
   Stop step(const Now& now) noexcept;
@@ -32,7 +32,7 @@ class DriveChanges {
   Stop moves_beyond(double share) const noexcept;
 
   bool begun_ = false;
-  MonoTime last_{}, torque_at_{};
+  MonoTime last_, torque_at_;
   double accelerator_ = 0.0;  // as it is held
   double torque_Nm_ = 0.0;    // of the last readings,
   double course_Nm_ = 0.0;    // and of some more

@@ -68,9 +68,9 @@ inline constexpr std::size_t kStateCount = 8;
 enum class Outcome : std::uint8_t { kNone, kCompleted, kInconclusive, kAborted };  // wire values
 
 struct ExperimentResult {
-  MonoTime start{};      // first sample
-  MonoTime end{};        // stop decision, or the last sample
-  bool stopped = false;  // a stop decision came (end is its instant)
+  MonoTime start = MonoTime::origin();  // first sample
+  MonoTime end = MonoTime::origin();    // stop decision, or the last sample
+  bool stopped = false;                 // a stop decision came (end is its instant)
   Outcome outcome = Outcome::kNone;
   estimator::StopReason stop_reason = estimator::StopReason::kNone;
   StopCause cause;  // beside it

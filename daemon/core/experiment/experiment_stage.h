@@ -33,7 +33,7 @@ class ExperimentStage {
 
   // One sample, as the other stages have it.
   struct Now {
-    MonoTime t{};
+    MonoTime t = MonoTime::origin();
     const InputStage& input;
     const EstimateStage& estimate;  // before begin() of the sample before, after it of this one
     FaultSet& faults;

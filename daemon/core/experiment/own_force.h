@@ -11,7 +11,7 @@ namespace beltgrip::daemon {
 class OwnForce {
  public:
   struct Now {
-    MonoTime t{};
+    MonoTime t = MonoTime::origin();
     double force_N = 0.0;
     double torque_Nm = 0.0;  // on the belt
   };
@@ -28,7 +28,7 @@ class OwnForce {
  private:
   bool begun_ = false;
   bool back_ = true;  // once it was
-  MonoTime last_{};
+  MonoTime last_;
   double force_N_ = 0.0, torque_Nm_ = 0.0;  // means of the last readings, magnitudes
   double own_N_ = 0.0, own_torque_Nm_ = 0.0;
 };

@@ -15,10 +15,10 @@ namespace beltgrip::daemon {
 
 struct RecordedRequest {
   struct Force {
-    MonoTime t{};
+    MonoTime t = MonoTime::origin();
     double force_N = 0.0;
   };
-  MonoTime begin{};             // stamp of the first frame that asks
+  MonoTime begin = MonoTime::origin();  // stamp of the first frame that asks
   std::optional<MonoTime> end;  // of the first that does not, or when silence ends it; none: the
                                 // log ends before
   // As the status behind it says; none: it says nothing.
@@ -45,7 +45,7 @@ class RecordedRequests {
 
  private:
   std::vector<RecordedRequest> requests_;
-  MonoTime t_{};
+  MonoTime t_;
   std::size_t next_ = 0;   // the first that has not ended
   std::size_t point_ = 0;  // of its course: the first that lies ahead
 };

@@ -28,7 +28,7 @@ class SlipCourse {
 
  private:
   struct Point {
-    MonoTime t{};
+    MonoTime t = MonoTime::origin();
     double slip = 0.0;
     double rate_1_s = 0.0;
   };

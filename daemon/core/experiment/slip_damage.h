@@ -11,7 +11,7 @@ namespace beltgrip::daemon {
 class SlipDamage {
  public:
   struct Now {
-    MonoTime t{};
+    MonoTime t = MonoTime::origin();
     double slip = 0.0;
     double mu_star = 0.0;  // magnitude
     double power_W = 0.0;  // |T| omega_p slip
@@ -29,7 +29,7 @@ class SlipDamage {
   double slip_at_best() const noexcept { return slip_at_best_; }
 
  private:
-  MonoTime last_{};
+  MonoTime last_;
   double mu_first_ = 0.0, mu_mean_ = 0.0;  // a lag behind another
   double mu_best_ = 0.0;
   double slip_at_best_ = 0.0;

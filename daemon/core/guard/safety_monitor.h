@@ -109,9 +109,9 @@ class SafetyMonitor {
   SafetyVerdict withdrawn_ = SafetyVerdict::kAllowed;
   bool standing_ = false;
   bool asked_before_ = false;
-  MonoTime begun_{};
-  MonoTime ended_{};
-  MonoTime last_{};
+  MonoTime begun_;
+  MonoTime ended_;
+  MonoTime last_;
   double reference_ratio_ = 0.0;
   double first_request_N_ = 0.0;
   double last_request_N_ = 0.0;
@@ -120,7 +120,7 @@ class SafetyMonitor {
   MonoTime power_since_ = kNever;
   double slip_mean_ = 0.0, slip_rate_1_s_ = 0.0;
   double acting_N_ = 0.0;  // smoothed; 0: not known
-  MonoTime acting_seen_{};
+  MonoTime acting_seen_;
   double near_count_ = 0.0;
   double near_sum_ = 0.0;          // of the first speed ratios
   double near_mean_ = 0.0;         // drift from their mean

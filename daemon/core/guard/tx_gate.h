@@ -45,7 +45,7 @@ struct PollLimits {
     std::uint8_t bus = 0;
     can::CanId id;
     std::uint16_t identifier = 0;  // of the data
-    Duration period{};
+    Duration period = Duration::zero();
     std::uint8_t service = 0x22;
   };
   std::array<Request, kMost> requests{};

@@ -28,7 +28,7 @@ class BusWatch {
     bool needed = false;                      // an experiment cannot go on without it
     BusState link = BusState::kActive;        // as the port sees it
     BusState controller = BusState::kActive;  // as error frames tell it
-    MonoTime off_since{};                     // with kOff
+    MonoTime off_since = MonoTime::origin();  // with kOff
     bool up() const noexcept {
       return link != BusState::kDown && link != BusState::kAbsent && link != BusState::kOff &&
              controller != BusState::kOff;

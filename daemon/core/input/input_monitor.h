@@ -95,11 +95,11 @@ class InputMonitor {
   // request for clamping force.
   struct Watch {
     bool on = false;
-    bool slopes = false;         // the shafts go on as they did: no belt takes hold again
-    double torque_sign = 0.0;    // of the torque on the belt, 1 or -1; 0: no request stands
-    MonoTime request_begun{};    // since then the pressure falls,
-    double fall_Pa_per_s = 0.0;  // so fast
-    Duration answer{};           // and so much later
+    bool slopes = false;       // the shafts go on as they did: no belt takes hold again
+    double torque_sign = 0.0;  // of the torque on the belt, 1 or -1; 0: no request stands
+    MonoTime request_begun = MonoTime::origin();  // since then the pressure falls,
+    double fall_Pa_per_s = 0.0;                   // so fast
+    Duration answer = Duration::zero();           // and so much later
   };
   void watch(const Watch& watch) noexcept { watch_ = watch; }
   // Something else has shown that it stands still: it does until it moves.
@@ -123,13 +123,13 @@ class InputMonitor {
     SignalHistory history;
     bool is_gated = false;  // its spikes are left out
     SpikeGate gate;
-    MonoTime heard{};  // newest stamp, of a spike too
+    MonoTime heard = MonoTime::origin();  // newest stamp, of a spike too
     bool is_watched = false;
     ValueCourse course;
     std::optional<MonoTime> stands_since;  // it has been found to stand still, since then
     SignalQuality quality = SignalQuality::kUnbound;
     std::optional<Duration> period;
-    Duration delay{};
+    Duration delay = Duration::zero();
     bool learns = false;
     std::array<Duration, kLearnIntervals> intervals{};
     std::size_t interval_count = 0;
@@ -137,7 +137,7 @@ class InputMonitor {
   // Since when a speed has stood still, and what the other was then.
   struct Motion {
     bool known = false;
-    MonoTime since{};
+    MonoTime since = MonoTime::origin();
     double value = 0.0;
     double other = 0.0;
   };

@@ -74,7 +74,7 @@ class InputStage {
   Duration sample_period_;
   bool next_samples_lost_ = false;
   bool samples_lost_ = false;
-  MonoTime last_usable_{};                 // sample
+  MonoTime last_usable_;                   // sample
   std::optional<MonoTime> last_unusable_;  // sample, after a usable one
   bool was_usable_ = false;                // a sample
 };

@@ -29,7 +29,7 @@ class SignalHistory {
   static constexpr std::size_t kCapacity = 128;  // 100 ms of a signal that comes every millisecond
   static constexpr std::size_t kLine = 4;
   struct Point {
-    MonoTime t{};
+    MonoTime t = MonoTime::origin();
     double value = 0.0;
   };
   const Point& at(std::size_t age) const noexcept {

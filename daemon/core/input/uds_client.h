@@ -33,7 +33,7 @@ namespace beltgrip::daemon {
 
 // The data of one identifier, and the roles whose value it holds. Valid until the next frame.
 struct UdsReading {
-  MonoTime t{};
+  MonoTime t = MonoTime::origin();
   std::span<const Role> roles;
   std::span<const std::uint8_t> data;
 };
@@ -78,9 +78,9 @@ class UdsClient {
     std::uint16_t bytes = 0;  // of data; 0: not known
     std::array<Role, kRoleCount> roles{};
     std::uint8_t role_count = 0;
-    Duration period{};
-    Duration pause{};  // after a failure; 0: all is well
-    MonoTime due{};
+    Duration period = Duration::zero();
+    Duration pause = Duration::zero();  // after a failure; 0: all is well
+    MonoTime due = MonoTime::origin();
     std::span<const Role> role_list() const noexcept { return {roles.data(), role_count}; }
   };
   struct Ecu {
@@ -94,8 +94,8 @@ class UdsClient {
     bool alone = false;  // refuses several at once
     bool is_asked() const noexcept { return asked_count > 0; }
     std::span<Item* const> asked_items() const noexcept { return {asked.data(), asked_count}; }
-    MonoTime asked_at{};
-    MonoTime give_up_at{};
+    MonoTime asked_at = MonoTime::origin();
+    MonoTime give_up_at = MonoTime::origin();
     MonoTime quiet_until = MonoTime::min();  // another tester is there
     bool flow_due = false;
     bool flow_sent = false;  // for this request

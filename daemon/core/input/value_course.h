@@ -48,7 +48,7 @@ class ValueCourse {
 
  private:
   struct Point {
-    MonoTime t{};
+    MonoTime t = MonoTime::origin();
     double value = 0.0;
   };
   static constexpr std::size_t kPoints = 32;
@@ -67,7 +67,7 @@ class ValueCourse {
   bool has_inertia_ = false;
   std::array<Point, kPoints> points_{};  // where runs began
   std::size_t count_ = 0;
-  MonoTime since_{}, newest_{};
+  MonoTime since_, newest_;
   double value_ = 0.0;
   double change_ = 0.0;        // with which the run began
   long run_ = 0;               // values equal to the first of the run, beside it
@@ -77,9 +77,9 @@ class ValueCourse {
   double drift_ = 0.0;         // mean of the last d_k; 0 without inertia
   double scatter_ = 0.0;       // mean of |d_k - drift|
   double known_ = 0.0;         // values that it rests on
-  MonoTime span_{};            // begin of the present span of kSpan
-  Duration longest_{};         // run in it,
-  Duration longest_before_{};  // and in the one before
+  MonoTime span_;              // begin of the present span of kSpan
+  Duration longest_;           // run in it,
+  Duration longest_before_;    // and in the one before
 };
 
 }  // namespace beltgrip::daemon

@@ -178,13 +178,13 @@ class Loop {
   Exchange exchange_;
   Duration period_;
   MonoTime next_;
-  MonoTime due_{};                              // of the sample under way, before any were given up
+  MonoTime due_;                                // of the sample under way, before any were given up
   std::array<BusState, kBusMax> bus_states_{};  // kActive
   std::uint8_t buses_;
   LoopCounters counters_;
   Pulse pulse_;               // of the last sample
   MonoTime changed_ = next_;  // when it became so, or a frame came
-  MonoTime reload_from_{};
+  MonoTime reload_from_;
   Outbox outbox_;
   std::array<RxFrame, kBatch> frames_{};
 };

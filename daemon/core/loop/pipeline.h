@@ -26,8 +26,8 @@ namespace beltgrip::daemon {
 struct SignalObservation {
   SignalQuality quality = SignalQuality::kUnbound;
   bool seen = false;
-  double value = 0.0;  // SI
-  MonoTime t{};        // its stamp
+  double value = 0.0;               // SI
+  MonoTime t = MonoTime::origin();  // its stamp
 };
 
 struct PipelineCounters {

@@ -39,7 +39,7 @@ struct Pipeline::Parts {
   OutputStage output;
   FaultSet faults;
   PipelineCounters counters;
-  MonoTime t{};                             // of the last sample
+  MonoTime t = MonoTime::origin();          // of the last sample
   bool estimate_changed = false;            // with this sample
   bool inputs_sound = false;                // with this sample: none is lost, none in doubt
   estimator::LearnedConditions conditions;  // with this sample

@@ -28,8 +28,8 @@ enum class RecordKind : std::uint8_t {
 };
 
 struct RecordItem {
-  MonoTime t{};
-  MonoTime now{};
+  MonoTime t = MonoTime::origin();
+  MonoTime now = MonoTime::origin();
   RecordKind kind = RecordKind::kMark;
   bool in_experiment = false;
   std::uint8_t bus = 0;
@@ -72,8 +72,8 @@ class RecordTap {
   void push(const RecordItem& item) noexcept { rings_.items.push(item); }
 
   RecordRings& rings_;
-  MonoTime sampled_{};  // the newest sample
-  MonoTime after_{};    // the newest kAfter
+  MonoTime sampled_;  // the newest sample
+  MonoTime after_;    // the newest kAfter
   bool in_experiment_ = false;
   std::uint32_t faults_ = 0;
   int left_ = 0;

@@ -13,7 +13,7 @@
 namespace beltgrip::daemon {
 
 struct SampleReport {
-  MonoTime t{};
+  MonoTime t = MonoTime::origin();
   State state = State::kInhibited;
   bool in_experiment = false;
   bool macro_slip_stop = false;

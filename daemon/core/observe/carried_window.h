@@ -18,7 +18,7 @@
 namespace beltgrip::daemon {
 
 struct CarriedWindow {
-  MonoTime end{};
+  MonoTime end = MonoTime::origin();
   estimator::Direction direction = estimator::Direction::kDrive;
   estimator::EndStop end_stop = estimator::EndStop::kOverdrive;
   double mu_star_held = 0.0;  // the lowest of its means
@@ -68,8 +68,8 @@ class CarriedWatch {
   bool commands_;
   bool runs_ = false;
   bool lowered_ = false;
-  MonoTime last_{};         // sample
-  MonoTime block_since_{};  // first sample of the block
+  MonoTime last_;           // sample
+  MonoTime block_since_;    // first sample of the block
   std::size_t blocks_ = 0;  // complete
   Sums block_, halves_[2];
   double lowest_ = 0.0;

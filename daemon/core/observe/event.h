@@ -19,7 +19,7 @@ enum class EventId : std::uint8_t { kState, kStop, kResult, kInhibit, kFaultRais
 enum class EventLevel : std::uint8_t { kInfo, kWarning };
 
 struct Event {
-  MonoTime t{};
+  MonoTime t = MonoTime::origin();
   EventId id = EventId::kState;
   std::uint8_t from = 0;  // state
   std::uint8_t to = 0;    // state, fault or inhibit
@@ -50,7 +50,7 @@ class LineBudget {
   std::array<MonoTime, kMost> taken_{};  // a ring
   std::size_t count_ = 0;
   unsigned left_out_ = 0;
-  MonoTime said_{};
+  MonoTime said_;
 };
 
 // Puts the events between successive reports into a ring. Why no experiment begins is said where
@@ -71,7 +71,7 @@ class EventSink final : public SampleSink {
   std::uint32_t faults_ = 0;
   std::uint32_t inhibits_ = 0;
   std::uint32_t inhibit_said_ = 0;
-  MonoTime inhibits_since_{};
+  MonoTime inhibits_since_;
 };
 
 }  // namespace beltgrip::daemon

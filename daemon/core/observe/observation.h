@@ -13,7 +13,7 @@
 namespace beltgrip::daemon {
 
 struct Observation {
-  MonoTime t{};
+  MonoTime t = MonoTime::origin();
   SampleReport report;
   PipelineCounters pipeline;
   LoopMeters loop;

@@ -56,7 +56,7 @@ class OutputStage {
   Outbox wanted_;                         // kept: to make one anew costs a thousand instructions
   std::uint64_t refused_before_ = 0;      // under the configurations before this one
   bool clamp_unconfirmed_ = false;        // a clamp frame waits for its echo
-  MonoTime clamp_sent_{};                 // the first that waits
+  MonoTime clamp_sent_;                   // the first that waits
   std::uint32_t foreign_identifier_ = 0;  // the last one that a foreign sender used
 };
 

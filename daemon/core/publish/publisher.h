@@ -50,7 +50,7 @@ class Publisher {
 
  private:
   struct Schedule {
-    MonoTime next{};
+    MonoTime next = MonoTime::origin();
     std::uint8_t counter = 0;
   };
   // True if the message leaves at t; moves its schedule on.

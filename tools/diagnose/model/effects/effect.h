@@ -26,6 +26,8 @@ struct Carried {
   bool secondary_torque = false;
 };
 
+inline constexpr std::span<const double> kNoFarSizes;
+
 struct Slot;
 using AddSlot = std::function<void(int index, std::string_view role)>;
 
@@ -41,7 +43,7 @@ struct Equation {
   double (*from_contract)(double value, double peak_percent, double mu_max) = nullptr;
   // Sizes at which its equation does another thing than near zero: what is left of a step a while
   // behind it, what is left of play that has been crossed. A fit sets out from there as well.
-  std::span<const double> far_sizes{};
+  std::span<const double> far_sizes = kNoFarSizes;
 };
 std::span<const Equation> measurement_equations();  // what the bus says differs from what is there
 std::span<const Equation> clamping_equations();     // from the measured pressure to the force
