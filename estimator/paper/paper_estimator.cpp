@@ -40,7 +40,7 @@ class PaperEstimator final : public SlipCurveEstimator {
     out_ = {};
     peak_ = {};
     forget_samples();
-    largest_mu_ = largest_slip_ = 0.0;
+    largest_mu_ = largest_slip_percent_ = 0.0;
   }
 
   const CurveEstimate& step(const VariatorSample& sample) noexcept override {
@@ -60,7 +60,7 @@ class PaperEstimator final : public SlipCurveEstimator {
     publish(now);
     if (now.mu_star > largest_mu_) {
       largest_mu_ = now.mu_star;
-      largest_slip_ = now.slip_percent;
+      largest_slip_percent_ = now.slip_percent;
       largest_mu_force_N_ = now.clamp_force_N;
       largest_mu_omega_s_rad_s_ = now.omega_s_rad_s;
     }
@@ -83,7 +83,7 @@ class PaperEstimator final : public SlipCurveEstimator {
       // itself says nothing of its noise.
       peak_ = {.kind = PeakKind::kLowerBound,
                .mu_max = largest_mu_,
-               .sigma_peak_percent = largest_slip_,
+               .sigma_peak_percent = largest_slip_percent_,
                .samples = 1,
                .clamp_force_N = largest_mu_force_N_,
                .omega_s_rad_s = largest_mu_omega_s_rad_s_};
@@ -108,7 +108,7 @@ class PaperEstimator final : public SlipCurveEstimator {
 
   void forget_samples() noexcept {
     peak_samples_ = 0;
-    mean_ = squares_ = slip_mean_ = force_mean_ = torque_mean_ = omega_s_mean_ = 0.0;
+    mean_ = squares_ = slip_mean_percent_ = force_mean_ = torque_mean_ = omega_s_mean_ = 0.0;
   }
 
   void publish(const Measurement& now) noexcept {
@@ -141,7 +141,7 @@ class PaperEstimator final : public SlipCurveEstimator {
     const double before = now.mu_star - mean_;
     mean_ += before * weight;
     squares_ += before * (now.mu_star - mean_);
-    slip_mean_ += (now.slip_percent - slip_mean_) * weight;
+    slip_mean_percent_ += (now.slip_percent - slip_mean_percent_) * weight;
     force_mean_ += (now.clamp_force_N - force_mean_) * weight;
     torque_mean_ += (std::abs(now.torque_p_Nm) - torque_mean_) * weight;
     omega_s_mean_ += (now.omega_s_rad_s - omega_s_mean_) * weight;
@@ -154,7 +154,7 @@ class PaperEstimator final : public SlipCurveEstimator {
     peak_ = {.kind = PeakKind::kValue,
              .mu_max = mean_,
              .mu_max_std = std::hypot(std::max(deviation, kSmallestStd), sensors),
-             .sigma_peak_percent = slip_mean_,
+             .sigma_peak_percent = slip_mean_percent_,
              .samples = peak_samples_};
     peak_.ci95_low = mean_ - kNormal95 * peak_.mu_max_std;
     peak_.ci95_high = mean_ + kNormal95 * peak_.mu_max_std;
@@ -178,8 +178,8 @@ class PaperEstimator final : public SlipCurveEstimator {
   PeakEstimate peak_;
   std::int64_t peak_samples_ = 0;
   double mean_ = 0.0, squares_ = 0.0;  // of mu* over the samples near the peak
-  double slip_mean_ = 0.0, force_mean_ = 0.0, torque_mean_ = 0.0, omega_s_mean_ = 0.0;
-  double largest_mu_ = 0.0, largest_slip_ = 0.0, largest_mu_force_N_ = 0.0;
+  double slip_mean_percent_ = 0.0, force_mean_ = 0.0, torque_mean_ = 0.0, omega_s_mean_ = 0.0;
+  double largest_mu_ = 0.0, largest_slip_percent_ = 0.0, largest_mu_force_N_ = 0.0;
   double largest_mu_omega_s_rad_s_ = 0.0;
 };
 

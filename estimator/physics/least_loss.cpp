@@ -31,8 +31,9 @@ double pump_loss_Nm_per_N(const VariatorParameters& variator) {
 double least_loss_share(const VariatorParameters& variator, EndStop end_stop, double mu_max,
                         double sigma_peak_percent, double loss_Nm_per_N) {
   const double torque_Nm_per_N = torque_carried_Nm(variator, end_stop, 1.0, mu_max);
-  const double peak_slip = sigma_peak_percent / kPercent;
-  return std::sqrt(kShareSquared + kPerSlipLoss * torque_Nm_per_N * peak_slip / loss_Nm_per_N);
+  const double peak_slip_share = sigma_peak_percent / kPercent;
+  return std::sqrt(kShareSquared +
+                   kPerSlipLoss * torque_Nm_per_N * peak_slip_share / loss_Nm_per_N);
 }
 
 double reserve_of_least_loss_Nm(const VariatorParameters& variator, double share,

@@ -14,19 +14,20 @@ double belt_length_m(double primary_radius_m, double secondary_radius_m, double 
          (std::numbers::pi - 2.0 * phi) * secondary_radius_m;
 }
 
-RunningRadii running_radii(double ratio, double belt_length, double centre_distance_m) {
+RunningRadii running_radii(double ratio, double wanted_length_m, double centre_distance_m) {
   // The length grows with the secondary radius: bisection between no radius and the largest that
   // keeps |R_p - R_s| below the centre distance.
   double low = 0.0;
   double high = centre_distance_m / std::max(std::abs(ratio - 1.0), 1e-3);
-  high = std::min(high, belt_length);
-  if (belt_length <= 2.0 * centre_distance_m ||
-      belt_length_m(ratio * high, high, centre_distance_m) < belt_length) {
+  high = std::min(high, wanted_length_m);
+  if (wanted_length_m <= 2.0 * centre_distance_m ||
+      belt_length_m(ratio * high, high, centre_distance_m) < wanted_length_m) {
     return {};
   }
   for (int i = 0; i < 100; ++i) {
     const double middle = 0.5 * (low + high);
-    (belt_length_m(ratio * middle, middle, centre_distance_m) < belt_length ? low : high) = middle;
+    (belt_length_m(ratio * middle, middle, centre_distance_m) < wanted_length_m ? low : high) =
+        middle;
   }
   const double secondary = 0.5 * (low + high);
   return {ratio * secondary, secondary};

@@ -15,6 +15,6 @@ double belt_length_m(double primary_radius_m, double secondary_radius_m, double 
 
 // Radii for the geometric ratio r_g = R_p / R_s. Lengths > 0, ratio > 0; radii are 0 where no pair
 // of radii closes the belt (too short, or a radius beyond the centre distance).
-RunningRadii running_radii(double ratio, double belt_length, double centre_distance_m);
+RunningRadii running_radii(double ratio, double wanted_length_m, double centre_distance_m);
 
 }  // namespace beltgrip::estimator

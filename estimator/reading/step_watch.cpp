@@ -40,17 +40,18 @@ StepWatch::Means StepWatch::means(std::size_t from, std::size_t to) const noexce
   const Means& late = sums_[(count_ - from) % kCells];
   const Means& early = sums_[(count_ - to) % kCells];
   const double share = 1.0 / static_cast<double>(to - from);
-  return {share * (late.value - early.value), share * (late.slip - early.slip)};
+  return {share * (late.value - early.value), share * (late.slip_percent - early.slip_percent)};
 }
 
 bool StepWatch::step(double value, double slip_percent, double slip_noise, const Trend& trend,
                      double slow_variance) noexcept {
   sum_.value += value / per_cell_;
-  sum_.slip += slip_percent / per_cell_;
+  sum_.slip_percent += slip_percent / per_cell_;
   if (++filled_ < per_cell_) return false;
   const Means& before_now = sums_[count_ % kCells];
   ++count_;
-  sums_[count_ % kCells] = {before_now.value + sum_.value, before_now.slip + sum_.slip};
+  sums_[count_ % kCells] = {before_now.value + sum_.value,
+                            before_now.slip_percent + sum_.slip_percent};
   filled_ = 0;
   sum_ = {};
   const double squares = trend.squares(kCell_s * kShortest);
@@ -62,13 +63,14 @@ bool StepWatch::step(double value, double slip_percent, double slip_noise, const
     const Means after = means(0, cells);
     const Means before = means(apart, apart + cells);
     const Means earlier = means(2 * apart, 2 * apart + cells);
-    if (std::abs(after.slip - before.slip) > kQuietSlip_percent) continue;
+    if (std::abs(after.slip_percent - before.slip_percent) > kQuietSlip_percent) continue;
     // What has been drifting already may go on doing so.
     const double drift = before.value - earlier.value;
     const double expected = before.value + std::clamp(after.value - before.value,
                                                       std::min(drift, 0.0), std::max(drift, 0.0));
     const double change = after.value - expected;
-    const double faster = (after.slip - before.slip) - (before.slip - earlier.slip);
+    const double faster =
+        (after.slip_percent - before.slip_percent) - (before.slip_percent - earlier.slip_percent);
     if (change * before.value < 0.0 && faster > kFaster * std::sqrt(6.0 * slip_noise / length_s)) {
       continue;
     }

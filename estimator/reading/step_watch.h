@@ -26,7 +26,7 @@ class StepWatch {
 
  private:
   struct Means {
-    double value = 0.0, slip = 0.0;
+    double value = 0.0, slip_percent = 0.0;
   };
   static constexpr std::size_t kCells = 512;  // of 50 ms
   // Over the cells from `from` to `to`, counted back from now.

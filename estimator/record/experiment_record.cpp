@@ -65,9 +65,9 @@ void ExperimentRecord::follow_force(const Cell& sample) noexcept {
 bool ExperimentRecord::step(const Cell& sample) noexcept {
   follow_force(sample);
   last_t_s_ = sample.t_s;
-  const double slip = sample.slip_percent;
+  const double slip_percent = sample.slip_percent;
   if (force_.step(sample.t_s, sample.clamp_force_N, 0.0)) force_line_ = force_.line();
-  if (torque_.step(sample.t_s, sample.torque_Nm, slip)) {
+  if (torque_.step(sample.t_s, sample.torque_Nm, slip_percent)) {
     torque_line_ = torque_.line();
     if (held_count_ % kSlowEvery == 0) torque_slow_variance_ = torque_.slow_variance();
     last_held_s_ = sample.t_s;
@@ -81,13 +81,13 @@ bool ExperimentRecord::step(const Cell& sample) noexcept {
     if (first_force_N_ <= 0.0) first_force_N_ = force_N;
     lowered_ = force_N < kLowered * first_force_N_;
   }
-  if (lowered_ &&
-      torque_watch_.step(sample.torque_Nm, slip, slip_noise(), torque_, torque_slow_variance_)) {
+  if (lowered_ && torque_watch_.step(sample.torque_Nm, slip_percent, slip_noise(), torque_,
+                                     torque_slow_variance_)) {
     torque_stepped_s_ = std::min(torque_stepped_s_, sample.t_s);
   }
   if (!slips_) {
     omega_p_.step(sample.t_s, sample.omega_p_rad_s, 0.0);
-    slip_speed_.step(sample.t_s, slip * sample.omega_p_rad_s, 0.0);
+    slip_speed_.step(sample.t_s, slip_percent * sample.omega_p_rad_s, 0.0);
   }
   last_omega_rad_s_ = sample.omega_p_rad_s;
   return history_.step(sample);

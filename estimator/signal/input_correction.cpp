@@ -65,8 +65,8 @@ void InputCorrection::begin(const VariatorSample& measured) noexcept {
   delays_[2].reset(measured.secondary_pressure_Pa);
   delays_[3].reset(measured.torque_Nm);
   acting_Pa_ = input_Pa_ = measured.secondary_pressure_Pa;
-  omega_p_ = measured.omega_p_rad_s;
-  acceleration_ = 0.0;
+  omega_p_rad_s_ = measured.omega_p_rad_s;
+  acceleration_rad_s2_ = 0.0;
 }
 
 const VariatorSample& InputCorrection::correct(const VariatorSample& measured,
@@ -92,9 +92,9 @@ const VariatorSample& InputCorrection::correct(const VariatorSample& measured,
 
   const double omega_p = delays_[0].step(measured.omega_p_rad_s) / (1.0 + e.primary_speed_scale);
   const double omega_s = delays_[1].step(measured.omega_s_rad_s) / (1.0 + e.secondary_speed_scale);
-  acceleration_ += ((omega_p - omega_p_) * rate_hz_ - acceleration_) *
-                   -std::expm1(-1.0 / (kAcceleration_s * rate_hz_));
-  omega_p_ = omega_p;
+  acceleration_rad_s2_ += ((omega_p - omega_p_rad_s_) * rate_hz_ - acceleration_rad_s2_) *
+                          -std::expm1(-1.0 / (kAcceleration_s * rate_hz_));
+  omega_p_rad_s_ = omega_p;
 
   // The lag, exact for a pressure that is linear between samples.
   const double pressure_Pa =
@@ -130,7 +130,7 @@ const VariatorSample& InputCorrection::correct(const VariatorSample& measured,
       (force_N - secondary_clamp_force_N(variator_, 0.0, out_.omega_s_rad_s)) /
       variator_.secondary_piston_area_m2;
   out_.torque_Nm = shaft_Nm - e.loss_constant_Nm - e.loss_per_kN_Nm * kN -
-                   e.loss_per_rad_s_Nm * omega_p - e.inertia_kg_m2 * acceleration_;
+                   e.loss_per_rad_s_Nm * omega_p - e.inertia_kg_m2 * acceleration_rad_s2_;
   started_ = true;
   return out_;
 }

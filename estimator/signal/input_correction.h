@@ -68,7 +68,7 @@ class InputCorrection {
   VariatorSample out_;
   double acting_Pa_ = 0.0, input_Pa_ = 0.0;
   double play_N_ = 0.0;
-  double omega_p_ = 0.0, acceleration_ = 0.0;
+  double omega_p_rad_s_ = 0.0, acceleration_rad_s2_ = 0.0;
   double force_error_N_ = 0.0;
   bool started_ = false;
 };

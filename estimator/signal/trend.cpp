@@ -46,19 +46,19 @@ Trend::Trend(double sample_rate_hz, std::size_t cells, Course course)
 void Trend::reset() noexcept {
   cells_ = 0;
   filled_ = 0;
-  sum_t_ = sum_y_ = sum_slip_ = 0.0;
+  sum_t_ = sum_y_ = sum_slip_percent_ = 0.0;
   scales_ = {};
 }
 
 bool Trend::step(double t_s, double value, double slip_percent) noexcept {
   sum_t_ += t_s;
   sum_y_ += value;
-  sum_slip_ += slip_percent;
+  sum_slip_percent_ += slip_percent;
   if (++filled_ < per_cell_) return false;
   const double share = 1.0 / per_cell_;
-  add(sum_t_ * share, sum_y_ * share, sum_slip_ * share);
+  add(sum_t_ * share, sum_y_ * share, sum_slip_percent_ * share);
   filled_ = 0;
-  sum_t_ = sum_y_ = sum_slip_ = 0.0;
+  sum_t_ = sum_y_ = sum_slip_percent_ = 0.0;
   return true;
 }
 
@@ -77,16 +77,18 @@ void Trend::add(double t_s, double value, double slip_percent) noexcept {
   for (int i = 0; i < kScales; ++i) {
     Scale& scale = scales_[static_cast<std::size_t>(i)];
     scale.sum += y;
-    scale.slip_sum += slip_percent;
+    scale.slip_sum_percent += slip_percent;
     if (++scale.filled < (1 << i)) continue;
     scale.means = {scale.means[1], scale.means[2], scale.sum / scale.filled};
-    scale.slips = {scale.slips[1], scale.slips[2], scale.slip_sum / scale.filled};
-    scale.sum = scale.slip_sum = 0.0;
+    scale.slips_percent = {scale.slips_percent[1], scale.slips_percent[2],
+                           scale.slip_sum_percent / scale.filled};
+    scale.sum = scale.slip_sum_percent = 0.0;
     scale.filled = 0;
-    const bool quiet = std::abs(scale.slips[2] - scale.slips[0]) < kQuietSlip_percent;
+    const bool quiet =
+        std::abs(scale.slips_percent[2] - scale.slips_percent[0]) < kQuietSlip_percent;
     if (++scale.count < 3 || (scale.squares.count > kEnough && !quiet)) continue;
     scale.take(scale.means[0] - 2.0 * scale.means[1] + scale.means[2],
-               scale.slips[0] - 2.0 * scale.slips[1] + scale.slips[2]);
+               scale.slips_percent[0] - 2.0 * scale.slips_percent[1] + scale.slips_percent[2]);
   }
 }
 
@@ -111,13 +113,16 @@ double Trend::Squares::median() const noexcept {
   return 0.0;
 }
 
-void Trend::Scale::take(double second, double slip_second) noexcept {
+void Trend::Scale::take(double second, double slip_second_percent) noexcept {
   // Of white noise the second difference has six times the variance of a mean.
   squares.take(second * second / 6.0);
-  const double rest = slip_square > 0.0 ? second - slip_cross / slip_square * slip_second : second;
+  const double rest = slip_square_percent2 > 0.0
+                          ? second - slip_cross / slip_square_percent2 * slip_second_percent
+                          : second;
   without_slip.take(rest * rest / 6.0);
-  slip_square += slip_second * slip_second - kFading * slip_square;
-  slip_cross += slip_second * second - kFading * slip_cross;
+  slip_square_percent2 +=
+      slip_second_percent * slip_second_percent - kFading * slip_square_percent2;
+  slip_cross += slip_second_percent * second - kFading * slip_cross;
   // A corner of the course or a step (the load is taken up, a ramp begins or ends) is no noise:
   // what lies beyond kLargestSquare times the mean counts for no more, and the mean is without it.
   mean_square = kUnbounded;

@@ -78,17 +78,18 @@ class Trend {
     double median() const noexcept;
   };
   struct Scale {  // second differences of means over 2^i cells
-    double sum = 0.0, slip_sum = 0.0;
+    double sum = 0.0, slip_sum_percent = 0.0;
     int filled = 0;
     int count = 0;
     std::array<double, 3> means{};
-    std::array<double, 3> slips{};
+    std::array<double, 3> slips_percent{};
     Squares squares;
     double mean_square = 0.0;
     // Without what the load's own variation makes of it, which slip follows.
     Squares without_slip;
-    double slip_square = 0.0, slip_cross = 0.0;  // sums: of slip's differences, by the value's
-    void take(double second, double slip_second) noexcept;
+    double slip_square_percent2 = 0.0,
+           slip_cross = 0.0;  // sums: of slip's differences, by the value's
+    void take(double second, double slip_second_percent) noexcept;
   };
   static constexpr int kScales = 9;  // up to 256 cells
   void add(double t_s, double value, double slip_percent) noexcept;
@@ -107,7 +108,7 @@ class Trend {
   int per_cell_;
   double cell_s_;
   int filled_ = 0;
-  double sum_t_ = 0.0, sum_y_ = 0.0, sum_slip_ = 0.0;
+  double sum_t_ = 0.0, sum_y_ = 0.0, sum_slip_percent_ = 0.0;
   std::array<Scale, kScales> scales_;
 };
 

@@ -180,12 +180,12 @@ std::vector<can::StampedFrame> drive_frames(const Drive& drive) {
     frames.push_back({t, frame});
   };
   double force_N = drive.start_force_N;
-  double slip = 0.0;  // fraction
+  double slip_share = 0.0;
   const double sign = drive.overrun ? -1.0 : 1.0;
   const auto steps = static_cast<int>(drive.duration_s / kStep_s);
   for (int step = 0; step < steps; ++step) {
     // Without pressure, spring and turning oil still clamp.
-    const double omega_s = kPrimary_rad_s * kRatio * (1.0 - sign * slip);
+    const double omega_s = kPrimary_rad_s * kRatio * (1.0 - sign * slip_share);
     const double oil_N = drive.centrifugal_N_s2 * omega_s * omega_s;
     const double least_N = std::max(1000.0, drive.spring_force_N + oil_N);
     force_N = std::max(force_N - drive.ramp_N_per_s * kStep_s, least_N);
@@ -194,16 +194,16 @@ std::vector<can::StampedFrame> drive_frames(const Drive& drive) {
     // Below the peak the belt carries the torque with the slip that this takes; beyond it slips
     // faster and faster, and the friction falls a little.
     double mu = needed;
-    if (needed < drive.mu_max && slip <= 0.02) {
-      slip = 0.02 * std::atanh(needed / drive.mu_max * std::tanh(2.2)) / 2.2;
+    if (needed < drive.mu_max && slip_share <= 0.02) {
+      slip_share = 0.02 * std::atanh(needed / drive.mu_max * std::tanh(2.2)) / 2.2;
     } else {
-      slip = std::min(slip + 0.05 * kStep_s, 0.15);
-      mu = drive.mu_max - 0.15 * std::max(slip - 0.02, 0.0);
+      slip_share = std::min(slip_share + 0.05 * kStep_s, 0.15);
+      mu = drive.mu_max - 0.15 * std::max(slip_share - 0.02, 0.0);
     }
     const double torque = mu * 2.0 * radius_m * force_N / kCos;
     const std::int64_t t = drive.start_ns + std::int64_t{step} * 1'000'000;
     if (step % 10 == 0) {
-      const double ratio = kRatio * (1.0 - sign * slip);
+      const double ratio = kRatio * (1.0 - sign * slip_share);
       add(t, speeds_frame(noisy(kPrimary_rad_s, 0.02), noisy(kPrimary_rad_s * ratio, 0.04)));
     }
     if (step % 10 == 3)

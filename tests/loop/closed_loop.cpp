@@ -23,12 +23,12 @@ namespace {
 void note_slip(const sim::VehicleSimulation& vehicle, LoopRun& run) {
   const auto bin = static_cast<std::size_t>(
       std::max(0.0, static_cast<double>(vehicle.now_ns()) * 1e-9 / LoopRun::kBin_s));
-  if (run.slip_bins.size() <= bin) {
-    run.slip_bins.resize(bin + 1, 0.0);
+  if (run.slip_share_bins.size() <= bin) {
+    run.slip_share_bins.resize(bin + 1, 0.0);
     run.speed_bins.resize(bin + 1, 0.0);
   }
   const sim::DrivelineOutput& belt = vehicle.truth().belt;
-  run.slip_bins[bin] = std::max(run.slip_bins[bin], std::abs(belt.slip));
+  run.slip_share_bins[bin] = std::max(run.slip_share_bins[bin], std::abs(belt.slip_share));
   run.speed_bins[bin] = std::max(run.speed_bins[bin], belt.slip_speed_m_s);
 }
 
@@ -162,8 +162,8 @@ void finish(const sim::VehicleSimulation& vehicle, LoopRun& run) {
 
 }  // namespace
 
-double LoopRun::slip_max(double begin_s, double end_s) const {
-  return largest(slip_bins, begin_s, end_s);
+double LoopRun::slip_max_share(double begin_s, double end_s) const {
+  return largest(slip_share_bins, begin_s, end_s);
 }
 double LoopRun::slip_speed_max(double begin_s, double end_s) const {
   return largest(speed_bins, begin_s, end_s);

@@ -29,7 +29,7 @@ struct LoopRun {
   std::vector<daemon::ExperimentResult> results;
   std::vector<sim::RequestTruth> requests;
   std::map<std::string, std::string> broken;  // invariants
-  std::vector<double> slip_bins;              // largest |slip| of each kBin_s
+  std::vector<double> slip_share_bins;        // largest |slip| of each kBin_s
   std::vector<double> speed_bins;             // and slip speed, m/s
   std::vector<Reaction> reactions;
   std::uint32_t inhibits = 0;  // all that were ever set once a trigger was near
@@ -42,7 +42,7 @@ struct LoopRun {
 
   static constexpr double kBin_s = 0.25;
   // Largest values from begin_s to end_s.
-  double slip_max(double begin_s, double end_s) const;
+  double slip_max_share(double begin_s, double end_s) const;
   double slip_speed_max(double begin_s, double end_s) const;
 };
 

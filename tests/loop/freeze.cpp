@@ -76,7 +76,7 @@ FreezeRun FreezeBench::run(const Freeze& freeze) const {
   out.named = names_frozen(run);
   out.stuck = run.last_state == daemon::State::kFault;
   for (const sim::RequestTruth& request : run.requests) {
-    out.slip_max = std::max(out.slip_max, request.slip_max);
+    out.slip_max_share = std::max(out.slip_max_share, request.slip_max_share);
     out.slip_speed_max_m_s = std::max(out.slip_speed_max_m_s, request.slip_speed_max_m_s);
     out.energy_J = std::max(out.energy_J, request.macro_energy_J);
     out.lasted_s = std::max(out.lasted_s, request.end_s - request.begin_s - freeze.at_s);

@@ -19,7 +19,7 @@ struct Freeze {
 };
 
 struct FreezeRun {
-  double slip_max = 0.0, slip_speed_max_m_s = 0.0, energy_J = 0.0;
+  double slip_max_share = 0.0, slip_speed_max_m_s = 0.0, energy_J = 0.0;
   double lasted_s = 0.0;  // the request, from the freeze on
   bool stuck = false;     // it ended in state Fault
   bool named = false;     // FaultInputFrozen, or stop reason InputFrozen

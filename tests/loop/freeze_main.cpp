@@ -74,15 +74,15 @@ int main(int argc, char** argv) {
               bench.false_alarm().empty() ? "no false alarm" : bench.false_alarm().c_str());
   for (const std::vector<std::string>& inputs : test::frozen_inputs()) {
     if (!only.empty() && joined(inputs) != only) continue;
-    double slip = 0.0, speed = 0.0, energy = 0.0, lasted = 0.0, at = 0.0;
+    double slip_share = 0.0, speed = 0.0, energy = 0.0, lasted = 0.0, at = 0.0;
     int runs = 0, named = 0;
     for (double at_s = 0.1; at_s < bench.ramp_s() + 0.1;
          at_s += at_s < bench.ramp_s() - 0.8 ? step_s : near_s) {
       const test::FreezeRun run = bench.run({inputs, at_s, creep_per_s});
       ++runs;
       named += run.named ? 1 : 0;
-      if (run.slip_max > slip) {
-        slip = run.slip_max;
+      if (run.slip_max_share > slip_share) {
+        slip_share = run.slip_max_share;
         at = at_s;
       }
       speed = std::max(speed, run.slip_speed_max_m_s);
@@ -93,13 +93,13 @@ int main(int argc, char** argv) {
       }
       if (all) {
         std::printf("  %.2f s: slip %.2f %%, %.0f J, lasted %.3f s, named %d, %s\n", at_s,
-                    100.0 * run.slip_max, run.energy_J, run.lasted_s, run.named,
+                    100.0 * run.slip_max_share, run.energy_J, run.lasted_s, run.named,
                     run.reason.c_str());
       }
     }
     std::printf(
         "%-34s %3d runs, named %3d, slip %.2f %% (at %.2f s), %.3f m/s, %.1f J, lasted %.2f s\n",
-        joined(inputs).c_str(), runs, named, 100.0 * slip, at, speed, energy, lasted);
+        joined(inputs).c_str(), runs, named, 100.0 * slip_share, at, speed, energy, lasted);
   }
   return 0;
 }

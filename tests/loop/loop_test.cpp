@@ -50,8 +50,8 @@ TEST(ClosedLoop, CoastOverdriveCompletesNearTheTruth) {
     expect_unbroken(run);
     ASSERT_EQ(run.requests.size(), 1u);
     EXPECT_TRUE(run.requests[0].peak_passed);
-    EXPECT_LT(run.requests[0].slip_at_end, 0.05);
-    EXPECT_LT(run.requests[0].slip_max, 0.06);
+    EXPECT_LT(run.requests[0].slip_at_end_share, 0.05);
+    EXPECT_LT(run.requests[0].slip_max_share, 0.06);
     EXPECT_EQ(run.stalls, 0);
     const daemon::ExperimentResult* result = completed(run);
     if (result == nullptr) continue;
@@ -76,7 +76,7 @@ TEST(ClosedLoop, ALatePeakIsCrossedInsideTheLimits) {
       expect_unbroken(run);
       ASSERT_EQ(run.requests.size(), 1u);
       EXPECT_TRUE(run.requests[0].peak_passed);
-      EXPECT_LT(run.requests[0].slip_max, 0.10);
+      EXPECT_LT(run.requests[0].slip_max_share, 0.10);
       EXPECT_LT(run.requests[0].slip_speed_max_m_s, 0.8);
       EXPECT_LT(run.requests[0].macro_energy_J, 100.0);
     }
@@ -175,7 +175,7 @@ TEST(ClosedLoop, LowCompletesOnADescentWithAFasterRamp) {
     const LoopRun run = run_closed(s, vehicle_config(s), seed);
     expect_unbroken(run);
     for (const sim::RequestTruth& request : run.requests) {
-      EXPECT_LT(request.slip_max, 0.10);
+      EXPECT_LT(request.slip_max_share, 0.10);
       EXPECT_LT(request.slip_speed_max_m_s, 0.8);
       EXPECT_LT(request.macro_energy_J, 100.0);
     }
@@ -199,7 +199,7 @@ TEST(ClosedLoop, ACurveWithoutAPeakEndsByBackup) {
     const LoopRun run = run_closed(s, vehicle_config(s), seed);
     expect_unbroken(run);
     for (const sim::RequestTruth& request : run.requests) {
-      EXPECT_LT(request.slip_max, 0.10);
+      EXPECT_LT(request.slip_max_share, 0.10);
       EXPECT_LT(request.slip_speed_max_m_s, 0.8);
     }
   }
@@ -220,7 +220,7 @@ TEST(ClosedLoop, TheBackupStopsAloneKeepTheLimits) {
       const LoopRun run = run_closed(s, config, seed);
       expect_unbroken(run);
       ASSERT_FALSE(run.requests.empty());
-      EXPECT_LT(run.requests[0].slip_max, 0.10);
+      EXPECT_LT(run.requests[0].slip_max_share, 0.10);
       EXPECT_LT(run.requests[0].slip_speed_max_m_s, 0.8);
       EXPECT_LT(run.requests[0].macro_energy_J, 100.0);
       ASSERT_FALSE(run.results.empty());
@@ -247,7 +247,7 @@ TEST(ClosedLoop, AtTheLowestAndTheHighestRate) {
       const LoopRun run = run_closed(s, config, seed);
       expect_unbroken(run);
       ASSERT_EQ(run.requests.size(), 1u);
-      EXPECT_LT(run.requests[0].slip_max, 0.06);
+      EXPECT_LT(run.requests[0].slip_max_share, 0.06);
       const daemon::ExperimentResult* result = completed(run);
       ASSERT_NE(result, nullptr);
       EXPECT_NEAR(result->peak.mu_max, 0.105, 0.003);
@@ -260,8 +260,8 @@ TEST(ClosedLoop, AtTheLowestAndTheHighestRate) {
     expect_unbroken(run);
     ASSERT_FALSE(run.results.empty());
     EXPECT_EQ(run.results[0].stop_reason, StopReason::kSlipRate);
-    EXPECT_LT(run.requests[0].slip_at_end, 0.045);
-    EXPECT_LT(run.requests[0].slip_max, 0.10);
+    EXPECT_LT(run.requests[0].slip_at_end_share, 0.045);
+    EXPECT_LT(run.requests[0].slip_max_share, 0.10);
   }
 }
 
@@ -281,7 +281,7 @@ TEST(ClosedLoop, SameSeedSameRun) {
     EXPECT_EQ(a.results[i].peak.mu_max, b.results[i].peak.mu_max);
     EXPECT_EQ(a.results[i].end, b.results[i].end);
   }
-  EXPECT_EQ(a.slip_bins, b.slip_bins);
+  EXPECT_EQ(a.slip_share_bins, b.slip_share_bins);
   EXPECT_EQ(a.sent_hash, b.sent_hash);
 }
 
@@ -290,8 +290,8 @@ TEST(ClosedLoop, SilenceAtEveryInstantOfTheRamp) {
   const SilenceResult silence = silence_over_the_ramp(scenario("coast-overdrive"), 0.2, 0.005, 0.5);
   for (const auto& [which, how] : silence.broken) ADD_FAILURE() << which << ": " << how;
   EXPECT_GT(silence.runs, 200);
-  EXPECT_GT(silence.slip_max, 0.02);  // the peak was passed
-  EXPECT_LT(silence.slip_max, 0.10);
+  EXPECT_GT(silence.slip_max_share, 0.02);  // the peak was passed
+  EXPECT_LT(silence.slip_max_share, 0.10);
   EXPECT_LT(silence.slip_speed_max_m_s, 0.8);
   EXPECT_LT(silence.energy_J, 100.0);
 }
@@ -323,7 +323,7 @@ TEST_P(FrozenInput, EndsTheRequestAndIsNamed) {
       SCOPED_TRACE(testing::Message() << inputs.front() << "+" << inputs.back() << " at " << at_s
                                       << " s: " << run.reason);
       for (const auto& [which, how] : run.broken) ADD_FAILURE() << which << ": " << how;
-      EXPECT_LT(run.slip_max, 0.10);
+      EXPECT_LT(run.slip_max_share, 0.10);
       EXPECT_LT(run.slip_speed_max_m_s, 0.8);
       EXPECT_LT(run.energy_J, 100.0);
       const bool speeds =
@@ -372,7 +372,7 @@ TEST(ClosedLoop, NoRequestWhereAStandstillWouldNotShow) {
                                std::vector<std::string>{"PrimarySpeed", "EngineSpeed"}}) {
       for (double at_s = bench.ramp_s() - 0.4; at_s < bench.ramp_s(); at_s += 0.1) {
         const FreezeRun frozen = bench.run({inputs, at_s});
-        EXPECT_LT(frozen.slip_max, 0.10) << at_s;
+        EXPECT_LT(frozen.slip_max_share, 0.10) << at_s;
         EXPECT_LT(frozen.slip_speed_max_m_s, 0.8) << at_s;
         EXPECT_LT(frozen.energy_J, 100.0) << at_s;
         EXPECT_TRUE(frozen.named) << at_s << ": " << frozen.reason;
@@ -414,7 +414,7 @@ TEST(ClosedLoop, ASpeedThatCreepsAgainstTheTorqueIsNamed) {
     for (const auto& [which, how] : run.broken) ADD_FAILURE() << which << ": " << how;
     EXPECT_TRUE(run.named);
     EXPECT_EQ(run.reason.rfind(std::string("Aborted InputFrozen (") + role, 0), 0u);
-    EXPECT_LT(run.slip_max, 0.10);
+    EXPECT_LT(run.slip_max_share, 0.10);
     EXPECT_LT(run.energy_J, 100.0);
   };
   // Nearer to the peak the slip that is hidden ends the request as the engine leaves the primary.
@@ -469,9 +469,9 @@ TEST(ClosedLoop, TheDriverActsAtAnyInstant) {
         ADD_FAILURE() << which << ": " << how << ", " << at_s;
       }
       for (const sim::RequestTruth& request : run.requests) {
-        EXPECT_LT(request.slip_max, 0.10)
+        EXPECT_LT(request.slip_max_share, 0.10)
             << static_cast<int>(act.kind) << " " << act.size << " at " << at_s;
-        worst = std::max(worst, request.slip_max);
+        worst = std::max(worst, request.slip_max_share);
       }
       if (!run.results.empty()) {
         EXPECT_NE(run.results[0].outcome, Outcome::kNone);

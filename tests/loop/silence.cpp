@@ -34,7 +34,7 @@ SilenceResult silence_over_the_ramp(sim::VehicleScenario scenario, double step_s
         out.broken.try_emplace(which, how + ", silence at " + std::to_string(at_s) + " s");
       }
       for (const sim::RequestTruth& request : run.requests) {
-        out.slip_max = std::max(out.slip_max, request.slip_max);
+        out.slip_max_share = std::max(out.slip_max_share, request.slip_max_share);
         out.slip_speed_max_m_s = std::max(out.slip_speed_max_m_s, request.slip_speed_max_m_s);
         out.energy_J = std::max(out.energy_J, request.macro_energy_J);
       }

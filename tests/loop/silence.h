@@ -11,7 +11,7 @@ namespace beltgrip::test {
 
 struct SilenceResult {
   int runs = 0;
-  double slip_max = 0.0;  // fraction
+  double slip_max_share = 0.0;
   double slip_speed_max_m_s = 0.0;
   double energy_J = 0.0;                      // beyond the peak
   double ramp_s = 0.0;                        // length of the ramp without silence

@@ -92,7 +92,7 @@ void BusView::take_window(const daemon::SampleReport& report) {
   }
   if (report.curve.usable) {
     mu_sum_ += std::abs(report.curve.mu_star);
-    slip_sum_ += report.curve.sigma_star_percent;
+    slip_sum_percent_ += report.curve.sigma_star_percent;
     ++mu_count_;
   }
   const double length_s = static_cast<double>((report.t - *window_begin_).ns()) * 1e-9;
@@ -107,14 +107,14 @@ void BusView::take_window(const daemon::SampleReport& report) {
   }
   if (mu_count_ == samples_) {
     window.mu_star = mu_sum_ / samples_;
-    window.slip_percent = slip_sum_ / samples_;
+    window.slip_percent = slip_sum_percent_ / samples_;
   }
   if (any) windows_.add(window);
   window_begin_.reset();
   samples_ = mu_count_ = 0;
   sum_ = {};
   count_ = {};
-  mu_sum_ = slip_sum_ = 0.0;
+  mu_sum_ = slip_sum_percent_ = 0.0;
 }
 
 daemon::Conditions BusView::conditions() const {

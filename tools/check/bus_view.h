@@ -85,7 +85,7 @@ class BusView final : public daemon::SampleSink {
   int samples_ = 0;
   std::array<double, daemon::kRoleCount> sum_{}, first_{}, last_{};
   std::array<int, daemon::kRoleCount> count_{};
-  double mu_sum_ = 0.0, slip_sum_ = 0.0;
+  double mu_sum_ = 0.0, slip_sum_percent_ = 0.0;
   int mu_count_ = 0;
 
   std::optional<daemon::MonoTime> begin_;  // of the driving

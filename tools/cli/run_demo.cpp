@@ -79,7 +79,7 @@ class Results {
       std::snprintf(when, sizeof when, "from %.1f to %.1f s", request.begin_s, request.end_s);
       std::snprintf(truth, sizeof truth, "%.4f%s", request.mu_max, error);
       std::fprintf(out, "  %-22s %-24s %-24s slip up to %.1f %%, %.0f J\n", when, found, truth,
-                   100.0 * request.slip_max, request.macro_energy_J);
+                   100.0 * request.slip_max_share, request.macro_energy_J);
     }
   }
 

@@ -25,12 +25,13 @@ namespace {
 
 constexpr const char* kInterface = "vcan0";
 // Where a request has done harm, whatever the fault.
-constexpr double kSlipLimit = 0.10;
+constexpr double kSlipLimit_share = 0.10;
 constexpr double kSlipSpeedLimit_m_s = 0.8;
 constexpr double kSlipEnergyLimit_J = 100.0;
 
 bool inside_limits(const sim::RequestTruth& request) {
-  return request.slip_max <= kSlipLimit && request.slip_speed_max_m_s <= kSlipSpeedLimit_m_s &&
+  return request.slip_max_share <= kSlipLimit_share &&
+         request.slip_speed_max_m_s <= kSlipSpeedLimit_m_s &&
          request.macro_energy_J <= kSlipEnergyLimit_J;
 }
 
@@ -46,8 +47,8 @@ void write_request(text::JsonWriter& json, const sim::RequestTruth& request) {
       .field("peak_passed", request.peak_passed)
       .field("peak_s", request.peak_passed ? request.peak_passed_s : text::kJsonNull)
       .field("mu_star_max", request.mu_star_max)
-      .field("slip_stop_percent", 100.0 * request.slip_at_end)
-      .field("slip_max_percent", 100.0 * request.slip_max)
+      .field("slip_stop_percent", 100.0 * request.slip_at_end_share)
+      .field("slip_max_percent", 100.0 * request.slip_max_share)
       .field("slip_speed_max_m_s", request.slip_speed_max_m_s)
       .field("slip_energy_J", request.macro_energy_J)
       .field("clamp_force_min_N", request.force_min_N)
@@ -63,10 +64,10 @@ void fail_not_finite(double t_s, std::uint64_t seed) {
 }
 
 std::string truth_json(const sim::VehicleSimulation& vehicle, std::uint64_t seed) {
-  double slip_max = 0.0, slip_speed_max_m_s = 0.0, energy_J = 0.0;
+  double slip_max_share = 0.0, slip_speed_max_m_s = 0.0, energy_J = 0.0;
   std::int64_t outside = 0;
   for (const sim::RequestTruth& request : vehicle.requests()) {
-    slip_max = std::max(slip_max, request.slip_max);
+    slip_max_share = std::max(slip_max_share, request.slip_max_share);
     slip_speed_max_m_s = std::max(slip_speed_max_m_s, request.slip_speed_max_m_s);
     energy_J = std::max(energy_J, request.macro_energy_J);
     outside += inside_limits(request) ? 0 : 1;
@@ -81,7 +82,7 @@ std::string truth_json(const sim::VehicleSimulation& vehicle, std::uint64_t seed
       .field("mu_max", vehicle.truth().belt.mu_max)
       .field("coast_downs", vehicle.truth().coast_downs)
       .field("stalls", vehicle.truth().stalls)
-      .field("slip_max_percent", 100.0 * slip_max)
+      .field("slip_max_percent", 100.0 * slip_max_share)
       .field("slip_speed_max_m_s", slip_speed_max_m_s)
       .field("slip_energy_max_J", energy_J)
       .field("requests_outside_limits", outside)
@@ -103,7 +104,7 @@ std::string truth_text(const sim::VehicleSimulation& vehicle) {
                   "    %.2f to %.2f s: mu_max %.4f, %s; slip up to %.2f %%, %.2f m/s, %.0f J "
                   "beyond the peak%s\n",
                   r.begin_s, r.end_s, r.mu_max, r.peak_passed ? "passed" : "not reached",
-                  100.0 * r.slip_max, r.slip_speed_max_m_s, r.macro_energy_J,
+                  100.0 * r.slip_max_share, r.slip_speed_max_m_s, r.macro_energy_J,
                   inside_limits(r) ? "" : ": OUTSIDE THE LIMITS");
     text += line;
   }
@@ -195,7 +196,7 @@ void DriveStory::observe(const sim::VehicleSimulation& vehicle) {
         truth.secondary_force_N);
   } else if (!truth.obeying && obeying_) {
     say(vehicle, "the transmission takes its force back; the belt slips by %.1f %%",
-        100.0 * std::abs(truth.belt.slip));
+        100.0 * std::abs(truth.belt.slip_share));
   }
   begun_ = true;
   pressed_ = pressed;

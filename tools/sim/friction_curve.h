@@ -30,7 +30,7 @@ struct FrictionCurve {
   double rise_per_percent = 1e-3;    // broad_top only: mu gained per percent along the top
 
   // Where the friction begins to fall, as a fraction.
-  double fall_slip() const { return (peak_slip_percent + plateau_percent) / 100.0; }
+  double fall_slip_share() const { return (peak_slip_percent + plateau_percent) / 100.0; }
 };
 
 struct FrictionPoint {
@@ -38,6 +38,6 @@ struct FrictionPoint {
   double slope = 0.0;  // d mu / d slip, per unit slip
 };
 
-FrictionPoint friction_at(const FrictionCurve& curve, double slip);
+FrictionPoint friction_at(const FrictionCurve& curve, double slip_share);
 
 }  // namespace beltgrip::sim

@@ -142,16 +142,17 @@ void RigSimulation::operate() {
                                 scenario_.start_force_N);
 }
 
-void RigSimulation::observe(double slip_before, double sigma_star_before) {
+void RigSimulation::observe(double slip_before_share, double sigma_star_before) {
   if (signals_.mode != RigMode::kLowering) return;
   ExperimentTruth& truth = truth_.back();
-  const double peak_slip = scenario_.friction().peak_slip_percent / 100.0;
-  const double slip = std::abs(plant_.output(belt_force_N_).slip);
+  const double peak_slip_share = scenario_.friction().peak_slip_percent / 100.0;
+  const double slip_share = std::abs(plant_.output(belt_force_N_).slip_share);
   const double sigma = std::abs(sigma_star());
   if (!truth.peak_s) truth.mu_max = friction_factor_ * scenario_.friction().mu_max;
   const bool has_peak = scenario_.friction().shape != CurveShape::kSaturating;
-  if (has_peak && !truth.peak_s && slip >= peak_slip) {
-    const double share = (peak_slip - slip_before) / std::max(slip - slip_before, 1e-12);
+  if (has_peak && !truth.peak_s && slip_share >= peak_slip_share) {
+    const double share =
+        (peak_slip_share - slip_before_share) / std::max(slip_share - slip_before_share, 1e-12);
     truth.peak_s = seconds() - (1.0 - share) * step_s_;
     truth.slip_peak_percent = scenario_.friction().peak_slip_percent;
     truth.sigma_star_peak_percent =
@@ -172,7 +173,7 @@ void RigSimulation::step() {
   clamp_force_N_ += share * (command_force_N_ - clamp_force_N_);
 
   act(false);
-  const double slip_before = std::abs(plant_.output(belt_force_N_).slip);
+  const double slip_before_share = std::abs(plant_.output(belt_force_N_).slip_share);
   const double sigma_star_before = std::abs(sigma_star());
   const double omega_p_before = plant_.state().omega_p_rad_s;
   const double error_rad_s = scenario_.primary_speed_rad_s - omega_p_before;
@@ -191,12 +192,13 @@ void RigSimulation::step() {
   const PlantOutput belt = plant_.output(belt_force_N_);
   const double acceleration = (state.omega_p_rad_s - omega_p_before) / step_s_;
   signals_.torque_p_Nm = belt.torque_p_Nm + loss_Nm(acceleration);
-  slip_energy_kJ_ += 1e-3 * std::abs(belt.torque_p_Nm * belt.slip) * state.omega_p_rad_s * step_s_;
+  slip_energy_kJ_ +=
+      1e-3 * std::abs(belt.torque_p_Nm * belt.slip_share) * state.omega_p_rad_s * step_s_;
   turn(state.omega_p_rad_s, state.omega_s_rad_s);
   signals_.torque_s_Nm = load_torque_Nm_;
   signals_.secondary_pressure_Pa = pressure_Pa(clamp_force_N_);
   signals_.secondary_pressure_command_Pa = pressure_Pa(command_force_N_);
-  observe(slip_before, sigma_star_before);
+  observe(slip_before_share, sigma_star_before);
   // A shaft that nearly stands: the rig's own protection switches off, and slip is no longer
   // defined.
   const bool stalled = state.omega_p_rad_s < kStall_rad_s;

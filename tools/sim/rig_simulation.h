@@ -37,7 +37,7 @@ class RigSimulation final : public Simulation {
 
  private:
   void operate();
-  void observe(double slip_before, double sigma_star_before);
+  void observe(double slip_before_share, double sigma_star_before);
   double sigma_star() const;
   double pressure_Pa(double clamp_force_N) const;
   double loss_Nm(double acceleration_rad_s2) const;

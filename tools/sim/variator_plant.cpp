@@ -18,8 +18,8 @@ double VariatorPlant::ratio_at(double clamp_force_N) const {
   return ratio_factor_ * variator_.ratio * (1.0 - variator_.deformation_per_N * clamp_force_N);
 }
 
-FrictionPoint VariatorPlant::friction_now(double slip) const {
-  const FrictionPoint point = friction_at(friction_, slip);
+FrictionPoint VariatorPlant::friction_now(double slip_share) const {
+  const FrictionPoint point = friction_at(friction_, slip_share);
   return {friction_factor_ * point.mu, friction_factor_ * point.slope};
 }
 
@@ -39,17 +39,17 @@ bool VariatorPlant::settle(double omega_p_rad_s, double torque_p_Nm, double clam
     const double middle = 0.5 * (low + high);
     (friction_now(middle).mu < wanted ? low : high) = middle;
   }
-  const double slip = std::copysign(0.5 * (low + high), torque_p_Nm);
+  const double slip_share = std::copysign(0.5 * (low + high), torque_p_Nm);
   state_.omega_p_rad_s = omega_p_rad_s;
-  state_.omega_s_rad_s = (1.0 - slip) * ratio_at(clamp_force_N) * omega_p_rad_s;
+  state_.omega_s_rad_s = (1.0 - slip_share) * ratio_at(clamp_force_N) * omega_p_rad_s;
   return true;
 }
 
 PlantOutput VariatorPlant::output(double clamp_force_N) const {
   PlantOutput out;
   out.geometric_ratio = ratio_at(clamp_force_N);
-  out.slip = 1.0 - state_.omega_s_rad_s / (out.geometric_ratio * state_.omega_p_rad_s);
-  out.mu = friction_now(out.slip).mu;
+  out.slip_share = 1.0 - state_.omega_s_rad_s / (out.geometric_ratio * state_.omega_p_rad_s);
+  out.mu = friction_now(out.slip_share).mu;
   out.torque_p_Nm = 2.0 * out.mu * clamp_force_N * primary_radius_m_ / cos_wedge_;
   out.torque_s_Nm = out.torque_p_Nm / out.geometric_ratio;
   return out;
@@ -67,8 +67,8 @@ VariatorPlant::Derivative VariatorPlant::derivative(const PlantState& state,
                                                     const PlantInput& input,
                                                     double omega_p_start_rad_s) const {
   const double ratio = ratio_at(input.clamp_force_N);
-  const double slip = 1.0 - state.omega_s_rad_s / (ratio * state.omega_p_rad_s);
-  const FrictionPoint friction = friction_now(slip);
+  const double slip_share = 1.0 - state.omega_s_rad_s / (ratio * state.omega_p_rad_s);
+  const FrictionPoint friction = friction_now(slip_share);
   const double torque_per_mu = 2.0 * input.clamp_force_N * primary_radius_m_ / cos_wedge_;
   const double torque_p = torque_per_mu * friction.mu;
   const double torque_p_per_slip = torque_per_mu * friction.slope;

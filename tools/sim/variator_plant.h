@@ -28,7 +28,7 @@ struct PlantInput {
 
 // What an ideal observer sees at an instant.
 struct PlantOutput {
-  double slip = 0.0;  // fraction
+  double slip_share = 0.0;
   double mu = 0.0;
   double geometric_ratio = 0.0;  // r_g
   double torque_p_Nm = 0.0;      // belt torque on the primary pulley
@@ -62,7 +62,7 @@ class VariatorPlant {
     double pp = 0.0, ps = 0.0, sp = 0.0, ss = 0.0;  // its Jacobian
   };
   double ratio_at(double clamp_force_N) const;
-  FrictionPoint friction_now(double slip) const;
+  FrictionPoint friction_now(double slip_share) const;
   double drag_Nm(double omega_s_rad_s) const;
   // Drive torque is linearised around omega_p of the step's start.
   Derivative derivative(const PlantState& state, const PlantInput& input,

@@ -246,11 +246,11 @@ void VehiclePlant::creep(double ln_force_ratio, double step_s) {
 void VehiclePlant::observe(const DrivelineInput& input) {
   const Held held = hold(input);
   const Slip slip = slip_of(held.ratio, state_.omega_p_rad_s, state_.omega_s_rad_s);
-  output_.slip = slip.value;
+  output_.slip_share = slip.value;
   output_.mu = friction_at(held.curve, slip.value).mu;
   output_.mu_max = held.curve.mu_max;
-  output_.peak_slip = held.curve.peak_slip_percent / 100.0;
-  output_.fall_slip = held.curve.fall_slip();
+  output_.peak_slip_share = held.curve.peak_slip_percent / 100.0;
+  output_.fall_slip_share = held.curve.fall_slip_share();
   output_.geometric_ratio = held.ratio;
   output_.primary_radius_m = held.radius_m;
   output_.belt_torque_Nm = held.torque_per_mu * output_.mu;

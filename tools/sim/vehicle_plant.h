@@ -43,12 +43,13 @@ struct DrivelineInput {
 };
 
 struct DrivelineOutput {
-  double slip = 0.0;  // the paper's sigma with the deformed ratio, fraction; negative in overrun
+  double slip_share =
+      0.0;  // the paper's sigma with the deformed ratio, fraction; negative in overrun
   double slip_speed_m_s = 0.0;
   double mu = 0.0;      // coefficient in use, signed
   double mu_max = 0.0;  // of the present curve
-  double peak_slip = 0.0;
-  double fall_slip = 0.0;        // where friction begins to fall: the peak, or a plateau's end
+  double peak_slip_share = 0.0;
+  double fall_slip_share = 0.0;  // where friction begins to fall: the peak, or a plateau's end
   double geometric_ratio = 0.0;  // r_g, deformed
   double primary_radius_m = 0.0;
   double belt_torque_Nm = 0.0;  // T_bp

@@ -173,24 +173,24 @@ void VehicleSimulation::observe(double t_s) {
   if (requests_.empty() || requests_.back().over) return;
   RequestTruth& request = requests_.back();
   const DrivelineOutput& belt = truth_.belt;
-  const double slip = std::abs(belt.slip);
+  const double slip_share = std::abs(belt.slip_share);
   if (truth_.obeying) {
     request.end_s = t_s;
-    request.slip_at_end = slip;
+    request.slip_at_end_share = slip_share;
   } else if (t_s > request.end_s + RequestTruth::kAfter_s) {
     request.over = true;
     return;
   }
   if (!request.peak_passed) {
     request.mu_max = belt.mu_max;
-    request.peak_passed = slip >= belt.peak_slip;
+    request.peak_passed = slip_share >= belt.peak_slip_share;
     request.peak_passed_s = t_s;
   }
-  request.slip_max = std::max(request.slip_max, slip);
+  request.slip_max_share = std::max(request.slip_max_share, slip_share);
   request.slip_speed_max_m_s = std::max(request.slip_speed_max_m_s, belt.slip_speed_m_s);
   request.mu_star_max = std::max(request.mu_star_max, std::abs(belt.mu));
   request.force_min_N = std::min(request.force_min_N, truth_.secondary_force_N);
-  if (slip > belt.fall_slip) request.macro_energy_J += belt.slip_power_W * step_s_;
+  if (slip_share > belt.fall_slip_share) request.macro_energy_J += belt.slip_power_W * step_s_;
 }
 
 }  // namespace beltgrip::sim

@@ -40,11 +40,11 @@ struct RequestTruth {
   double mu_max = 0.0;  // of the belt when it peaked, or at the end
   bool peak_passed = false;
   double peak_passed_s = 0.0;
-  double slip_max = 0.0;  // fraction, magnitude
+  double slip_max_share = 0.0;  // magnitude
   double slip_speed_max_m_s = 0.0;
-  double slip_at_end = 0.0;     // when the controller took its force back
-  double macro_energy_J = 0.0;  // dissipated beyond the slip where friction begins to fall
-  double mu_star_max = 0.0;     // largest coefficient in use
+  double slip_at_end_share = 0.0;  // when the controller took its force back
+  double macro_energy_J = 0.0;     // dissipated beyond the slip where friction begins to fall
+  double mu_star_max = 0.0;        // largest coefficient in use
   double force_min_N = 0.0;
 };
 

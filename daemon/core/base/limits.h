@@ -17,7 +17,7 @@
 namespace beltgrip::daemon::limits {
 
 // --- what a belt may go through in a request: promised ------------------------------------------
-inline constexpr double kPromisedSlip = 0.10;
+inline constexpr double kPromisedSlip_share = 0.10;
 inline constexpr double kPromisedSlipSpeed_m_s = 0.8;
 inline constexpr double kPromisedEnergy_J = 100.0;  // beyond the peak
 
@@ -27,10 +27,11 @@ inline constexpr double kPromisedEnergy_J = 100.0;  // beyond the peak
 inline constexpr double kObservedSpeedShare = 0.5;  // of the least speed at the start
 
 // --- the request ends itself (experiment/clamp_request) ------------------------------------------
-inline constexpr double kRequestSlip = 0.07;            // chosen: room to come back, at any speed
-inline constexpr double kRequestSlipBeyond = 0.02;      // chosen: past where friction was largest
-inline constexpr double kRequestSlipRate_1_s = 0.12;    // measured: a belt that runs away
-inline constexpr double kRequestSlipRateFrom = 0.0075;  // chosen: below it noise has such rates
+inline constexpr double kRequestSlip_share = 0.07;        // chosen: room to come back, at any speed
+inline constexpr double kRequestSlipBeyond_share = 0.02;  // chosen: past where friction was largest
+inline constexpr double kRequestSlipRate_1_s = 0.12;      // measured: a belt that runs away
+// Chosen: below it noise has such rates.
+inline constexpr double kRequestSlipRateFrom_share = 0.0075;
 // Beyond the peak, as it is estimated. Adhesive wear begins at a line of load and sliding speed;
 // the one hard point is 3 kN, 0.8 m/s, 0.5 kW for seconds (the paper).
 inline constexpr double kRequestEnergy_J =
@@ -47,8 +48,8 @@ inline constexpr Duration kAnnounced = kInactiveFrames * kClampPeriod;
 
 // --- the safety monitor withdraws the permission (guard/safety_monitor) --------------------------
 // It cannot know where the peak lies: slip and power of any kind.
-inline constexpr double kMonitorSlipDebounced = 0.075;
-inline constexpr double kMonitorSlip = 0.09;
+inline constexpr double kMonitorSlipDebounced_share = 0.075;
+inline constexpr double kMonitorSlip_share = 0.09;
 inline constexpr double kMonitorSlipSpeed_m_s = 0.70;
 inline constexpr double kMonitorSlipRate_1_s = 0.15;  // chosen: beyond the request's own
 inline constexpr double kMonitorPower_W = 250.0;      // chosen
@@ -68,9 +69,11 @@ inline constexpr double kGateFramePeriod_s = 0.016;
 
 inline constexpr double kGateStartShare = 0.80;  // chosen: below the monitor's, above 1 / 1.3
 
-static_assert(kRequestSlip < kMonitorSlipDebounced && kMonitorSlipDebounced < kMonitorSlip &&
-              kMonitorSlip < kPromisedSlip);
-static_assert(kRequestSlipRateFrom < kRequestSlip && kRequestSlipBeyond < kRequestSlip);
+static_assert(kRequestSlip_share < kMonitorSlipDebounced_share &&
+              kMonitorSlipDebounced_share < kMonitorSlip_share &&
+              kMonitorSlip_share < kPromisedSlip_share);
+static_assert(kRequestSlipRateFrom_share < kRequestSlip_share &&
+              kRequestSlipBeyond_share < kRequestSlip_share);
 static_assert(kRequestSlipRate_1_s < kMonitorSlipRate_1_s);
 static_assert(kRequestFast_m_s < kMonitorSlipSpeed_m_s);
 static_assert(kMonitorSlipSpeed_m_s < kPromisedSlipSpeed_m_s);

@@ -17,8 +17,8 @@ constexpr double kPedalMoved =
 constexpr double kOilBand_K =
     1.0;  // chosen: in an experiment, below what it may begin with; oil cools slower
 constexpr double kKnownMargin = 1.05;  // the belt may have run in since its last value
-constexpr double kPeakSlipOverdrive = 0.020;
-constexpr double kPeakSlipLow = 0.035;
+constexpr double kPeakSlipOverdrive_share = 0.020;
+constexpr double kPeakSlipLow_share = 0.035;
 // What a fifth more or less of these numbers changes has not been measured.
 // Chosen: a belt of which nothing is known may have as little friction; more of it refuses fewer.
 constexpr double kLeastFriction = 0.085;
@@ -157,8 +157,8 @@ Stop Arming::ended_by(const Conditions& now) const noexcept {
 bool Arming::steady(const Now& now) const noexcept {
   const double ratio = now.omega_s_rad_s / now.omega_p_rad_s;
   return std::abs(ratio / ratio_since_ - 1.0) <= kRatioDrift &&
-         std::abs(now.torque_Nm - torque_since_) <=
-             kTorqueDrift * std::abs(torque_since_) + kTorqueDrift_Nm;
+         std::abs(now.torque_Nm - torque_since_Nm_) <=
+             kTorqueDrift * std::abs(torque_since_Nm_) + kTorqueDrift_Nm;
 }
 
 void Arming::look(const Now& now) noexcept {
@@ -211,7 +211,7 @@ RampPoint Arming::point_at(const Now& now, double omega_p_rad_s) const noexcept 
   point.mu_expected = known ? kKnownMargin * now.mu_max_known : settings_.friction_expected;
   point.mu_least = known ? kKnownLeast * now.mu_max_known
                          : std::min(kLeastFriction, settings_.friction_expected);
-  point.peak_slip = low ? kPeakSlipLow : kPeakSlipOverdrive;
+  point.peak_slip_share = low ? kPeakSlipLow_share : kPeakSlipOverdrive_share;
   const double fall_max = kPercent * settings_.fall_max_per_percent;
   point.fall = within(now.shown.fall, fall_max);
   point.fall_at_fault = within(now.shown.fall, kFaultShare * fall_max);
@@ -266,7 +266,7 @@ double Arming::reached_below_rad_s(const RampPoint& point, double ratio) const n
 // Of the primary, since the trigger held.
 double Arming::slowing_rad_s2(const Now& now) const noexcept {
   const double held_s = seconds(now.t - held_since_);
-  return held_s > 0.0 ? std::max(0.0, (omega_p_since_ - now.omega_p_rad_s) / held_s) : 0.0;
+  return held_s > 0.0 ? std::max(0.0, (omega_p_since_rad_s_ - now.omega_p_rad_s) / held_s) : 0.0;
 }
 
 std::uint32_t Arming::clearance(const Now& now) noexcept {
@@ -279,9 +279,10 @@ std::uint32_t Arming::clearance(const Now& now) noexcept {
   const double needed_s = ramp_s(point, planned_1_s, rate_max_N_per_s_) + kBeyondPeak_s;
   const double patience_s = seconds(kPatience);
   const bool slows = slowing * patience_s > (1.0 - kFurther) * now.omega_p_rad_s;
-  const bool waits = slows && needed_s + kSpare_s < left_s &&
-                     (later_.crossing().peak_slip_told > crossing.peak_slip_told + kRoomGained ||
-                      reachable_mu(point) < point.mu_expected);
+  const bool waits =
+      slows && needed_s + kSpare_s < left_s &&
+      (later_.crossing().peak_slip_told_share > crossing.peak_slip_told_share + kRoomGained ||
+       reachable_mu(point) < point.mu_expected);
   if (waits) return inhibit_bit(Inhibit::kWait);
   if (crossing.slip_rate_1_s <= 0.0) {
     const CrossingDenied& denied = search_.denied();
@@ -364,8 +365,8 @@ void Arming::step(const Now& now) noexcept {
     held_ = true;
     held_since_ = now.t;
     ratio_since_ = now.omega_s_rad_s / now.omega_p_rad_s;
-    torque_since_ = now.torque_Nm;
-    omega_p_since_ = now.omega_p_rad_s;
+    torque_since_Nm_ = now.torque_Nm;
+    omega_p_since_rad_s_ = now.omega_p_rad_s;
     unclear_ = 0;
     looked_ = cleared_ = false;
     search_ = later_ = refused_ = {};

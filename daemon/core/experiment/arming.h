@@ -211,8 +211,8 @@ class Arming {
   MonoTime held_since_;
   MonoTime next_look_;
   double ratio_since_ = 0.0;
-  double torque_since_ = 0.0;
-  double omega_p_since_ = 0.0;
+  double torque_since_Nm_ = 0.0;
+  double omega_p_since_rad_s_ = 0.0;
   double slip_percent_ = 0.0;
   double slip_samples_ = 0.0;
   SlipCourse slip_course_;  // for its noise

@@ -11,7 +11,7 @@ using estimator::StopReason;
 namespace {
 constexpr double kPercent = 100.0;
 // What the slip since the start leaves out: slip at the start, and the deformation that is gone.
-constexpr double kSlipAtStart = 0.01;
+constexpr double kSlipAtStart_share = 0.01;
 // And of a late peak more: at 57 % of its friction a belt has come 28 % of the way in slip.
 constexpr double kStartShare = 0.3;
 constexpr double kNearPeak = 0.85;  // of the largest friction expected
@@ -29,9 +29,10 @@ constexpr double kFloorPatience_s = 1.0;
 constexpr double kFloorFalls_N_per_s = 10.0;
 constexpr Duration kReleaseMinimum = 300 * kMillisecond;
 constexpr Duration kSlipAfter =
-    200 * kMillisecond;              // averages noise, forgets macro slip before kReleaseTime
-constexpr double kSlipTold = 0.003;  // slip at the end of a request that shows whether it goes back
-constexpr double kSlipGone = 0.5;    // of it: then the force is back
+    200 * kMillisecond;  // averages noise, forgets macro slip before kReleaseTime
+// Slip at the end of a request that shows whether it goes back; and of it, then the force is back.
+constexpr double kSlipTold_share = 0.003;
+constexpr double kSlipGone = 0.5;
 constexpr double kUntrueShare = 0.5;    // of the ratio's drift that another node's speed tells too
 constexpr double kStuckForce = 1.1;     // of the last request
 constexpr double kStuckFriction = 0.8;  // of the friction expected: the belt is near its peak
@@ -79,16 +80,17 @@ void ClampRequest::begin(const Now& now, const RequestPlan& plan, double floor_N
 }
 
 double ClampRequest::power_W(const Now& now) const noexcept {
-  return (std::max(0.0, slip_.slip()) + kSlipAtStart) * std::abs(now.torque_Nm) * now.omega_p_rad_s;
+  return (std::max(0.0, slip_.slip_share()) + kSlipAtStart_share) * std::abs(now.torque_Nm) *
+         now.omega_p_rad_s;
 }
 
 void ClampRequest::follow_belt(const Now& now) noexcept {
   slip_.step(now.t, now.omega_s_rad_s / now.omega_p_rad_s);
   damage_.step({.t = now.t,
-                .slip = slip_.slip(),
+                .slip_share = slip_.slip_share(),
                 .mu_star = std::abs(now.mu_star),
                 .power_W = power_W(now),
-                .slip_speed_m_s = slip_.slip() * now.omega_p_rad_s * plan_.primary_radius_m,
+                .slip_speed_m_s = slip_.slip_share() * now.omega_p_rad_s * plan_.primary_radius_m,
                 .grows = rides_ || slip_.rate_1_s() > kSlipGrows_1_s});
   proof_.step({.t = now.t,
                .asked_N = force_N_,
@@ -104,26 +106,27 @@ void ClampRequest::hold(MonoTime t) noexcept {
 }
 
 Stop ClampRequest::judge_slip(const Now&) const noexcept {
-  const double slip = slip_.slip(), rate_1_s = slip_.rate_1_s();
-  const double beyond = slip - damage_.slip_at_best();
+  const double slip_share = slip_.slip_share(), rate_1_s = slip_.rate_1_s();
+  const double beyond = slip_share - damage_.slip_at_best_share();
   const auto too_much = [](const char* what, StopReason reason, double figure, double limit,
                            const char* unit) {
     return Stop{
         reason,
         {.what = what, .figure = kPercent * figure, .limit = kPercent * limit, .unit = unit}};
   };
-  if (slip > limits::kRequestSlip) {
-    return too_much("slip since the start", StopReason::kSlip, slip, limits::kRequestSlip, "%");
+  if (slip_share > limits::kRequestSlip_share) {
+    return too_much("slip since the start", StopReason::kSlip, slip_share,
+                    limits::kRequestSlip_share, "%");
   }
-  if (damage_.beyond() && beyond > limits::kRequestSlipBeyond) {
+  if (damage_.beyond() && beyond > limits::kRequestSlipBeyond_share) {
     return too_much("slip since friction rose last", StopReason::kSlip, beyond,
-                    limits::kRequestSlipBeyond, "%");
+                    limits::kRequestSlipBeyond_share, "%");
   }
   const double held_1_s =
       law_.slip_rate_1_s + std::max(kRateLeast_1_s, kRateDeviations * slip_.rate_deviation_1_s());
   const double most_1_s = damage_.beyond() ? std::min(held_1_s, limits::kRequestSlipRate_1_s)
                                            : limits::kRequestSlipRate_1_s;
-  if (slip > limits::kRequestSlipRateFrom && rate_1_s > most_1_s) {
+  if (slip_share > limits::kRequestSlipRateFrom_share && rate_1_s > most_1_s) {
     return too_much("slip grows by", StopReason::kSlipRate, rate_1_s, most_1_s, "%/s");
   }
   return {};
@@ -152,14 +155,15 @@ Stop ClampRequest::judge_damage(const Now& now) const noexcept {
 }
 
 Stop ClampRequest::judge_room(const Now& now) const noexcept {
-  const double room = peak_slip_max(plan_.crossing, SlipLimits{}, std::abs(now.torque_Nm),
-                                    now.omega_p_rad_s, plan_.primary_radius_m);
-  const double slip =
-      slip_.slip() + std::max(kSlipAtStart, kStartShare * std::max(0.0, slip_.slip()));
-  if (slip > room) {
+  const double room = peak_slip_max_share(plan_.crossing, SlipLimits{}, std::abs(now.torque_Nm),
+                                          now.omega_p_rad_s, plan_.primary_radius_m);
+  const double slip_share =
+      slip_.slip_share() +
+      std::max(kSlipAtStart_share, kStartShare * std::max(0.0, slip_.slip_share()));
+  if (slip_share > room) {
     return {StopReason::kRoom,
             {.what = "a peak could no longer be crossed, slip",
-             .figure = kPercent * slip,
+             .figure = kPercent * slip_share,
              .limit = kPercent * room,
              .unit = "%"}};
   }
@@ -375,7 +379,7 @@ bool ClampRequest::changed_since(MonoTime t) const noexcept {
 }
 
 void ClampRequest::end(MonoTime t) noexcept {
-  if (standing_) slip_after_ = slip_.slip();
+  if (standing_) slip_after_share_ = slip_.slip_share();
   standing_ = false;
   ended_ = t;
   rest_s_ = rest_m_ = 0.0;
@@ -389,15 +393,15 @@ bool ClampRequest::released(const Now& now) const noexcept {
 }
 
 void ClampRequest::follow_release(const Now& now) noexcept {
-  const double slip = slip_.slip_at(now.omega_s_rad_s / now.omega_p_rad_s);
+  const double slip_share = slip_.slip_share_at(now.omega_s_rad_s / now.omega_p_rad_s);
   const double share = std::min(1.0, fraction(now.t - last_, kSlipAfter));
-  slip_after_ += share * (slip - slip_after_);
+  slip_after_share_ += share * (slip_share - slip_after_share_);
   last_ = now.t;
 }
 
 std::optional<bool> ClampRequest::held_again() const noexcept {
-  if (slip_.slip() < kSlipTold) return std::nullopt;
-  return slip_after_ < kSlipGone * slip_.slip();
+  if (slip_.slip_share() < kSlipTold_share) return std::nullopt;
+  return slip_after_share_ < kSlipGone * slip_.slip_share();
 }
 
 bool ClampRequest::stuck(const Now& now) const noexcept {

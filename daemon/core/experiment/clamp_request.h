@@ -3,8 +3,8 @@
 // the cool-down. SI. Real-time thread; no allocation.
 //
 // Stops while a request stands (strict):
-//   Slip         since the start more than kRequestSlip, or kRequestSlipBeyond more than where
-//                friction was largest
+//   Slip         since the start more than kRequestSlip_share, or kRequestSlipBeyond_share more
+//                than where friction was largest
 //   SlipRate     it grows faster than the ramp holds it, beyond its noise, while friction does not
 //                rise; or faster than kRequestSlipRate_1_s
 //   SlipEnergy   beyond the peak, as slip_damage has it: energy with what is still to come, power,
@@ -94,7 +94,7 @@ class ClampRequest {
   // The force asked for has changed since then by as much as counts as not followed.
   bool changed_since(MonoTime t) const noexcept;
   // The largest slip since the start, of the request that stands or was the last.
-  double slip_max() const noexcept { return slip_.slip_max(); }
+  double slip_max_share() const noexcept { return slip_.slip_max_share(); }
 
   // After the end.
   bool released(const Now& now) const noexcept;
@@ -176,7 +176,7 @@ class ClampRequest {
   std::size_t asked_count_ = 0;
   double recent_least_N_per_s_ = 0.0;
   MonoTime recent_until_;
-  double slip_after_ = 0.0;  // mean of the last kSlipAfter
+  double slip_after_share_ = 0.0;  // mean of the last kSlipAfter
 };
 
 }  // namespace beltgrip::daemon

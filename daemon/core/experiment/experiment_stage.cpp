@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kAnswerLags = 3.0;       // of the actuator: then its pressure has answered
 constexpr double kSlipped_percent = 1.5;  // more than deformation and a drift of the ratio explain
-constexpr double kSlipOfAPeak = 0.007;    // since the start: less of it has passed no peak
+constexpr double kSlipOfAPeak_share = 0.007;  // since the start: less of it has passed no peak
 
 bool in_experiment(State state) noexcept {
   return state == State::kRamping || state == State::kEvaluating || state == State::kReleasing;
@@ -550,7 +550,7 @@ EndedExperiment ExperimentStage::ended() const noexcept {
   ended.end_stop = running_.end_stop;
   ended.duration = running_.end - running_.start;
   ended.ramped = !refused_;
-  ended.passed_a_peak = !commands() || !(request_.slip_max() < kSlipOfAPeak);
+  ended.passed_a_peak = !commands() || !(request_.slip_max_share() < kSlipOfAPeak_share);
   ended.ended_by_slip = stopped_by_slip();
   ended.may_have_slipped = running_.stopped && reason == StopReason::kInputs &&
                            running_.sigma_stop_percent - sigma_first_percent_ > kSlipped_percent;

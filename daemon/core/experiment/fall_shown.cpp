@@ -46,13 +46,13 @@ void LastPoints::show(double peak_slip_percent, FallShown& to) const noexcept {
   double n = 0.0, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0, yy = 0.0;
   for (std::size_t i = 0; i < count_; ++i) {
     const Point& each = points_[i];
-    const double slip = (each.slip_percent - peak_slip_percent) / kPercent;
-    if (!(slip > 0.0)) continue;
+    const double beyond_share = (each.slip_percent - peak_slip_percent) / kPercent;
+    if (!(beyond_share > 0.0)) continue;
     n += 1.0;
-    x += slip;
+    x += beyond_share;
     y += each.mu_star;
-    xx += slip * slip;
-    xy += slip * each.mu_star;
+    xx += beyond_share * beyond_share;
+    xy += beyond_share * each.mu_star;
     yy += each.mu_star * each.mu_star;
   }
   if (n < static_cast<double>(kPointsLeast)) return;

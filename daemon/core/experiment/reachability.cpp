@@ -14,8 +14,8 @@ namespace {
 // reach; with 3 %/s beside them from 109, and one break of G1.
 constexpr std::array kSlipRates_1_s{0.025, 0.02};
 // A steep fall is seen early, a flat top late.
-constexpr double kSlipToSeeSteep = 0.003;
-constexpr double kSlipToSeeFlat = 0.008;
+constexpr double kSlipToSeeSteep_share = 0.003;
+constexpr double kSlipToSeeFlat_share = 0.008;
 // Measured: of the noise of the slip rate. With 4 %/s a fall of 4e-3 to 8e-3 per percent was told
 // 0.8 points behind the peak, and decided on 0.3 later (campaign seeds 920085, 922504).
 constexpr double kSlipToSee_s = 0.2;
@@ -42,13 +42,13 @@ class Recovery {
     d_ = w * g / (a + 1.0 / lag_s);
     c_ = x1 + w * (y1 - g) / a + d_;
   }
-  double slip(double t) const noexcept {
+  double slip_share(double t) const noexcept {
     return x1_ + c_ * std::expm1(a_ * t) - d_ * std::expm1(-t / lag_s_);
   }
   double slope(double t) const noexcept {
     const double answered = std::expm1(-t / lag_s_);
-    const double slip = x1_ + c_ * std::expm1(a_ * t) - d_ * answered;
-    return a_ * slip + w_ * (y1_ + g_ * answered);
+    const double slip_share = x1_ + c_ * std::expm1(a_ * t) - d_ * answered;
+    return a_ * slip_share + w_ * (y1_ + g_ * answered);
   }
   // The integral of the slip up to t.
   double area_s(double t) const noexcept {
@@ -72,8 +72,8 @@ double last_positive(Function f, double low, double high) noexcept {
 }
 
 Excursion larger(const Excursion& a, const Excursion& b) noexcept {
-  return {std::max(a.slip, b.slip), std::max(a.time_s, b.time_s), std::max(a.area_s, b.area_s),
-          std::max(a.late_s, b.late_s)};
+  return {std::max(a.slip_share, b.slip_share), std::max(a.time_s, b.time_s),
+          std::max(a.area_s, b.area_s), std::max(a.late_s, b.late_s)};
 }
 
 double runaway_1_s(const RampPoint& point) noexcept {
@@ -96,12 +96,12 @@ double ramp_at_the_top_N_per_s(const RampPoint& point, double answer_s,
 }
 
 Excursion excursion(const RampPoint& point, const Reaction& reaction, double slip_rate_1_s,
-                    double fall, double slip_to_see, double reaction_s) noexcept {
+                    double fall, double slip_to_see_share, double reaction_s) noexcept {
   const double w = runaway_1_s(point);
   const double a = w * fall / point.mu_least;
   const double lag_s = std::max(reaction.lag_s, 1e-3);
   const double y1 = slip_rate_1_s / w;
-  const double seen_s = std::log1p(a * slip_to_see / slip_rate_1_s) / a;
+  const double seen_s = std::log1p(a * slip_to_see_share / slip_rate_1_s) / a;
   const double told_s = seen_s + reaction.detection_s + reaction_s + reaction.dead_time_s;
   const double x1 = slip_rate_1_s / a * std::expm1(a * told_s);
   const double force_N = peak_force_N(point, point.mu_least);
@@ -112,25 +112,26 @@ Excursion excursion(const RampPoint& point, const Reaction& reaction, double sli
   if (recovery.slope(horizon_s) > 0.0) return {kNotCaught, kNotCaught, kNotCaught};
   const double top_s = last_positive([&](double t) { return recovery.slope(t); }, 0.0, horizon_s);
   Excursion out;
-  out.slip = std::max(x1, recovery.slip(top_s));
+  out.slip_share = std::max(x1, recovery.slip_share(top_s));
   // Back below the peak's slip.
-  const double end_s = last_positive([&](double t) { return recovery.slip(t); }, top_s, horizon_s);
+  const double end_s =
+      last_positive([&](double t) { return recovery.slip_share(t); }, top_s, horizon_s);
   out.time_s = told_s + end_s;
   out.area_s = (x1 - slip_rate_1_s * told_s) / a + recovery.area_s(end_s);
   out.late_s = std::max(0.0, reaction_s + end_s - lag_s);
   return out;
 }
 
-double peak_slip_max(const Crossing& crossing, const SlipLimits& limits, double torque_Nm,
-                     double omega_p_rad_s, double primary_radius_m) noexcept {
-  const double slip =
-      std::min(limits.slip_max, limits.slip_speed_max_m_s / (omega_p_rad_s * primary_radius_m));
+double peak_slip_max_share(const Crossing& crossing, const SlipLimits& limits, double torque_Nm,
+                           double omega_p_rad_s, double primary_radius_m) noexcept {
+  const double slip_share = std::min(
+      limits.slip_max_share, limits.slip_speed_max_m_s / (omega_p_rad_s * primary_radius_m));
   const double turn_W = std::max(1.0, torque_Nm * omega_p_rad_s);  // of a whole turn of slip
   const Excursion& cost = crossing.dearest;
   const double by_fall = (limits.energy_max_J / turn_W - cost.area_s) / cost.time_s;
   const double by_stop =
-      (limits.energy_max_J - limits.energy_stop_J) / (turn_W * cost.late_s) - cost.slip;
-  return std::min(slip - cost.slip, std::min(by_fall, by_stop));
+      (limits.energy_max_J - limits.energy_stop_J) / (turn_W * cost.late_s) - cost.slip_share;
+  return std::min(slip_share - cost.slip_share, std::min(by_fall, by_stop));
 }
 
 CrossingSearch::CrossingSearch(const RampPoint& point, const Reaction& reaction,
@@ -141,10 +142,11 @@ Excursion CrossingSearch::excursion_at(double slip_rate_1_s, Corner corner,
                                        double fall_share) const noexcept {
   const double silence_s = corner.fault ? std::max(reaction_.stale_s, reaction_.timeout_s) : 0.0;
   const double steepest = corner.fault ? point_.fall_at_fault : point_.fall;
-  const double to_see_steep = std::max(kSlipToSeeSteep, kSlipToSee_s * point_.slip_rate_noise_1_s);
-  return excursion(point_, reaction_, slip_rate_1_s,
-                   corner.steep ? fall_share * steepest : kFlatFall,
-                   corner.steep ? to_see_steep : kSlipToSeeFlat, silence_s + reaction_.cycle_s);
+  const double to_see_steep =
+      std::max(kSlipToSeeSteep_share, kSlipToSee_s * point_.slip_rate_noise_1_s);
+  return excursion(
+      point_, reaction_, slip_rate_1_s, corner.steep ? fall_share * steepest : kFlatFall,
+      corner.steep ? to_see_steep : kSlipToSeeFlat_share, silence_s + reaction_.cycle_s);
 }
 
 bool CrossingSearch::step() noexcept {
@@ -165,23 +167,24 @@ void CrossingSearch::try_corner() noexcept {
   const std::size_t at = tried_++ % kCorners;
   const Corner corner{.steep = at % 2 == 0, .fault = at >= 2};
   const Excursion all = excursion_at(rate_1_s, corner, 1.0);
-  const Excursion cost = corner.steep ? Excursion{all.slip, all.time_s, all.area_s, 0.0}
-                                      : Excursion{all.slip, 0.0, 0.0, all.late_s};
+  const Excursion cost = corner.steep ? Excursion{all.slip_share, all.time_s, all.area_s, 0.0}
+                                      : Excursion{all.slip_share, 0.0, 0.0, all.late_s};
   if (at == 0) tries_ = {};
   tries_.dearest = larger(tries_.dearest, cost);
   if (at + 1 < kCorners) return;
   tries_.slip_rate_1_s = rate_1_s;
-  tries_.peak_slip_max = peak_slip_max(tries_, limits_, point_.torque_Nm, point_.omega_p_rad_s,
-                                       point_.primary_radius_m);
+  tries_.peak_slip_max_share = peak_slip_max_share(tries_, limits_, point_.torque_Nm,
+                                                   point_.omega_p_rad_s, point_.primary_radius_m);
   tries_.ramp_top_N_per_s =
       ramp_at_the_top_N_per_s(point_, reaction_.dead_time_s + reaction_.lag_s, rate_1_s);
-  const double told_s =
-      kSlipToSeeFlat / rate_1_s + reaction_.detection_s + reaction_.dead_time_s + reaction_.lag_s;
-  tries_.peak_slip_told = std::min(
-      tries_.peak_slip_max,
+  const double told_s = kSlipToSeeFlat_share / rate_1_s + reaction_.detection_s +
+                        reaction_.dead_time_s + reaction_.lag_s;
+  tries_.peak_slip_told_share = std::min(
+      tries_.peak_slip_max_share,
       limits_.energy_stop_J / (std::max(1.0, point_.torque_Nm * point_.omega_p_rad_s) * told_s));
-  if (tries_.dearest.slip < kExcursionMost && tries_.peak_slip_max > point_.peak_slip &&
-      tries_.peak_slip_told > crossing_.peak_slip_told) {
+  if (tries_.dearest.slip_share < kExcursionMost &&
+      tries_.peak_slip_max_share > point_.peak_slip_share &&
+      tries_.peak_slip_told_share > crossing_.peak_slip_told_share) {
     crossing_ = tries_;
   }
 }
@@ -189,21 +192,21 @@ void CrossingSearch::try_corner() noexcept {
 // By the last rate, the slowest: it runs on least.
 void CrossingSearch::deny() noexcept {
   const Excursion& cost = tries_.dearest;
-  if (cost.slip >= kExcursionMost) {
+  if (cost.slip_share >= kExcursionMost) {
     denied_ = {CrossingWall::kFall, 0.0, point_.fall};
     return;
   }
-  const double slip_most =
-      std::min(limits_.slip_max,
+  const double slip_most_share =
+      std::min(limits_.slip_max_share,
                limits_.slip_speed_max_m_s / (point_.omega_p_rad_s * point_.primary_radius_m));
-  if (slip_most - cost.slip <= point_.peak_slip) {
-    denied_ = {CrossingWall::kSlip, slip_most - cost.slip, point_.peak_slip};
+  if (slip_most_share - cost.slip_share <= point_.peak_slip_share) {
+    denied_ = {CrossingWall::kSlip, slip_most_share - cost.slip_share, point_.peak_slip_share};
     return;
   }
   const double turn_W = point_.torque_Nm * point_.omega_p_rad_s;
-  const double fall_J = (point_.peak_slip * cost.time_s + cost.area_s) * turn_W;
+  const double fall_J = (point_.peak_slip_share * cost.time_s + cost.area_s) * turn_W;
   const double flat_J =
-      limits_.energy_stop_J + (point_.peak_slip + cost.slip) * cost.late_s * turn_W;
+      limits_.energy_stop_J + (point_.peak_slip_share + cost.slip_share) * cost.late_s * turn_W;
   denied_ = {CrossingWall::kEnergy, std::max(fall_J, flat_J), limits_.energy_max_J};
 }
 
@@ -212,7 +215,7 @@ void CrossingSearch::tell() noexcept {
   if (told()) return;
   const double share = 0.5 * (survived_ + lost_);
   const Excursion all = excursion_at(kSlipRates_1_s.back(), {.fault = fault_next_}, share);
-  const bool survives = all.slip < kExcursionMost;
+  const bool survives = all.slip_share < kExcursionMost;
   if (survives && !fault_next_) {
     fault_next_ = true;
     return;

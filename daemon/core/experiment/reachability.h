@@ -25,7 +25,7 @@ namespace beltgrip::daemon {
 
 // What an experiment may do at most (promise G1).
 struct SlipLimits {
-  double slip_max = 0.10;  // ever
+  double slip_max_share = 0.10;  // ever
   double slip_speed_max_m_s = 0.8;
   double energy_max_J = 90.0;  // dissipated beyond the peak; 100 less what a model may be off
   double energy_stop_J = limits::kRequestEnergy_J;  // there the request ends itself
@@ -47,12 +47,12 @@ struct RampPoint {
   double omega_p_rad_s = 0.0;
   double primary_radius_m = 0.0;
   double wedge_cosine = 1.0;
-  double inertia_kg_m2 = 0.0;  // of the side that can run away
-  double own_force_N = 0.0;    // before the request
-  double floor_N = 0.0;        // the clamp goes no lower
-  double mu_expected = 0.0;    // of the peak, at the most
-  double mu_least = 0.0;       // of the peak, at the least: the own force then holds it least
-  double peak_slip = 0.0;      // where it is expected at the latest
+  double inertia_kg_m2 = 0.0;    // of the side that can run away
+  double own_force_N = 0.0;      // before the request
+  double floor_N = 0.0;          // the clamp goes no lower
+  double mu_expected = 0.0;      // of the peak, at the most
+  double mu_least = 0.0;         // of the peak, at the least: the own force then holds it least
+  double peak_slip_share = 0.0;  // where it is expected at the latest
   // Of mu beyond the peak, at the steepest, per unit of slip: where nothing goes wrong, and with
   // the worst single fault beside it.
   double fall = 0.0;
@@ -69,16 +69,16 @@ double ramp_at_the_top_N_per_s(const RampPoint& point, double answer_s,
                                double slip_rate_1_s) noexcept;
 
 struct Excursion {
-  double slip = 0.0;    // the largest beyond the peak
-  double time_s = 0.0;  // spent beyond the peak
-  double area_s = 0.0;  // integral of the slip beyond the peak over that time
-  double late_s = 0.0;  // of that time, after the decision and the actuator's own answer
+  double slip_share = 0.0;  // the largest beyond the peak
+  double time_s = 0.0;      // spent beyond the peak
+  double area_s = 0.0;      // integral of the slip beyond the peak over that time
+  double late_s = 0.0;      // of that time, after the decision and the actuator's own answer
 };
 // What becomes of the slip when the belt passes its peak at this slip rate, friction falls by
-// `fall` behind it, the estimator needs detection_s after slip_to_see beyond the peak, and
+// `fall` behind it, the estimator needs detection_s after slip_to_see_share beyond the peak, and
 // reaction_s passes before the actuator is told. Not caught: all 1e9.
 Excursion excursion(const RampPoint& point, const Reaction& reaction, double slip_rate_1_s,
-                    double fall, double slip_to_see, double reaction_s) noexcept;
+                    double fall, double slip_to_see_share, double reaction_s) noexcept;
 
 // How the belt is to be brought over its peak.
 struct Crossing {
@@ -89,13 +89,13 @@ struct Crossing {
   // this time + this area) T omega, and (slip + this slip) * this late_s T omega beyond the energy
   // of the request's own stop, are inside the limits.
   Excursion dearest;
-  double peak_slip_max = 0.0;  // the latest peak with room, at its point
+  double peak_slip_max_share = 0.0;  // the latest peak with room, at its point
   // And the latest whose flat top can be told before the request ends itself for its energy.
-  double peak_slip_told = 0.0;
+  double peak_slip_told_share = 0.0;
 };
 // The latest peak that this crossing has room for, where the shaft has this speed.
-double peak_slip_max(const Crossing& crossing, const SlipLimits& limits, double torque_Nm,
-                     double omega_p_rad_s, double primary_radius_m) noexcept;
+double peak_slip_max_share(const Crossing& crossing, const SlipLimits& limits, double torque_Nm,
+                           double omega_p_rad_s, double primary_radius_m) noexcept;
 
 // What stands in the way of every crossing; the figure and what it would have to be.
 enum class CrossingWall : std::uint8_t {

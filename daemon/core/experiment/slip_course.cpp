@@ -17,16 +17,16 @@ void SlipCourse::begin(double ratio, double torque_Nm) noexcept {
   start_ratio_ = ratio;
   direction_ = -std::copysign(1.0, torque_Nm);
   count_ = 0;
-  slip_ = slip_max_ = rate_1_s_ = square_ = squares_ = 0.0;
+  slip_share_ = slip_max_share_ = rate_1_s_ = square_ = squares_ = 0.0;
 }
 
-double SlipCourse::slip_at(double ratio) const noexcept {
+double SlipCourse::slip_share_at(double ratio) const noexcept {
   return direction_ * (ratio / start_ratio_ - 1.0);
 }
 
 void SlipCourse::step(MonoTime t, double ratio) noexcept {
   Point& newest = points_[count_++ % kPoints];
-  newest = {t, slip_at(ratio), 0.0};
+  newest = {t, slip_share_at(ratio), 0.0};
   double recent = 0.0, recent_n = 0.0, oldest_s = 0.0;
   double n = 0.0, sum_t = 0.0, sum_x = 0.0, sum_tt = 0.0, sum_tx = 0.0;
   const std::size_t points = std::min(count_, kPoints);
@@ -36,19 +36,19 @@ void SlipCourse::step(MonoTime t, double ratio) noexcept {
     const Duration before = t - each.t;
     if (before > kRateOver) break;
     const double at_s = -seconds(before);
-    const double slip = each.slip;
+    const double slip_share = each.slip_share;
     oldest_s = at_s;
     n += 1.0;
     sum_t += at_s;
-    sum_x += slip;
+    sum_x += slip_share;
     sum_tt += at_s * at_s;
-    sum_tx += at_s * slip;
+    sum_tx += at_s * slip_share;
     if (before > kSlipMean) continue;
-    recent += slip;
+    recent += slip_share;
     recent_n += 1.0;
   }
-  slip_ = recent / recent_n;
-  slip_max_ = std::max(slip_max_, slip_);
+  slip_share_ = recent / recent_n;
+  slip_max_share_ = std::max(slip_max_share_, slip_share_);
   const bool whole = -oldest_s > kWhole * seconds(kRateOver);
   rate_1_s_ = whole ? (n * sum_tx - sum_t * sum_x) / (n * sum_tt - sum_t * sum_t) : 0.0;
   newest.rate_1_s = rate_1_s_;

@@ -17,19 +17,19 @@ class SlipCourse {
   void begin(double ratio, double torque_Nm) noexcept;
   void step(MonoTime t, double ratio) noexcept;
 
-  double slip() const noexcept { return slip_; }  // mean of the last 15 ms
-  double slip_max() const noexcept { return slip_max_; }
+  double slip_share() const noexcept { return slip_share_; }  // mean of the last 15 ms
+  double slip_max_share() const noexcept { return slip_max_share_; }
   double rate_1_s() const noexcept { return rate_1_s_; }  // 0: not known yet
   // One standard deviation of rate_1_s(), from the scatter of rates that share no sample; infinite
   // until that is known.
   double rate_deviation_1_s() const noexcept;
   // Slip as it would be at this ratio.
-  double slip_at(double ratio) const noexcept;
+  double slip_share_at(double ratio) const noexcept;
 
  private:
   struct Point {
     MonoTime t = MonoTime::origin();
-    double slip = 0.0;
+    double slip_share = 0.0;
     double rate_1_s = 0.0;
   };
   static constexpr std::size_t kPoints = 128;  // kRateOver at 1000 Hz, and more
@@ -42,8 +42,8 @@ class SlipCourse {
   std::size_t count_ = 0;
   double start_ratio_ = 1.0;
   double direction_ = 1.0;
-  double slip_ = 0.0;
-  double slip_max_ = 0.0;
+  double slip_share_ = 0.0;
+  double slip_max_share_ = 0.0;
   double rate_1_s_ = 0.0;
   double square_ = 0.0;  // mean square of the change of rate from one window to the next
   double squares_ = 0.0;

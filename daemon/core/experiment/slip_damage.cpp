@@ -28,7 +28,7 @@ void SlipDamage::step(const Now& now) noexcept {
     // One such rise may be noise, on a top that lies level.
     const double kept = std::max(0.0, 1.0 - (mu_mean_ / mu_best_ - 1.0) / kForgets);
     mu_best_ = mu_mean_;
-    slip_at_best_ = now.slip;
+    slip_at_best_share_ = now.slip_share;
     beyond_s_ = 0.0;
     fast_s_ *= kept;
     energy_J_ *= kept;

@@ -12,7 +12,7 @@ class SlipDamage {
  public:
   struct Now {
     MonoTime t = MonoTime::origin();
-    double slip = 0.0;
+    double slip_share = 0.0;
     double mu_star = 0.0;  // magnitude
     double power_W = 0.0;  // |T| omega_p slip
     double slip_speed_m_s = 0.0;
@@ -26,13 +26,13 @@ class SlipDamage {
   // And what is not forgotten of before.
   double energy_J() const noexcept { return energy_J_; }
   double fast_s() const noexcept { return fast_s_; }  // faster than kRequestFast_m_s
-  double slip_at_best() const noexcept { return slip_at_best_; }
+  double slip_at_best_share() const noexcept { return slip_at_best_share_; }
 
  private:
   MonoTime last_;
   double mu_first_ = 0.0, mu_mean_ = 0.0;  // a lag behind another
   double mu_best_ = 0.0;
-  double slip_at_best_ = 0.0;
+  double slip_at_best_share_ = 0.0;
   double beyond_s_ = 0.0;
   double fast_s_ = 0.0;
   double energy_J_ = 0.0;

@@ -75,7 +75,7 @@ SafetyVerdict SafetyMonitor::judge(MonoTime t, const SafetySignals& signals,
     begun_ = t;
     reference_ratio_ = signals.omega_s_rad_s / signals.omega_p_rad_s;
     first_request_N_ = last_request_N_ = request_N;
-    near_sum_ = near_mean_ = slip_mean_ = slip_rate_1_s_ = 0.0;
+    near_sum_ = near_mean_ = slip_mean_share_ = slip_rate_1_s_ = 0.0;
     near_count_ = 0.0;
     beyond_since_ = engine_beyond_since_ = power_since_ = kNever;
     reference_engine_ = signals.omega_e_rad_s / signals.omega_p_rad_s;
@@ -91,11 +91,12 @@ bool SafetyMonitor::slips_near_own_force(MonoTime t, double ratio, double reques
     near_count_ += 1.0;
     return false;
   }
-  const double share = (1.0 - request_N / first_request_N_) / (1.0 - limits_.force_near);
+  const double share = (1.0 - request_N / first_request_N_) / (1.0 - limits_.force_near_share);
   if (share >= 1.0) return false;
   const double latest = std::min(1.0, fraction(t - last_, kNearMean));
   near_mean_ += latest * (ratio * near_count_ / near_sum_ - 1.0 - near_mean_);
-  const double most = limits_.slip_nearest + (limits_.slip_near - limits_.slip_nearest) * share;
+  const double most =
+      limits_.slip_nearest_share + (limits_.slip_near_share - limits_.slip_nearest_share) * share;
   if (std::abs(near_mean_) > most) beyond(SafetyVerdict::kSlip, std::abs(near_mean_), most);
   return std::abs(near_mean_) > most;
 }
@@ -104,11 +105,13 @@ SafetyVerdict SafetyMonitor::judge_motion(MonoTime t, const SafetySignals& signa
                                           double request_N) noexcept {
   const double drift =
       std::abs(signals.omega_s_rad_s / signals.omega_p_rad_s / reference_ratio_ - 1.0);
-  if (drift <= limits_.slip_debounced) beyond_since_ = kNever;
-  if (drift > limits_.slip_debounced && beyond_since_ == kNever) beyond_since_ = t;
-  if (drift > limits_.slip_max || (beyond_since_ != kNever && t - beyond_since_ >= kDebounce)) {
-    return beyond(SafetyVerdict::kSlip, drift,
-                  drift > limits_.slip_max ? limits_.slip_max : limits_.slip_debounced);
+  if (drift <= limits_.slip_debounced_share) beyond_since_ = kNever;
+  if (drift > limits_.slip_debounced_share && beyond_since_ == kNever) beyond_since_ = t;
+  if (drift > limits_.slip_max_share ||
+      (beyond_since_ != kNever && t - beyond_since_ >= kDebounce)) {
+    return beyond(
+        SafetyVerdict::kSlip, drift,
+        drift > limits_.slip_max_share ? limits_.slip_max_share : limits_.slip_debounced_share);
   }
   if (slips_near_own_force(t, signals.omega_s_rad_s / signals.omega_p_rad_s, request_N)) {
     return SafetyVerdict::kSlip;
@@ -141,9 +144,9 @@ SafetyVerdict SafetyMonitor::judge_motion(MonoTime t, const SafetySignals& signa
 // The rate of a lag that follows the drift, through another.
 bool SafetyMonitor::slips_away(MonoTime t, double drift) noexcept {
   const double share = std::min(1.0, seconds(t - last_) / kRateMean_s);
-  slip_rate_1_s_ += share * ((drift - slip_mean_) / kRateMean_s - slip_rate_1_s_);
-  slip_mean_ += share * (drift - slip_mean_);
-  return drift > limits_.slip_rate_from && slip_rate_1_s_ > limits_.slip_rate_max_1_s;
+  slip_rate_1_s_ += share * ((drift - slip_mean_share_) / kRateMean_s - slip_rate_1_s_);
+  slip_mean_share_ += share * (drift - slip_mean_share_);
+  return drift > limits_.slip_rate_from_share && slip_rate_1_s_ > limits_.slip_rate_max_1_s;
 }
 
 SafetyVerdict SafetyMonitor::judge_request(MonoTime t, double request_N, double floor_N) noexcept {

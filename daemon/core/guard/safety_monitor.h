@@ -5,15 +5,17 @@
 //
 // A request may stand while all of this holds (strict: the limit itself is still allowed):
 //   every input is there and fresh; both shafts turn, the primary at least at speed_min
-//   |drift of the speed ratio| <= slip_max at every sample, <= slip_debounced but for less than 10
-//   ms while the force asked for is above force_near of the first: |mean drift| of 40 ms, from
-//     the mean of the first 80 ms, <= slip_near, and less the nearer. A belt that slips there has
-//     less friction than was measured last, and the controller's own force, to which it returns,
-//     could not catch it beyond the peak
+//   |drift of the speed ratio| <= slip_max_share at every sample, <= slip_debounced_share but for
+//     less than 10 ms
+//   while the force asked for is above force_near_share of the first: |mean drift| of 40 ms, from
+//   the
+//     mean of the first 80 ms, <= slip_near_share, and less the nearer. A belt that slips there
+//     has less friction than was measured last, and the controller's own force, to which it
+//     returns, could not catch it beyond the peak
 //   slip speed <= slip_speed_max
 //   engine speed over primary speed within engine_drift of what it was, but for less than 25 ms:
 //   macro slip shows in both, speeds of the pulleys that are old or wrong do not
-//   |drift| grows no faster than slip_rate_max, smoothed over 40 ms, beyond slip_rate_from
+//   |drift| grows no faster than slip_rate_max, smoothed over 40 ms, beyond slip_rate_from_share
 //   power, |T| omega_p |drift|, <= power_max but for less than power_for: it cannot know where the
 //     peak of friction lies, and so not what slip beyond it costs
 //   the force asked for is >= floor, never rises, and falls no faster than rate_max
@@ -31,14 +33,14 @@
 namespace beltgrip::daemon {
 
 struct SafetyLimits {
-  double slip_max = limits::kMonitorSlip;
-  double slip_debounced = limits::kMonitorSlipDebounced;
-  double slip_near = 0.0048;
-  double slip_nearest = 0.0015;  // at the first force; in between along a line
-  double force_near = 0.84;
+  double slip_max_share = limits::kMonitorSlip_share;
+  double slip_debounced_share = limits::kMonitorSlipDebounced_share;
+  double slip_near_share = 0.0048;
+  double slip_nearest_share = 0.0015;  // at the first force; in between along a line
+  double force_near_share = 0.84;
   double slip_speed_max_m_s = limits::kMonitorSlipSpeed_m_s;
   double slip_rate_max_1_s = limits::kMonitorSlipRate_1_s;
-  double slip_rate_from = 0.02;
+  double slip_rate_from_share = 0.02;
   double power_max_W = limits::kMonitorPower_W;
   Duration power_for = limits::kMonitorPowerFor;
   double engine_drift = 0.025;
@@ -116,9 +118,9 @@ class SafetyMonitor {
   double first_request_N_ = 0.0;
   double last_request_N_ = 0.0;
   static constexpr MonoTime kNever = MonoTime::max();
-  MonoTime beyond_since_ = kNever;  // slip_debounced
+  MonoTime beyond_since_ = kNever;  // slip_debounced_share
   MonoTime power_since_ = kNever;
-  double slip_mean_ = 0.0, slip_rate_1_s_ = 0.0;
+  double slip_mean_share_ = 0.0, slip_rate_1_s_ = 0.0;
   double acting_N_ = 0.0;  // smoothed; 0: not known
   MonoTime acting_seen_;
   double near_count_ = 0.0;

@@ -227,18 +227,18 @@ TEST_P(BadFrame, ChangesNothing) {
   const Rig rig = {.friction = test::round_peak(0.105, 2.5)};
   const auto estimator = make_slip_curve_estimator(rig_settings(rig), {}, {});
   StopReason stop = StopReason::kNone;
-  double slip = 0.0;
+  double slip_percent = 0.0;
   for (auto& point : rig_trace(rig)) {
     const double t_s = static_cast<double>(point.sample.t_ns) * 1e-9;
     if (t_s > 20.0 && t_s < 20.02) GetParam().apply(point.sample);
     stop = estimator->step(point.sample).stop;
-    slip = point.slip_percent;
+    slip_percent = point.slip_percent;
     if (stop != StopReason::kNone) break;
   }
   for (int i = 0; i < 10000 && !estimator->conclude(); ++i) {
   }
   EXPECT_EQ(stop, GetParam().reason);
-  EXPECT_GT(slip, 2.4);
+  EXPECT_GT(slip_percent, 2.4);
   ASSERT_EQ(estimator->peak().kind, PeakKind::kValue);
   EXPECT_NEAR(estimator->peak().mu_max, 0.105, 0.0003);
 }

@@ -30,22 +30,22 @@ double rounded(double value, double quantum) {
 }  // namespace
 
 FrictionLaw tent(double mu_max, double peak_percent, double fall_per_percent) {
-  return [=](double slip) {
-    return slip < peak_percent
-               ? mu_max * slip / peak_percent
-               : std::max(0.5 * mu_max, mu_max - fall_per_percent * (slip - peak_percent));
+  return [=](double slip_percent) {
+    return slip_percent < peak_percent
+               ? mu_max * slip_percent / peak_percent
+               : std::max(0.5 * mu_max, mu_max - fall_per_percent * (slip_percent - peak_percent));
   };
 }
 
 FrictionLaw round_peak(double mu_max, double peak_percent) {
-  return [=](double slip) {
-    const double x = slip / peak_percent;
+  return [=](double slip_percent) {
+    const double x = slip_percent / peak_percent;
     return mu_max * 2.0 * x / (1.0 + x * x);
   };
 }
 
 FrictionLaw saturating(double limit, double half_percent) {
-  return [=](double slip) { return limit * slip / (slip + half_percent); };
+  return [=](double slip_percent) { return limit * slip_percent / (slip_percent + half_percent); };
 }
 
 std::vector<TracePoint> rig_trace(const Rig& rig) {
@@ -59,8 +59,8 @@ std::vector<TracePoint> rig_trace(const Rig& rig) {
   Noise noise(rig.seed);
 
   // The slip that carries the load at the begin.
-  double slip = 0.0;
-  while (rig.friction(slip) < rig.mu_begin) slip += 1e-4;
+  double slip_percent = 0.0;
+  while (rig.friction(slip_percent) < rig.mu_begin) slip_percent += 1e-4;
 
   const int substeps = std::max(1, static_cast<int>(std::lround(kPlant_hz / rig.sample_rate_hz)));
   std::vector<TracePoint> out;
@@ -74,14 +74,14 @@ std::vector<TracePoint> rig_trace(const Rig& rig) {
     // Secondary: the belt's torque against the load; slip is what its speed lacks, in both
     // directions.
     for (int j = 0; j < substeps; ++j) {
-      const double belt_Nm = lever_m * force_N * rig.friction(slip);
-      slip += 100.0 * (load_Nm - belt_Nm) / (ratio * rig.secondary_inertia_kg_m2) /
-              (omega_p_rad_s * ratio) / (rig.sample_rate_hz * substeps);
-      slip = std::max(0.0, slip);
+      const double belt_Nm = lever_m * force_N * rig.friction(slip_percent);
+      slip_percent += 100.0 * (load_Nm - belt_Nm) / (ratio * rig.secondary_inertia_kg_m2) /
+                      (omega_p_rad_s * ratio) / (rig.sample_rate_hz * substeps);
+      slip_percent = std::max(0.0, slip_percent);
     }
-    const double mu = rig.friction(slip);
+    const double mu = rig.friction(slip_percent);
     const double measured_ratio = ratio * (1.0 - rig.deformation_percent_per_kN * 1e-5 * force_N) *
-                                  (1.0 - sign * slip / 100.0);
+                                  (1.0 - sign * slip_percent / 100.0);
     const double direction = t_s < rig.reversal_s ? sign : -sign;
     const double omega_p = omega_p_rad_s + 0.03 * rig.noise * noise();
     const double omega_s = omega_p_rad_s * measured_ratio + 0.05 * rig.noise * noise();
@@ -93,10 +93,10 @@ std::vector<TracePoint> rig_trace(const Rig& rig) {
                         (force_N - 500.0) / 0.0113 + 1000.0 * rig.noise * noise(),
                     .torque_Nm = direction * lever_m * force_N * mu + 0.2 * rig.noise * noise(),
                     .usable = true},
-         .slip_percent = slip,
+         .slip_percent = slip_percent,
          .mu = mu,
          .clamp_force_N = force_N});
-    if (slip > rig.end_slip_percent) break;
+    if (slip_percent > rig.end_slip_percent) break;
   }
   return out;
 }

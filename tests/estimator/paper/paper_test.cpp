@@ -57,10 +57,10 @@ TEST(Excitation, IsThePopulationVarianceOfTheLastSecond) {
   Noise noise(1);
   for (int i = 0; i < 3000; ++i) {
     // Rest, drift, a jump and a large offset.
-    const double slip =
+    const double slip_percent =
         0.1 * noise() + (i > 800 ? 0.004 * (i - 800) : 0.0) + (i > 2000 ? 5000.0 : 0.0);
-    excitation.step(slip);
-    window.push_back(slip);
+    excitation.step(slip_percent);
+    window.push_back(slip_percent);
     if (window.size() > 200) window.pop_front();
     const double truth = window.size() < 200 ? 0.0 : variance_in_two_passes(window);
     EXPECT_NEAR(excitation.variance(), truth, 1e-7 + 1e-9 * truth) << i;
@@ -106,7 +106,7 @@ struct Trace {
   std::function<double(double)> slip_percent;
   std::function<double(double)> mu;
   double end_s = 10.0;
-  double noise_slip = 0.0;
+  double noise_slip_percent = 0.0;
   double sign = 1.0;
 };
 
@@ -115,12 +115,12 @@ std::vector<VariatorSample> samples(const Trace& trace, double rate_hz) {
   Noise noise(7);
   for (int i = 0; i < static_cast<int>(trace.end_s * rate_hz); ++i) {
     const double t_s = i / rate_hz;
-    const double slip = trace.slip_percent(t_s) + trace.noise_slip * noise();
+    const double slip_percent = trace.slip_percent(t_s) + trace.noise_slip_percent * noise();
     const double force_N =
         50.0 * std::cos(11.0 * std::numbers::pi / 180.0) / (2.0 * 0.0784 * trace.mu(t_s));
     out.push_back({.t_ns = std::lround(t_s * 1e9),
                    .omega_p_rad_s = 105.0,
-                   .omega_s_rad_s = 105.0 * 2.25 * (1.0 - trace.sign * slip / 100.0),
+                   .omega_s_rad_s = 105.0 * 2.25 * (1.0 - trace.sign * slip_percent / 100.0),
                    .secondary_pressure_Pa = (force_N - 500.0) / 0.0113,
                    .torque_Nm = trace.sign * 50.0,
                    .usable = true});
@@ -137,30 +137,31 @@ class Naive {
         window_(static_cast<std::size_t>(std::lround(kT_s * settings.sample_rate_hz))),
         scale_(200.0 / settings.sample_rate_hz) {}
 
-  void step(double slip, double mu) {
-    slips_.push_back(slip);
-    if (slips_.size() > window_) slips_.pop_front();
-    v = slips_.size() == window_ ? variance_in_two_passes(slips_) : 0.0;
+  void step(double slip_percent, double mu) {
+    slips_percent_.push_back(slip_percent);
+    if (slips_percent_.size() > window_) slips_percent_.pop_front();
+    v = slips_percent_.size() == window_ ? variance_in_two_passes(slips_percent_) : 0.0;
     const bool was_open = open;
     open = v > kCv;
     if (open && !was_open) ++rising;
     const bool paused = settings_.reopening == Reopening::kPaused && rising > 1;
     if (open && !was_open && !paused) {
       if (settings_.reopening == Reopening::kInitialSlope) k = settings_.initial_slope;
-      mu0 = mu - k * slip;
+      mu0 = mu - k * slip_percent;
       p11 = p22 = settings_.initial_variance;
       p12 = 0.0;
     } else if (open) {
       const double s11 = p11 + kQk * scale_, s22 = p22 + kQmu0 * scale_, s12 = p12;  // (16), (21)
-      const double innovation = slip * (slip * s11 + s12) + (slip * s12 + s22) + 1.0;
-      const double gain_k = (slip * s11 + s12) / innovation;  // (17), R = 1
-      const double gain_mu0 = (slip * s12 + s22) / innovation;
-      const double error = mu - slip * k - mu0;
+      const double innovation =
+          slip_percent * (slip_percent * s11 + s12) + (slip_percent * s12 + s22) + 1.0;
+      const double gain_k = (slip_percent * s11 + s12) / innovation;  // (17), R = 1
+      const double gain_mu0 = (slip_percent * s12 + s22) / innovation;
+      const double error = mu - slip_percent * k - mu0;
       k += gain_k * error;  // (18)
       mu0 += gain_mu0 * error;
-      p11 = (1.0 - gain_k * slip) * s11 - gain_k * s12;  // (19)
-      p12 = (1.0 - gain_k * slip) * s12 - gain_k * s22;
-      p22 = -gain_mu0 * slip * s12 + (1.0 - gain_mu0) * s22;
+      p11 = (1.0 - gain_k * slip_percent) * s11 - gain_k * s12;  // (19)
+      p12 = (1.0 - gain_k * slip_percent) * s12 - gain_k * s22;
+      p22 = -gain_mu0 * slip_percent * s12 + (1.0 - gain_mu0) * s22;
     }
     largest = std::max(largest, mu);
     if (stopped || !open) return;
@@ -188,7 +189,7 @@ class Naive {
 
  private:
   EstimatorSettings settings_;
-  std::deque<double> slips_;
+  std::deque<double> slips_percent_;
   std::size_t window_;
   double scale_;
 };
@@ -244,15 +245,17 @@ Outcome compare(const Trace& trace, double rate_hz, EstimatorSettings settings =
 }
 
 // Slip at rest, then faster and faster over a round peak of 0.105 at 4 %, as on the rig.
-double rig_slip(double t_s) { return t_s < 4.0 ? 0.5 : 0.5 + 0.3 * (t_s - 4.0) * (t_s - 4.0); }
+double rig_slip_percent(double t_s) {
+  return t_s < 4.0 ? 0.5 : 0.5 + 0.3 * (t_s - 4.0) * (t_s - 4.0);
+}
 double rig_mu(double t_s) {
-  const double from_peak = rig_slip(t_s) - 4.0;
+  const double from_peak = rig_slip_percent(t_s) - 4.0;
   return 0.105 - 0.0025 * from_peak * from_peak / (1.0 + std::abs(from_peak) / 2.0);
 }
 
 TEST(Paper, IsTheRecursionOfThePaperOverARigTrace) {
   for (const double sign : {1.0, -1.0}) {
-    const Outcome run = compare({rig_slip, rig_mu, 11.0, 0.02, sign}, 200.0);
+    const Outcome run = compare({rig_slip_percent, rig_mu, 11.0, 0.02, sign}, 200.0);
     ASSERT_GT(run.usable, 2000);
     EXPECT_EQ(run.naive.rising, 1);
     EXPECT_EQ(run.stop, StopReason::kSlope);
@@ -268,7 +271,7 @@ TEST(Paper, IsTheRecursionOfThePaperOverARigTrace) {
 
 TEST(Paper, ScalesTheWalkWithTheSampleRate) {
   for (const double rate_hz : {100.0, 50.0, 400.0}) {
-    const Outcome run = compare({rig_slip, rig_mu, 11.0, 0.02}, rate_hz);
+    const Outcome run = compare({rig_slip_percent, rig_mu, 11.0, 0.02}, rate_hz);
     EXPECT_EQ(run.naive.rising, 1) << rate_hz;
     EXPECT_EQ(run.stop, StopReason::kSlope) << rate_hz;
     EXPECT_NEAR(run.peak.mu_max, run.naive.mean(), 1e-12) << rate_hz;
@@ -278,20 +281,22 @@ TEST(Paper, ScalesTheWalkWithTheSampleRate) {
 TEST(Paper, SamplesBetweenTheBandAndTheStopAreOfThePeaksPhaseButNotOfItsMean) {
   EstimatorSettings later;
   later.stop_slope = -1.5e-3;
-  const Outcome run = compare({rig_slip, rig_mu, 11.0, 0.02}, 200.0, later);
+  const Outcome run = compare({rig_slip_percent, rig_mu, 11.0, 0.02}, 200.0, later);
   EXPECT_EQ(run.stop, StopReason::kSlope);
   EXPECT_NEAR(run.peak.mu_max, run.naive.mean(), 1e-12);
-  const Outcome early = compare({rig_slip, rig_mu, 11.0, 0.02}, 200.0);
+  const Outcome early = compare({rig_slip_percent, rig_mu, 11.0, 0.02}, 200.0);
   EXPECT_EQ(run.peak.samples, early.peak.samples);  // k only falls: the band is left once
 }
 
 // Strokes of slip with rest between them, up and down over a round peak of 0.1 at 2 %.
 TEST(Paper, ReadingsThatTheTextLeavesOpen) {
-  const auto slip = [](double t_s) {
+  const auto slip_percent = [](double t_s) {
     const double part = std::fmod(t_s, 6.0);
     return 1.0 + (part < 3.0 ? 0.0 : std::min(1.0, part - 3.0) * 1.5);
   };
-  const auto mu = [&](double t_s) { return 0.1 - 0.002 * (slip(t_s) - 2.0) * (slip(t_s) - 2.0); };
+  const auto mu = [&](double t_s) {
+    return 0.1 - 0.002 * (slip_percent(t_s) - 2.0) * (slip_percent(t_s) - 2.0);
+  };
   std::vector<double> slopes;
   int left_the_band = 0;
   for (const Reopening reopening :
@@ -302,9 +307,9 @@ TEST(Paper, ReadingsThatTheTextLeavesOpen) {
       settings.initial_slope = slope;
       settings.initial_variance = variance;
       settings.stop_slope = -1.0;
-      const Outcome all = compare({slip, mu, 20.0}, 200.0, settings);
+      const Outcome all = compare({slip_percent, mu, 20.0}, 200.0, settings);
       settings.peak_samples = PeakSamples::kLast;
-      const Outcome last = compare({slip, mu, 20.0}, 200.0, settings);
+      const Outcome last = compare({slip_percent, mu, 20.0}, 200.0, settings);
       for (const Outcome& run : {all, last}) {
         EXPECT_GE(run.naive.rising, 3);
         EXPECT_GT(run.held, 1000);
@@ -351,7 +356,7 @@ TEST(Paper, SlipIsInPercent) {
 TEST(Paper, SensorAccuracyWidensTheInterval) {
   SensorAccuracies accuracies;
   accuracies.torque = {.bias = 1.0, .gain = 0.0};  // 2 % of 50 Nm
-  const Outcome run = compare({rig_slip, rig_mu, 11.0, 0.02}, 200.0, {}, accuracies);
+  const Outcome run = compare({rig_slip_percent, rig_mu, 11.0, 0.02}, 200.0, {}, accuracies);
   const double std = std::hypot(run.naive.deviation(), 0.02 * run.naive.mean());
   EXPECT_NEAR(run.peak.mu_max_std, std, 1e-7);
   EXPECT_NEAR(run.peak.ci95_high - run.peak.ci95_low, 2.0 * 1.96 * std, 1e-6);
@@ -362,7 +367,7 @@ TEST(Paper, ResetForgetsEverything) {
   settings.method = Method::kPaper;
   settings.torque_is_engine = false;
   const auto estimator = make_slip_curve_estimator(settings, kVariator, {});
-  const auto trace = samples({rig_slip, rig_mu, 11.0, 0.02}, 200.0);
+  const auto trace = samples({rig_slip_percent, rig_mu, 11.0, 0.02}, 200.0);
   std::vector<double> first, second;
   for (std::vector<double>* slopes : {&first, &second}) {
     for (const VariatorSample& sample : trace) {

@@ -117,7 +117,7 @@ std::string slips(const GuardedRun& run) {
   constexpr double kMost = 0.10;
   double most = 0.0;
   for (const ClampFrame& now : run.frames) {
-    if (now.force_N > 0.0) most = std::max(most, now.slip);
+    if (now.force_N > 0.0) most = std::max(most, now.slip_share);
   }
   return most > kMost ? text("a request stands with slip of", most, kMost) : std::string();
 }
@@ -231,7 +231,7 @@ GuardedRun run_guarded(const GuardCase& which) {
   observers.on_step = [&](const sim::VehicleSimulation& vehicle) {
     const sim::VehicleTruth& truth = vehicle.truth();
     truth_now.acting_N = truth.secondary_force_N;
-    truth_now.slip = std::abs(truth.belt.slip);
+    truth_now.slip_share = std::abs(truth.belt.slip_share);
     truth_now.slip_speed_m_s = truth.belt.slip_speed_m_s;
     const double omega_s_rad_s = vehicle.signals().omega_s_rad_s;
     truth_now.floor_N =

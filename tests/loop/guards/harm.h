@@ -12,17 +12,17 @@ namespace beltgrip::test {
 // One frame with the identifier of BeltGripClamp.
 struct ClampFrame {
   double t_s = 0.0;
-  double force_N = 0.0;   // 0: inactive
-  double acting_N = 0.0;  // the force that really acts then
-  double slip = 0.0;      // and the belt's slip, fraction
+  double force_N = 0.0;     // 0: inactive
+  double acting_N = 0.0;    // the force that really acts then
+  double slip_share = 0.0;  // and the belt's slip, fraction
   double slip_speed_m_s = 0.0;
   double floor_N = 0.0;  // with the centrifugal force of that speed
 };
 
 struct GuardedRun {
   std::vector<ClampFrame> frames;
-  double slip_max = 0.0;  // fraction, over the whole drive
-  double floor_N = 0.0;   // spring and piston area times the floor of the pressure
+  double slip_max_share = 0.0;  // over the whole drive
+  double floor_N = 0.0;         // spring and piston area times the floor of the pressure
   double cooldown_s = 0.0;
   double silent_from_s = 0.0;
 };

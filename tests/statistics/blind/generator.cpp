@@ -174,8 +174,9 @@ History Experiment::run() {
   const PlannedRun& plan = trial_.plan[static_cast<std::size_t>(index_)];
   const double radius = plan.low ? 0.0324 : 0.0784;
   const double nominal_ratio = plan.low ? 0.405 : 2.25;
-  const double peak_slip = (plan.low ? m_.peak_slip_low : m_.peak_slip_overdrive) *
-                           (1.0 + fault_("friction_shape.peak_slip_relative"));
+  const double peak_slip_share =
+      (plan.low ? m_.peak_slip_low_share : m_.peak_slip_overdrive_share) *
+      (1.0 + fault_("friction_shape.peak_slip_relative"));
   const double fall = std::max(0.0, m_.fall_per_unit + fault_("friction_shape.fall_per_unit"));
   level_ = std::hypot(m_.scatter_friction, fault_("x_friction_between.size")) * random_.normal();
   seat_ = m_.scatter_ratio * random_.normal();
@@ -189,12 +190,12 @@ History Experiment::run() {
   History h;
   double force_wanted_N = 1.9 * held_N;
   double omega_p = plan.speed_rad_s, omega_s = omega_p * nominal_ratio * 0.995;
-  double slip = 0.0, energy_J = 0.0, acting_Pa = -1.0, play_N = 0.0;
+  double slip_share = 0.0, energy_J = 0.0, acting_Pa = -1.0, play_N = 0.0;
   double angle_p = random_.uniform(0.0, 6.28), angle_s = random_.uniform(0.0, 6.28);
   double belt_before = plan.torque_Nm;
   double hold_s = 3.0;
   int direction = -1;
-  const double slip_limit = random_.uniform(1.35, 2.2) * peak_slip;
+  const double slip_limit_share = random_.uniform(1.35, 2.2) * peak_slip_share;
   const double sweep_phase = random_.uniform(0.0, 6.28);
   const double step_period_s = random_.uniform(4.0, 7.0);
   bool first = true;
@@ -215,7 +216,7 @@ History Experiment::run() {
         if (force_wanted_N > 1.9 * held_N) direction = -1;
       } else if (direction < 0) {
         force_wanted_N -= plan.ramp_N_s * kStep_s;
-        if (std::abs(slip) > slip_limit || force_wanted_N < 0.5 * held_N) direction = 1;
+        if (std::abs(slip_share) > slip_limit_share || force_wanted_N < 0.5 * held_N) direction = 1;
       } else {
         force_wanted_N += 8.0 * held_N * kStep_s;
         if (force_wanted_N >= 1.9 * held_N) {
@@ -279,7 +280,7 @@ History Experiment::run() {
     const double ratio = ratio_now(force, belt_before);
     const double capacity = 2.0 * radius * force * mu / kCosTheta;
     const auto belt = [&](double s) {
-      return std::copysign(capacity * curve(m_.law, std::abs(s) / peak_slip, fall), s);
+      return std::copysign(capacity * curve(m_.law, std::abs(s) / peak_slip_share, fall), s);
     };
     double belt_torque = 0.0;
     const double loss = m_.loss_Nm + m_.loss_per_speed_Nms * omega_p +
@@ -298,7 +299,7 @@ History Experiment::run() {
       acceleration_p = speed_rate;
       load_s =
           torque / nominal_ratio - m_.secondary_inertia_kg_m2 * speed_rate * nominal_ratio * 0.0;
-      if (first) omega_s = omega_p * ratio * (1.0 - sign * 0.3 * peak_slip);
+      if (first) omega_s = omega_p * ratio * (1.0 - sign * 0.3 * peak_slip_share);
       // J_s d(omega_s)/dt = T_belt(omega_s_next) / ratio - load
       const auto residual = [&](double w) {
         return w - omega_s -
@@ -319,15 +320,15 @@ History Experiment::run() {
       }
       acceleration_s = (w - omega_s) / kStep_s;
       omega_s = w;
-      slip = 1.0 - omega_s / (omega_p * ratio);
-      belt_torque = belt(slip);
+      slip_share = 1.0 - omega_s / (omega_p * ratio);
+      belt_torque = belt(slip_share);
       // The sensor sits between the drive's inertia and the pulley: no inertia torque in it.
       torque_p = belt_torque + loss + fault_("inertia_torque.inertia_kg_m2") * acceleration_p;
     } else {
       omega_s = speed * nominal_ratio;
       acceleration_s = speed_rate * nominal_ratio;
       const double inertia = m_.primary_inertia_kg_m2 + fault_("inertia_torque.inertia_kg_m2");
-      if (first) omega_p = omega_s / (ratio * (1.0 - sign * 0.3 * peak_slip));
+      if (first) omega_p = omega_s / (ratio * (1.0 - sign * 0.3 * peak_slip_share));
       const auto residual = [&](double w) {
         return w - omega_p -
                kStep_s / inertia * (torque - loss - belt(1.0 - omega_s / (w * ratio)));
@@ -346,13 +347,13 @@ History Experiment::run() {
       }
       acceleration_p = (w - omega_p) / kStep_s;
       omega_p = w;
-      slip = 1.0 - omega_s / (omega_p * ratio);
-      belt_torque = belt(slip);
+      slip_share = 1.0 - omega_s / (omega_p * ratio);
+      belt_torque = belt(slip_share);
       torque_p = torque;
       load_s = belt_torque / ratio - m_.secondary_inertia_kg_m2 * acceleration_s - drag(omega_s);
     }
     belt_before = belt_torque;
-    energy_J += std::abs(belt_torque * slip) * omega_p * kStep_s;
+    energy_J += std::abs(belt_torque * slip_share) * omega_p * kStep_s;
     angle_p += omega_p * kStep_s;
     belt_phase_ += 2.0 * std::numbers::pi * omega_p * radius / kBeltLength_m * kStep_s;
     angle_s += omega_s * kStep_s;
@@ -468,8 +469,8 @@ Machine draw_machine(Random& random) {
                             : Setting::kCar;
   m.law = static_cast<Law>(random.below(3));
   m.mu_max = random.uniform(0.088, 0.112);
-  m.peak_slip_overdrive = random.uniform(0.013, 0.026);
-  m.peak_slip_low = m.peak_slip_overdrive * random.uniform(1.1, 1.8);
+  m.peak_slip_overdrive_share = random.uniform(0.013, 0.026);
+  m.peak_slip_low_share = m.peak_slip_overdrive_share * random.uniform(1.1, 1.8);
   m.fall_per_unit = random.uniform(0.01, 0.05);
   m.deformation_per_kN = random.uniform(0.4e-3, 1.8e-3);
   m.loss_Nm = random.uniform(0.0, 1.2);

@@ -40,7 +40,7 @@ struct Machine {
   Setting setting = Setting::kRig;
   Law law = Law::kTanh;
   double mu_max = 0.1;
-  double peak_slip_overdrive = 0.02, peak_slip_low = 0.03;
+  double peak_slip_overdrive_share = 0.02, peak_slip_low_share = 0.03;
   double fall_per_unit = 0.15;  // of mu, per unit slip beyond the peak
   double deformation_per_kN = 1e-3;
   double loss_Nm = 0.5, loss_per_speed_Nms = 4e-3;

@@ -84,13 +84,13 @@ int run_silence() {
     std::printf(
         "%s: %d runs, ramp of %.2f s; largest slip %.2f %%, %.2f m/s, energy beyond the peak %.0f "
         "J\n",
-        name, result.runs, result.ramp_s, 100.0 * result.slip_max, result.slip_speed_max_m_s,
+        name, result.runs, result.ramp_s, 100.0 * result.slip_max_share, result.slip_speed_max_m_s,
         result.energy_J);
     for (const auto& [which, how] : result.broken) {
       std::printf("broken: %s: %s\n", which.c_str(), how.c_str());
     }
-    const bool inside =
-        result.slip_max <= 0.10 && result.slip_speed_max_m_s <= 0.8 && result.energy_J <= 100.0;
+    const bool inside = result.slip_max_share <= 0.10 && result.slip_speed_max_m_s <= 0.8 &&
+                        result.energy_J <= 100.0;
     broken += !inside || !result.broken.empty() ? 1 : 0;
   }
   return broken > 0 ? 1 : 0;

@@ -16,7 +16,7 @@ namespace {
 using sim::FaultKind;
 
 // Promise G1. Where the disturbance alone slips the belt: no more than that and kAlone.
-constexpr double kSlip = 0.10;
+constexpr double kSlip_share = 0.10;
 constexpr double kSlipSpeed_m_s = 0.8;
 constexpr double kEnergy_J = 100.0;
 constexpr double kAlone = 0.002;
@@ -47,7 +47,7 @@ daemon::Config configuration(const CampaignCase& given) {
 
 bool beyond_limits(const sim::RequestTruth& request, bool has_peak) {
   // Without a peak there is no macro slip whose energy could be counted.
-  return request.slip_max > kSlip || request.slip_speed_max_m_s > kSlipSpeed_m_s ||
+  return request.slip_max_share > kSlip_share || request.slip_speed_max_m_s > kSlipSpeed_m_s ||
          (has_peak && request.macro_energy_J > kEnergy_J);
 }
 
@@ -63,7 +63,7 @@ void judge_at_once(const CampaignCase& given, const sim::RequestTruth& broken,
   for (const sim::RequestTruth& request :
        run_closed(scenario, configuration(given), given.seed).requests) {
     if (request.begin_s != broken.begin_s) continue;
-    verdict.at_once_slip_percent = 100.0 * request.slip_max;
+    verdict.at_once_slip_percent = 100.0 * request.slip_max_share;
     verdict.at_once_energy_J = request.macro_energy_J;
     verdict.broken_at_once = beyond_limits(request, verdict.has_peak);
   }
@@ -82,9 +82,10 @@ void judge_slip(const CampaignCase& given, const LoopRun& run, CampaignVerdict& 
   bool beyond = run.stalls > 0;
   const sim::RequestTruth* broken = nullptr;
   for (const sim::RequestTruth& request : run.requests) {
-    verdict.slip_max_percent = std::max(verdict.slip_max_percent, 100.0 * request.slip_max);
+    verdict.slip_max_percent = std::max(verdict.slip_max_percent, 100.0 * request.slip_max_share);
     verdict.slip_speed_max_m_s = std::max(verdict.slip_speed_max_m_s, request.slip_speed_max_m_s);
-    verdict.slip_stop_percent = std::max(verdict.slip_stop_percent, 100.0 * request.slip_at_end);
+    verdict.slip_stop_percent =
+        std::max(verdict.slip_stop_percent, 100.0 * request.slip_at_end_share);
     verdict.energy_J = std::max(verdict.energy_J, request.macro_energy_J);
     beyond = beyond || beyond_limits(request, true);
   }
@@ -93,13 +94,13 @@ void judge_slip(const CampaignCase& given, const LoopRun& run, CampaignVerdict& 
   double worst = 0.0;
   for (const sim::RequestTruth& request : run.requests) {
     const double end_s = request.end_s + kAfter_s;
-    const double alone_slip = alone.slip_max(request.begin_s, end_s);
-    worst = std::max(worst, alone_slip);
-    if (!promised(given, request) || request.slip_max <= alone_slip + kAlone) continue;
+    const double alone_slip_share = alone.slip_max_share(request.begin_s, end_s);
+    worst = std::max(worst, alone_slip_share);
+    if (!promised(given, request) || request.slip_max_share <= alone_slip_share + kAlone) continue;
     if (beyond_limits(request, verdict.has_peak)) broken = &request;
-    if (request.slip_max > kSlip) {
-      verdict.violations.push_back("G1: slip " + text(100.0 * request.slip_max) + " %, alone " +
-                                   text(100.0 * alone_slip) + " %");
+    if (request.slip_max_share > kSlip_share) {
+      verdict.violations.push_back("G1: slip " + text(100.0 * request.slip_max_share) +
+                                   " %, alone " + text(100.0 * alone_slip_share) + " %");
     }
     if (request.slip_speed_max_m_s >
         std::max(kSlipSpeed_m_s, alone.slip_speed_max(request.begin_s, end_s))) {

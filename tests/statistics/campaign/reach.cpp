@@ -12,12 +12,12 @@ namespace {
 
 // Chosen: the slip rate of the crossing. Slower costs energy, faster runs past.
 constexpr double kSlipRate_1_s = 0.03;
-constexpr double kSlipToSee = 0.008;       // chosen: to tell a flat top
-constexpr double kSlipToSeeSteep = 0.003;  // and a steep fall
-constexpr double kDecision_s = 0.05;       // chosen: of a detector, after that slip
-constexpr double kFrame_s = 0.01;          // a clamp frame every 10 ms
-constexpr double kSlipSpeed_m_s = 0.8;     // promise G1
-constexpr double kEnergy_J = 100.0;        // promise G1
+constexpr double kSlipToSee_share = 0.008;       // chosen: to tell a flat top
+constexpr double kSlipToSeeSteep_share = 0.003;  // and a steep fall
+constexpr double kDecision_s = 0.05;             // chosen: of a detector, after that slip
+constexpr double kFrame_s = 0.01;                // a clamp frame every 10 ms
+constexpr double kSlipSpeed_m_s = 0.8;           // promise G1
+constexpr double kEnergy_J = 100.0;              // promise G1
 // Measured on a simulation of other make: the steepest fall that ends inside G1, of the steepest
 // that is caught at all.
 constexpr double kInsideG1 = 0.8;
@@ -35,8 +35,8 @@ double steepest_fall(const sim::FrictionCurve& curve) {
   constexpr int kSteps = 40;
   double steepest = 0.0;
   for (int i = 1; i <= kSteps; ++i) {
-    const double slip = curve.fall_slip() + kFallOver * i / kSteps;
-    steepest = std::max(steepest, -sim::friction_at(curve, slip).slope);
+    const double slip_share = curve.fall_slip_share() + kFallOver * i / kSteps;
+    steepest = std::max(steepest, -sim::friction_at(curve, slip_share).slope);
   }
   return steepest;
 }
@@ -64,7 +64,7 @@ ReachPoint point_of(const sim::VehicleSimulation& vehicle, const RequestKeys& ke
   point.own_force_N = vehicle.truth().own_force_N;
   point.floor_N = floor_N(scenario, keys, vehicle.signals().omega_s_rad_s);
   point.mu_max = belt.mu_max;
-  point.peak_slip = belt.peak_slip;
+  point.peak_slip_share = belt.peak_slip_share;
   point.fall = kPercent * keys.fall_max_per_percent;
   point.dead_time_s = scenario.hydraulics.dead_time_s;
   point.lag_s = scenario.hydraulics.lag_s;
@@ -133,14 +133,14 @@ bool caught(const ReachPoint& point) {
   const double y = kSlipRate_1_s / w;
   const double told_s = kDecision_s + kFrame_s + point.dead_time_s;
   const double g = point.own_force_N / reach_peak_force_N(point) - 1.0 + y;
-  const double slip = (kSlipToSeeSteep + w * y / a) * std::exp(a * told_s) - w * y / a;
-  return slip < point.mu_max / fall * (g / (1.0 + a * point.lag_s) - y);
+  const double slip_share = (kSlipToSeeSteep_share + w * y / a) * std::exp(a * told_s) - w * y / a;
+  return slip_share < point.mu_max / fall * (g / (1.0 + a * point.lag_s) - y);
 }
 
 double crossing_energy_J(const ReachPoint& point) {
   const double lasts_s =
-      kSlipToSee / kSlipRate_1_s + kDecision_s + kFrame_s + point.dead_time_s + point.lag_s;
-  return point.torque_Nm * point.omega_p_rad_s * point.peak_slip * lasts_s;
+      kSlipToSee_share / kSlipRate_1_s + kDecision_s + kFrame_s + point.dead_time_s + point.lag_s;
+  return point.torque_Nm * point.omega_p_rad_s * point.peak_slip_share * lasts_s;
 }
 
 double slip_noise(const SpeedNoise& primary, const SpeedNoise& secondary, double omega_p_rad_s,
@@ -152,8 +152,8 @@ double slip_noise(const SpeedNoise& primary, const SpeedNoise& secondary, double
 
 Wall wall_at(const ReachPoint& point) {
   if (point.floor_N >= reach_peak_force_N(point)) return Wall::kFloor;
-  const double slip_most = kSlipSpeed_m_s / (point.omega_p_rad_s * point.primary_radius_m);
-  if (point.peak_slip + kSlipToSee >= slip_most) return Wall::kSlipSpeed;
+  const double slip_most_share = kSlipSpeed_m_s / (point.omega_p_rad_s * point.primary_radius_m);
+  if (point.peak_slip_share + kSlipToSee_share >= slip_most_share) return Wall::kSlipSpeed;
   if (crossing_energy_J(point) >= kEnergy_J) return Wall::kEnergy;
   return caught(point) ? Wall::kNone : Wall::kFall;
 }
@@ -172,7 +172,7 @@ Reach reach_of(const sim::VehicleScenario& scenario, const RequestKeys& keys, st
     if (!vehicle.tcu().permitted) continue;
     omega_p_rad_s = vehicle.signals().omega_p_rad_s;
     omega_s_rad_s = vehicle.signals().omega_s_rad_s;
-    reach.peak_slip_percent = kPercent * vehicle.truth().belt.peak_slip;
+    reach.peak_slip_percent = kPercent * vehicle.truth().belt.peak_slip_share;
   }
   coast.end(t_s);
   reach.wall = coast.furthest();

@@ -41,7 +41,7 @@ struct ReachPoint {
   double own_force_N = 0.0;
   double floor_N = 0.0;  // of the force on the belt
   double mu_max = 0.0;
-  double peak_slip = 0.0;
+  double peak_slip_share = 0.0;
   double fall = 0.0;  // that must be caught, of mu per unit of slip
   double dead_time_s = 0.0;
   double lag_s = 0.0;

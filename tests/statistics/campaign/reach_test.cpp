@@ -19,7 +19,7 @@ ReachPoint car() {
   point.wedge_cosine = std::cos(11.0 * 3.14159265358979 / 180.0);
   point.inertia_kg_m2 = 0.18;
   point.mu_max = 0.105;
-  point.peak_slip = 0.04;
+  point.peak_slip_share = 0.04;
   point.fall = 0.8;
   point.dead_time_s = 0.045;
   point.lag_s = 0.08;
@@ -44,9 +44,9 @@ TEST(Reach, SlipSpeedAllowsEightTenthsOfAPointLessThanItsLimit) {
   point.torque_Nm = 10.0;    // energy is no wall
   point.floor_N = 100.0;
   point.own_force_N = 3.0 * reach_peak_force_N(point);
-  point.peak_slip = 0.0684;
+  point.peak_slip_share = 0.0684;
   EXPECT_EQ(wall_at(point), Wall::kNone);
-  point.peak_slip = 0.0688;
+  point.peak_slip_share = 0.0688;
   EXPECT_EQ(wall_at(point), Wall::kSlipSpeed);
 }
 
@@ -54,7 +54,7 @@ TEST(Reach, EnergyOfACrossingIsPowerByTime) {
   // 30 x 133 x 0.04 W for 0.8 points at 3 %/s and for 50 + 10 + 45 + 80 ms.
   EXPECT_NEAR(crossing_energy_J(car()), 159.6 * (0.26667 + 0.185), 0.1);
   ReachPoint point = car();
-  point.peak_slip = 0.057;
+  point.peak_slip_share = 0.057;
   EXPECT_EQ(wall_at(point), Wall::kEnergy);
 }
 

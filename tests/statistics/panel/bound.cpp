@@ -72,7 +72,8 @@ class Knowledge {
         f(curve_ + 1) = 1.0;
         f(curve_ + 2) = t - t0;
       }
-      const Eigen::VectorXd g = force / c * of_friction(i) + s.curve.value(trace.slip[i]) / c * f;
+      const Eigen::VectorXd g =
+          force / c * of_friction(i) + s.curve.value(trace.slip_percent[i]) / c * f;
       const double variance =
           (torque_density + std::pow(force / c * slope, 2) * slip_density) / sample_s;
       information_ += g * g.transpose() / variance;
@@ -82,10 +83,10 @@ class Knowledge {
   // Gradient of mu at this sample, by the parameters.
   Eigen::VectorXd of_friction(std::size_t i) const {
     Eigen::VectorXd g = Eigen::VectorXd::Zero(curve_ + 4);
-    const double slip = trace_.slip[i];
+    const double slip_percent = trace_.slip_percent[i];
     for (int p = 0; p < curve_; ++p) {
       const Step& step = steps_[static_cast<std::size_t>(p)];
-      g(p) = (step.up.value(slip) - step.down.value(slip)) / (2.0 * step.size);
+      g(p) = (step.up.value(slip_percent) - step.down.value(slip_percent)) / (2.0 * step.size);
     }
     g(curve_) = -slope_at(i) * trace_.clamp_N[i] / 1e4;
     return g;
@@ -105,7 +106,9 @@ class Knowledge {
  private:
   static constexpr double kStandsStill = 1e-3;  // of the force, in a second
   double slope_at(std::size_t i) const {
-    return (s_.curve.value(trace_.slip[i] + 1e-3) - s_.curve.value(trace_.slip[i] - 1e-3)) / 2e-3;
+    return (s_.curve.value(trace_.slip_percent[i] + 1e-3) -
+            s_.curve.value(trace_.slip_percent[i] - 1e-3)) /
+           2e-3;
   }
   const Scenario& s_;
   const Trace& trace_;
@@ -142,9 +145,10 @@ namespace {
 // The form of a curve by slip over that of its peak.
 class Stretched {
  public:
-  explicit Stretched(const FrictionCurve& curve) : slip_peak_(curve.slip_peak()) {
-    for (int i = 0; i <= kSize; ++i) table_[i] = curve.value(slip_peak_ * kLast * i / kSize);
-    reached_ = curve.slip_reached(kNearTop) / slip_peak_;
+  explicit Stretched(const FrictionCurve& curve) : slip_peak_percent_(curve.slip_peak_percent()) {
+    for (int i = 0; i <= kSize; ++i)
+      table_[i] = curve.value(slip_peak_percent_ * kLast * i / kSize);
+    reached_ = curve.slip_reached_percent(kNearTop) / slip_peak_percent_;
   }
   double reached() const { return reached_; }  // in slips of the peak
   double value(double slips) const {
@@ -158,11 +162,11 @@ class Stretched {
   static constexpr int kSize = 1024;
   static constexpr double kLast = 1.6;  // no slip so far lies beyond
   double table_[kSize + 1];
-  double slip_peak_, reached_;
+  double slip_peak_percent_, reached_;
 };
 
 struct Evidence {  // means over a few samples
-  double slip, mu, force;
+  double slip_percent, mu, force;
   double weight;  // of mu, by the noise of torque and slip
 };
 
@@ -190,36 +194,37 @@ DetectionBound detection_bound(const Scenario& s, const Trace& trace) {
     const FrictionCurve form = with_parameters(s.curve, changed);
     if (form.possible()) forms.emplace_back(form);
   }
-  const double top_slip = s.curve.slip_reached(Stretched::kNearTop);
+  const double top_slip_percent = s.curve.slip_reached_percent(Stretched::kNearTop);
   std::vector<Evidence> seen;
-  double furthest = top_slip, power = 0.0;
+  double furthest = top_slip_percent, power = 0.0;
   out.delay_s = trace.t_reached_s - trace.t_peak_s;
   out.stopped.fill(1.0);
   std::size_t filled = 0;
-  for (std::size_t i = 0; i + kSamples <= trace.slip.size(); i += kSamples) {
-    const double slip = trace.slip[i + kSamples / 2];
+  for (std::size_t i = 0; i + kSamples <= trace.slip_percent.size(); i += kSamples) {
+    const double slip_percent = trace.slip_percent[i + kSamples / 2];
     const double force = trace.clamp_N[i + kSamples / 2];
-    const double slope = (s.curve.value(slip + 1e-3) - s.curve.value(slip - 1e-3)) / 2e-3;
+    const double slope =
+        (s.curve.value(slip_percent + 1e-3) - s.curve.value(slip_percent - 1e-3)) / 2e-3;
     const double noise = (engine ? 0.0 : density(s.torque) * square(c / force)) +
                          square(slope) * slip_density + 1e-14;
-    seen.push_back({slip, s.curve.value(slip), force, cell_s / noise});
-    if (slip <= top_slip) continue;
+    seen.push_back({slip_percent, s.curve.value(slip_percent), force, cell_s / noise});
+    if (slip_percent <= top_slip_percent) continue;
     // The least of what tells the curve from those of its family whose top lies further on.
-    if (slip > furthest + kStep_percent) {
-      furthest = slip;
+    if (slip_percent > furthest + kStep_percent) {
+      furthest = slip_percent;
       double least = 1e300;
       for (const Stretched& form : forms) {
-        const double per_slip = form.reached() / slip;
+        const double per_slip = form.reached() / slip_percent;
         double ff = 0.0, fg = 0.0;
         for (const Evidence& e : seen) {
-          const double g = form.value(e.slip * per_slip);
+          const double g = form.value(e.slip_percent * per_slip);
           ff += e.weight * g * g;
           fg += e.weight * g * e.mu;
         }
         const double height = fg / ff;
         double odds = 0.0, omega = 0.0, sum = 0.0, squares = 0.0;
         for (const Evidence& e : seen) {
-          const double rest = e.mu - height * form.value(e.slip * per_slip);
+          const double rest = e.mu - height * form.value(e.slip_percent * per_slip);
           odds += e.weight * rest * rest;
           omega += e.force / c * rest * cell_s / s.variator.primary_inertia_kg_m2;
           sum += omega;
@@ -231,9 +236,9 @@ DetectionBound detection_bound(const Scenario& s, const Trace& trace) {
       }
       power = 0.5 * std::erfc(-(std::sqrt(least) - kOneSided99) / std::sqrt(2.0));
     }
-    const double past =
-        trace.slip_star[i + kSamples / 2] -
-        (s.curve.family() == Family::kPlateau ? trace.slip_star_leave : trace.slip_star_peak);
+    const double past = trace.slip_star_percent[i + kSamples / 2] -
+                        (s.curve.family() == Family::kPlateau ? trace.slip_star_leave_percent
+                                                              : trace.slip_star_peak_percent);
     while (filled < kPastSteps && past > kPastStep_percent * static_cast<double>(filled)) {
       out.stopped[filled++] = power;
     }

@@ -68,14 +68,14 @@ Knots draw_knots(Random& r) {
 FrictionCurve draw_curve(Random& r) {
   const bool rising = r.chance(kRisingShare);
   const double mu_max = r.between(0.06, 0.14);
-  const double slip_peak = r.between(kPeakFrom_percent, kPeakTo_percent);
+  const double slip_peak_percent = r.between(kPeakFrom_percent, kPeakTo_percent);
   const double fall = r.log_between(kLeastFall_per_percent, kMostFall_per_percent);
   // Not every family has a curve of this peak and fall: draw on until one has.
   for (;;) {
     const Family family =
         rising ? Family::kRising : static_cast<Family>(r.below(kFamiliesWithPeak));
     const double shape = draw_shape(r, family);
-    const FrictionCurve curve(family, mu_max, slip_peak, fall, shape, draw_knots(r));
+    const FrictionCurve curve(family, mu_max, slip_peak_percent, fall, shape, draw_knots(r));
     if (curve.possible()) return curve;
   }
 }
@@ -164,8 +164,8 @@ Scenario paper_scenario(std::uint64_t seed, double mu_max) {
   Random r(seed ^ 0x55AA55AAULL);
   Scenario s;
   s.seed = seed;
-  const double slip_peak = r.between(1.6, 2.4), fall = r.between(1e-3, 2.5e-3);
-  s.curve = {Family::kExponential, mu_max, slip_peak, fall, 4.4};
+  const double slip_peak_percent = r.between(1.6, 2.4), fall = r.between(1e-3, 2.5e-3);
+  s.curve = {Family::kExponential, mu_max, slip_peak_percent, fall, 4.4};
   s.torque_Nm = 50.0;
   s.ramp_N_per_s = 26.0;
   s.mu_start = 0.06;

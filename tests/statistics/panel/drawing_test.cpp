@@ -27,10 +27,10 @@ std::vector<Scenario> drawn() {
 }
 
 // Where the curve is largest, by search.
-double top_slip(const FrictionCurve& curve, double to) {
+double top_slip_percent(const FrictionCurve& curve, double to) {
   double best = 0.0;
-  for (double slip = 0.0; slip <= to; slip += 2e-3) {
-    if (curve.value(slip) > curve.value(best)) best = slip;
+  for (double slip_percent = 0.0; slip_percent <= to; slip_percent += 2e-3) {
+    if (curve.value(slip_percent) > curve.value(best)) best = slip_percent;
   }
   return best;
 }
@@ -39,28 +39,29 @@ TEST(Drawing, EveryCurveHasItsTopWhereItSays) {
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
     const FrictionCurve curve = draw_scenario(seed).curve;
     if (!curve.has_peak()) continue;
-    const double slip = top_slip(curve, 20.0);
+    const double slip_percent = top_slip_percent(curve, 20.0);
     const double end =
-        curve.slip_peak() + (curve.family() == Family::kPlateau ? curve.shape() : 0.0);
-    EXPECT_GE(slip, curve.slip_peak() - 0.01) << seed << family_name(curve.family());
-    EXPECT_LE(slip, end + 0.01) << seed << family_name(curve.family());
-    EXPECT_NEAR(curve.value(slip), curve.mu_max(), 1e-4 * curve.mu_max())
+        curve.slip_peak_percent() + (curve.family() == Family::kPlateau ? curve.shape() : 0.0);
+    EXPECT_GE(slip_percent, curve.slip_peak_percent() - 0.01)
         << seed << family_name(curve.family());
-    EXPECT_DOUBLE_EQ(curve.value(-slip), -curve.value(slip));
+    EXPECT_LE(slip_percent, end + 0.01) << seed << family_name(curve.family());
+    EXPECT_NEAR(curve.value(slip_percent), curve.mu_max(), 1e-4 * curve.mu_max())
+        << seed << family_name(curve.family());
+    EXPECT_DOUBLE_EQ(curve.value(-slip_percent), -curve.value(slip_percent));
   }
 }
 
 TEST(Drawing, EveryCurveRisesToItsTopAndFallsBehindIt) {
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
     const FrictionCurve curve = draw_scenario(seed).curve;
-    const double top = curve.has_peak() ? curve.slip_peak() : 30.0;
-    for (double slip = 0.0; slip + 0.01 < top; slip += 0.01) {
-      ASSERT_LE(curve.value(slip), curve.value(slip + 0.01) + 1e-9)
-          << seed << family_name(curve.family()) << slip;
+    const double top = curve.has_peak() ? curve.slip_peak_percent() : 30.0;
+    for (double slip_percent = 0.0; slip_percent + 0.01 < top; slip_percent += 0.01) {
+      ASSERT_LE(curve.value(slip_percent), curve.value(slip_percent + 0.01) + 1e-9)
+          << seed << family_name(curve.family()) << slip_percent;
     }
-    for (double slip = top; curve.has_peak() && slip < 30.0; slip += 0.01) {
-      ASSERT_GE(curve.value(slip) + 1e-9, curve.value(slip + 0.01))
-          << seed << family_name(curve.family()) << slip;
+    for (double slip_percent = top; curve.has_peak() && slip_percent < 30.0; slip_percent += 0.01) {
+      ASSERT_GE(curve.value(slip_percent) + 1e-9, curve.value(slip_percent + 0.01))
+          << seed << family_name(curve.family()) << slip_percent;
     }
   }
 }
@@ -70,7 +71,7 @@ TEST(Drawing, TheFallIsTheMeanOverThreePointsBehindTheTop) {
     const FrictionCurve curve = draw_scenario(seed).curve;
     if (!curve.has_peak()) continue;
     const bool plateau = curve.family() == Family::kPlateau;
-    const double end = curve.slip_peak() + (plateau ? curve.shape() : 0.0);
+    const double end = curve.slip_peak_percent() + (plateau ? curve.shape() : 0.0);
     const double fall = (curve.mu_max() - curve.value(end + 3.0)) / 3.0;
     // A third of the plateau's bend is rounded; the rest as the family can.
     const double near = plateau ? 0.15 : 0.11;
@@ -99,7 +100,7 @@ TEST(Drawing, PeaksLieEvenlyFallsLogEvenly) {
     ++families[static_cast<std::size_t>(s.curve.family())];
     if (!s.curve.has_peak()) continue;
     ++curves;
-    const double place = (s.curve.slip_peak() - 0.8) / 7.2;
+    const double place = (s.curve.slip_peak_percent() - 0.8) / 7.2;
     const double fall = std::log(s.curve.fall_per_percent() / 2e-4) / std::log(60.0);
     ASSERT_TRUE(place >= 0.0 && place < 1.0 && fall >= 0.0 && fall < 1.0);
     ++peaks[static_cast<std::size_t>(4.0 * place)];
@@ -175,12 +176,13 @@ TEST(Bands, OnACaseByHand) {
   EXPECT_EQ(band_of(4.49), 3);
   EXPECT_EQ(band_of(8.0), 4);
 
-  const auto trace = [](double slip_peak, PlantKind plant, double past, double mu, double half) {
+  const auto trace = [](double slip_peak_percent, PlantKind plant, double past, double mu,
+                        double half) {
     Judged t;
     t.has_peak = true;
     t.mu_max = 0.1;
     t.scenario.plant = plant;
-    t.scenario.curve = FrictionCurve(Family::kPower, 0.1, slip_peak, 1e-3, 2.0);
+    t.scenario.curve = FrictionCurve(Family::kPower, 0.1, slip_peak_percent, 1e-3, 2.0);
     t.robust.slip_past_percent = past;
     if (mu <= 0.0) return t;
     t.robust.peak.kind = estimator::PeakKind::kValue;

@@ -49,7 +49,7 @@ FrictionCurve::FrictionCurve(Family family, double mu_max, double slip_peak_perc
                              double fall_per_percent, double shape, const Knots& knots)
     : family_(family),
       mu_max_(mu_max),
-      slip_peak_(slip_peak_percent),
+      slip_peak_percent_(slip_peak_percent),
       fall_(fall_per_percent),
       shape_(shape),
       knots_(knots),
@@ -76,12 +76,12 @@ FrictionCurve::FrictionCurve(Family family, double mu_max, double slip_peak_perc
   if (family_ != Family::kMagic && family_ != Family::kStribeck && family_ != Family::kRational) {
     return;
   }
-  const double drop = 1.0 - unit(slip_peak_ + kFallSpan_percent);
+  const double drop = 1.0 - unit(slip_peak_percent_ + kFallSpan_percent);
   possible_ = possible_ && std::abs(drop - drop_) <= kMissed * drop_;
 }
 
 void FrictionCurve::prepare_magic() {
-  const double far = 1.0 + kFallSpan_percent / slip_peak_;
+  const double far = 1.0 + kFallSpan_percent / slip_peak_percent_;
   const auto peak = [this](double C) {
     const double wanted = std::tan(0.5 * std::numbers::pi / C);
     return root(0.0, 1e4, [&](double x) { return magic_argument(x, shape_) - wanted; });
@@ -93,7 +93,7 @@ void FrictionCurve::prepare_magic() {
 }
 
 void FrictionCurve::prepare_stribeck() {
-  const double far = 1.0 + kFallSpan_percent / slip_peak_;
+  const double far = 1.0 + kFallSpan_percent / slip_peak_percent_;
   a_ = root(1e-3, 0.9, [&](double d) {
     const double peak = stribeck_peak(shape_, d);
     return 1.0 - stribeck(far * peak, shape_, d) / stribeck(peak, shape_, d) - drop_;
@@ -104,12 +104,12 @@ void FrictionCurve::prepare_stribeck() {
 
 void FrictionCurve::prepare_rational() {
   constexpr double kLeast = -1.0, kMost = 25.0;  // more of a bend: no friction rises like that
-  const double far = 1.0 + kFallSpan_percent / slip_peak_;
+  const double far = 1.0 + kFallSpan_percent / slip_peak_percent_;
   a_ = std::clamp(((far - 1.0) * (far - 1.0) / drop_ - far * far - 1.0) / far, kLeast, kMost);
 }
 
 void FrictionCurve::prepare_spline() {
-  const double p = slip_peak_;
+  const double p = slip_peak_percent_;
   const auto left = [this](double share) { return std::max(kLeastOfTop, 1.0 - share * drop_); };
   place_ = {0.0, 0.25 * p, 0.5 * p, 0.75 * p, p, p + 1.0, p + kFallSpan_percent, p + 8.0, p + 60.0};
   height_ = {0.0,
@@ -137,20 +137,20 @@ void FrictionCurve::prepare_spline() {
   }
 }
 
-double FrictionCurve::spline(double slip) const {
-  if (slip >= place_.back()) return height_.back();
+double FrictionCurve::spline(double slip_percent) const {
+  if (slip_percent >= place_.back()) return height_.back();
   std::size_t i = 0;
-  while (slip >= place_[i + 1]) ++i;
+  while (slip_percent >= place_[i + 1]) ++i;
   const double width = place_[i + 1] - place_[i];
-  const double t = (slip - place_[i]) / width;
+  const double t = (slip_percent - place_[i]) / width;
   const double t2 = t * t, t3 = t2 * t;
   return (2.0 * t3 - 3.0 * t2 + 1.0) * height_[i] + (t3 - 2.0 * t2 + t) * width * slope_[i] +
          (3.0 * t2 - 2.0 * t3) * height_[i + 1] + (t3 - t2) * width * slope_[i + 1];
 }
 
 double FrictionCurve::unit(double s) const {
-  const double u = s / slip_peak_;
-  const double beyond = std::max(0.0, s - slip_peak_);
+  const double u = s / slip_peak_percent_;
+  const double beyond = std::max(0.0, s - slip_peak_percent_);
   switch (family_) {
     case Family::kMagic:
       return std::sin(a_ * std::atan(magic_argument(u * x_peak_, shape_)));
@@ -183,22 +183,25 @@ double FrictionCurve::unit(double s) const {
 
 double FrictionCurve::value(double slip_percent) const {
   const double s = std::abs(slip_percent);
-  const double mu = mu_max_ * std::max(unit(s), kLeastOfTop * std::min(1.0, s / slip_peak_));
+  const double mu =
+      mu_max_ * std::max(unit(s), kLeastOfTop * std::min(1.0, s / slip_peak_percent_));
   return slip_percent < 0.0 ? -mu : mu;
 }
 
-double FrictionCurve::slip_reached(double relative) const {
-  return root(0.0, slip_peak_,
-              [&](double slip) { return value(slip) - (1.0 - relative) * mu_max_; });
+double FrictionCurve::slip_reached_percent(double relative) const {
+  return root(0.0, slip_peak_percent_, [&](double slip_percent) {
+    return value(slip_percent) - (1.0 - relative) * mu_max_;
+  });
 }
 
-double FrictionCurve::slip_left(double relative) const {
-  return root(slip_peak_, slip_peak_ + 60.0,
-              [&](double slip) { return (1.0 - relative) * mu_max_ - value(slip); });
+double FrictionCurve::slip_left_percent(double relative) const {
+  return root(slip_peak_percent_, slip_peak_percent_ + 60.0, [&](double slip_percent) {
+    return (1.0 - relative) * mu_max_ - value(slip_percent);
+  });
 }
 
 FrictionCurve FrictionCurve::with_mu_max(double mu_max) const {
-  return {family_, mu_max, slip_peak_, fall_ * mu_max / mu_max_, shape_, knots_};
+  return {family_, mu_max, slip_peak_percent_, fall_ * mu_max / mu_max_, shape_, knots_};
 }
 
 namespace {
@@ -209,7 +212,7 @@ bool shape_before_fall(Family family) { return family == Family::kRising; }
 }  // namespace
 
 std::array<double, kCurveParameters> parameters(const FrictionCurve& curve) {
-  std::array<double, kCurveParameters> p = {curve.mu_max(), curve.slip_peak(),
+  std::array<double, kCurveParameters> p = {curve.mu_max(), curve.slip_peak_percent(),
                                             curve.fall_per_percent(), curve.shape()};
   if (shape_before_fall(curve.family())) std::swap(p[2], p[3]);
   return p;

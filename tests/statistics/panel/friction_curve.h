@@ -33,9 +33,9 @@ inline constexpr Knots kPlainKnots = {0.6, 0.85, 0.96, 0.3, 1.8};
 class FrictionCurve {
  public:
   FrictionCurve() : FrictionCurve(Family::kExponential, 0.1, 2.0, 1.5e-3, 4.0) {}
-  // slip_peak: percent; of a plateau its beginning; of a rising curve that of its knee. shape is
-  // the family's own: E; the steepness of a rise; a plateau's width in points; the exponent of a
-  // rise; what still comes slowly.
+  // slip_peak_percent: percent; of a plateau its beginning; of a rising curve that of its knee.
+  // shape is the family's own: E; the steepness of a rise; a plateau's width in points; the
+  // exponent of a rise; what still comes slowly.
   FrictionCurve(Family family, double mu_max, double slip_peak_percent, double fall_per_percent,
                 double shape, const Knots& knots = kPlainKnots);
 
@@ -43,29 +43,29 @@ class FrictionCurve {
   // The family has a curve of that peak and fall.
   bool possible() const { return possible_; }
   // Ends of the stretch in which mu >= (1 - relative) mu_max.
-  double slip_reached(double relative) const;
-  double slip_left(double relative) const;
+  double slip_reached_percent(double relative) const;
+  double slip_left_percent(double relative) const;
   // The same form with another top.
   FrictionCurve with_mu_max(double mu_max) const;
 
   Family family() const { return family_; }
   bool has_peak() const { return family_ != Family::kRising; }
   double mu_max() const { return mu_max_; }
-  double slip_peak() const { return slip_peak_; }
+  double slip_peak_percent() const { return slip_peak_percent_; }
   double fall_per_percent() const { return fall_; }
   double shape() const { return shape_; }
   const Knots& knots() const { return knots_; }
 
  private:
-  double unit(double slip) const;  // of mu_max
-  double spline(double slip) const;
+  double unit(double slip_percent) const;  // of mu_max
+  double spline(double slip_percent) const;
   void prepare_magic();
   void prepare_stribeck();
   void prepare_rational();
   void prepare_spline();
 
   Family family_;
-  double mu_max_, slip_peak_, fall_, shape_;
+  double mu_max_, slip_peak_percent_, fall_, shape_;
   Knots knots_;
   bool possible_ = true;
   double drop_;                    // of mu_max over the span, relative
@@ -75,7 +75,8 @@ class FrictionCurve {
   std::array<double, kPlaces> place_{}, height_{}, slope_{};
 };
 
-// Parameters by name for the bound, those that the family has: mu_max, slip_peak, fall, shape.
+// Parameters by name for the bound, those that the family has: mu_max, slip_peak_percent, fall,
+// shape.
 inline constexpr int kCurveParameters = 4;
 std::array<double, kCurveParameters> parameters(const FrictionCurve& curve);
 FrictionCurve with_parameters(const FrictionCurve& curve,

@@ -45,7 +45,7 @@ BandFigures band_figures(const std::vector<Judged>& traces, NoiseClass noise,
   for (const Judged& trace : traces) {
     const Scenario& s = trace.scenario;
     if (!trace.has_peak || s.noise != noise) continue;
-    if (band && band_of(s.curve.slip_peak()) != *band) continue;
+    if (band && band_of(s.curve.slip_peak_percent()) != *band) continue;
     const Outcome& o = trace.robust;
     ++f.traces;
     if (is_refused(o.peak)) ++refused;

@@ -295,7 +295,7 @@ void print_confidence(std::FILE* out, const std::vector<Judged>& traces) {
   for (int i = -1; i < kNoiseClasses; ++i) {
     const auto noise = static_cast<NoiseClass>(std::max(0, i));
     int peaks = 0, ended = 0, before = 0, covered = 0;
-    std::vector<double> slip, error;
+    std::vector<double> slip_percent, error;
     for (const Judged& trace : traces) {
       if (!trace.has_peak || (i >= 0 && trace.scenario.noise != noise)) continue;
       ++peaks;
@@ -303,7 +303,7 @@ void print_confidence(std::FILE* out, const std::vector<Judged>& traces) {
       if (o.reason != estimator::StopReason::kConfidence) continue;
       ++ended;
       if (o.slip_share_at_stop < 1.0) ++before;
-      slip.push_back(100.0 * o.slip_share_at_stop);
+      slip_percent.push_back(100.0 * o.slip_share_at_stop);
       error.push_back(100.0 * std::abs(o.relative_error));
       const double truth = trace.mu_max;
       if (o.peak.ci95_low <= truth && truth <= o.peak.ci95_high) ++covered;
@@ -311,8 +311,8 @@ void print_confidence(std::FILE* out, const std::vector<Judged>& traces) {
     std::fprintf(out,
                  "| %s | %.1f %% | %.1f %% | %.0f %% / %.0f %% | %.1f %% / %.1f %% | %.1f %% |\n",
                  i < 0 ? "all" : noise_name(noise), share(ended, peaks), share(before, ended),
-                 percentile(slip, 0.5), percentile(slip, 0.9), percentile(error, 0.5),
-                 percentile(error, 0.95), share(covered, ended));
+                 percentile(slip_percent, 0.5), percentile(slip_percent, 0.9),
+                 percentile(error, 0.5), percentile(error, 0.95), share(covered, ended));
   }
 }
 
@@ -334,8 +334,8 @@ bool write_csv(const char* path, const std::vector<Judged>& traces, bool paper) 
           "%.6f,%.6f,%.6f,%.3f,%.3f,%.5f,%.6f,%.6f,%.3f,%.3f,%s\n",
           static_cast<unsigned long long>(s.seed), method == Method::kPaper ? "paper" : "robust",
           family_name(s.curve.family()), noise_name(s.noise), plant_name(s.plant), s.overrun, s.low,
-          s.torque_Nm, s.ramp_N_per_s, trace.mu_max, s.curve.slip_peak(), trace.has_peak, o.stopped,
-          static_cast<int>(o.reason), o.early, o.delay_s, o.slip_past_percent,
+          s.torque_Nm, s.ramp_N_per_s, trace.mu_max, s.curve.slip_peak_percent(), trace.has_peak,
+          o.stopped, static_cast<int>(o.reason), o.early, o.delay_s, o.slip_past_percent,
           o.slip_past_peak_percent, static_cast<int>(o.peak.kind), o.peak.mu_max, o.peak.mu_max_std,
           o.peak.ci95_low, o.peak.ci95_high, o.relative_error, o.peak.sigma_peak_percent, o.stop_s,
           o.mu_reached, trace.bound, trace.reached_bound, trace.detection.stopped[kOnePoint],

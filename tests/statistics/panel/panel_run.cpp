@@ -34,7 +34,7 @@ Outcome run(const Scenario& scenario, const Trace& trace, const RunOptions& opti
     out.mu_reached = std::max(out.mu_reached, trace.mu[i]);
     for (std::size_t k = 0; k < std::size(kForecastAt); ++k) {
       if (!out.has_peak || out.expected[k].reached ||
-          trace.slip[i] < kForecastAt[k] * scenario.curve.slip_peak()) {
+          trace.slip_percent[i] < kForecastAt[k] * scenario.curve.slip_peak_percent()) {
         continue;
       }
       out.expected[k] = {true, now.mu_max_expected, now.mu_max_low, now.mu_max_high,
@@ -47,14 +47,15 @@ Outcome run(const Scenario& scenario, const Trace& trace, const RunOptions& opti
     }
   }
   out.stop_s = static_cast<double>(last) * sample_s;
-  out.slip_share_at_stop = trace.slip[last] / scenario.curve.slip_peak();
+  out.slip_share_at_stop = trace.slip_percent[last] / scenario.curve.slip_peak_percent();
   out.peak_passed = trace.peak_reached && out.stop_s >= trace.t_peak_s;
   out.delay_s = out.stop_s - trace.t_peak_s;
   out.early = out.stopped && out.stop_s < trace.t_reached_s;
-  out.beyond_10_percent = trace.slip_star[last] > 10.0 + std::max(0.0, trace.slip_star[0]);
-  out.slip_past_peak_percent = trace.slip_star[last] - trace.slip_star_peak;
+  out.beyond_10_percent =
+      trace.slip_star_percent[last] > 10.0 + std::max(0.0, trace.slip_star_percent[0]);
+  out.slip_past_peak_percent = trace.slip_star_percent[last] - trace.slip_star_peak_percent;
   out.slip_past_percent = scenario.curve.family() == Family::kPlateau
-                              ? trace.slip_star[last] - trace.slip_star_leave
+                              ? trace.slip_star_percent[last] - trace.slip_star_leave_percent
                               : out.slip_past_peak_percent;
   do {
     ++out.conclude_calls;

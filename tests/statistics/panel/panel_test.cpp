@@ -79,7 +79,8 @@ TEST(Panel, ACurveThatRisesForEverSeldomGivesAValueThatMisses) {
   const auto rising = [](std::uint64_t seed) {
     Scenario scenario = draw_scenario(seed);
     const FrictionCurve& drawn = scenario.curve;
-    scenario.curve = FrictionCurve(Family::kRising, drawn.mu_max(), drawn.slip_peak(), 0.0, 0.15);
+    scenario.curve =
+        FrictionCurve(Family::kRising, drawn.mu_max(), drawn.slip_peak_percent(), 0.0, 0.15);
     return scenario;
   };
   const auto traces = judge_many(rising, kFirst, kRisingTraces, 1, {.paper = false});

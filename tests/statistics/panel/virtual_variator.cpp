@@ -62,12 +62,12 @@ class CurveTable {
   explicit CurveTable(const FrictionCurve& curve) {
     for (int i = 0; i <= kSize; ++i) values_.push_back(curve.value(kSpacing * i));
   }
-  double value(double slip) const {
-    const double place = std::min(std::abs(slip) / kSpacing, kSize - 1.0);
+  double value(double slip_percent) const {
+    const double place = std::min(std::abs(slip_percent) / kSpacing, kSize - 1.0);
     const auto index = static_cast<std::size_t>(place);
     const double part = place - static_cast<double>(index);
     const double mu = values_[index] + part * (values_[index + 1] - values_[index]);
-    return slip < 0.0 ? -mu : mu;
+    return slip_percent < 0.0 ? -mu : mu;
   }
 
  private:
@@ -118,7 +118,7 @@ Trace simulate(const Scenario& s) {
   const double force_start = force_by_mu / s.mu_start;
   const double force_floor =
       std::max({force_by_mu / s.mu_floor, 0.1 * force_start, s.variator.secondary_spring_force_N});
-  const double slip_reached = curve.slip_reached(0.005);
+  const double slip_reached_percent = curve.slip_reached_percent(0.005);
 
   Channel omega_p_sensor(s.omega_p, s.planted.omega_p, r);
   Channel omega_s_sensor(s.omega_s, s.planted.omega_s, r);
@@ -145,7 +145,7 @@ Trace simulate(const Scenario& s) {
   const double sample_s = 1.0 / s.sample_rate_hz;
   double next_sample_s = 0.0;
   double end_s = 1e9;
-  double slip = 0.0;
+  double slip_percent = 0.0;
   double loss_at_top_Nm = 0.0, force_at_top_N = 0.0;
   double disturbed_s = 1e9;  // since then
   double friction = 1.0;
@@ -171,8 +171,8 @@ Trace simulate(const Scenario& s) {
     // Implicit step in the speed that gives way (rig: secondary, car: primary); the other one is
     // held (rig) or slow (car).
     const auto belt = [&](double wp, double ws) {
-      slip = p.sign * 100.0 * (1.0 - ws / (ratio * wp));
-      return p.sign * 2.0 * friction * table.value(slip) * force * p.radius / p.cosine;
+      slip_percent = p.sign * 100.0 * (1.0 - ws / (ratio * wp));
+      return p.sign * 2.0 * friction * table.value(slip_percent) * force * p.radius / p.cosine;
     };
     if (car) {
       omega_p = solve(omega_p, [&](double trial) {
@@ -213,25 +213,26 @@ Trace simulate(const Scenario& s) {
     torque_sensor.advance(t, read_Nm, previous_t, previous[3]);
     std::copy(std::begin(truth), std::end(truth), std::begin(previous));
 
-    const double mu = friction * table.value(slip);
-    const double slip_star = p.sign * 100.0 * (1.0 - omega_s / omega_p / p.ratio);
+    const double mu = friction * table.value(slip_percent);
+    const double slip_star_percent = p.sign * 100.0 * (1.0 - omega_s / omega_p / p.ratio);
     const double mu_star = std::abs(belt_Nm + loss_Nm) * p.cosine / (2.0 * p.radius * force);
-    if (peaked && out.t_reached_s > 1e8 && slip >= slip_reached) out.t_reached_s = t;
-    if (peaked && !out.peak_reached && slip >= curve.slip_peak()) {
+    if (peaked && out.t_reached_s > 1e8 && slip_percent >= slip_reached_percent)
+      out.t_reached_s = t;
+    if (peaked && !out.peak_reached && slip_percent >= curve.slip_peak_percent()) {
       out.peak_reached = true;
       out.t_peak_s = t;
       loss_at_top_Nm = loss_Nm;
       force_at_top_N = force;
-      out.slip_star_peak = slip_star;
+      out.slip_star_peak_percent = slip_star_percent;
     }
     if (disturbed_s > 1e8 && mu >= s.disturbed_from * curve.mu_max()) disturbed_s = t;
-    if (peaked && slip >= slip_reached && mu >= (1.0 - kLeftTop) * curve.mu_max()) {
-      out.slip_star_leave = std::max(out.slip_star_leave, slip_star);
+    if (peaked && slip_percent >= slip_reached_percent && mu >= (1.0 - kLeftTop) * curve.mu_max()) {
+      out.slip_star_leave_percent = std::max(out.slip_star_leave_percent, slip_star_percent);
     }
     if (t + 1e-9 >= next_sample_s) {
       t_grid.push_back(t);
-      out.slip_star.push_back(slip_star);
-      out.slip.push_back(slip);
+      out.slip_star_percent.push_back(slip_star_percent);
+      out.slip_percent.push_back(slip_percent);
       out.mu.push_back(mu_star);
       out.clamp_N.push_back(force);
       out.torque_belt_Nm.push_back(belt_Nm);
@@ -245,12 +246,12 @@ Trace simulate(const Scenario& s) {
     const bool on_floor = command <= force_floor && t > s.hold_s;
     if (end_s > 1e8 && on_floor) end_s = t + 5.0;
     if (end_s < 1e8 && out.peak_reached) end_s = std::max(end_s, out.t_peak_s + 30.0);
-    if (slip > 30.0 || t > end_s) break;
+    if (slip_percent > 30.0 || t > end_s) break;
     if (car && (omega_p < 20.0 || omega_s < 5.0)) break;
   }
   out.mu_max = friction * curve.mu_max() +
                p.sign * loss_at_top_Nm * p.cosine / (2.0 * p.radius * force_at_top_N);
-  if (!out.peak_reached) out.slip_star_peak = out.slip_star.back();
+  if (!out.peak_reached) out.slip_star_peak_percent = out.slip_star_percent.back();
   for (std::size_t i = 0; i < t_grid.size(); ++i) {
     const double t = t_grid[i];
     out.samples.push_back({.t_ns = static_cast<std::int64_t>(std::llround(t * 1e9)) + 1'000'000'000,

@@ -23,7 +23,7 @@ void count(const sim::VehicleScenario& s, const sim::VehicleTruth& truth, double
   const sim::DrivelineOutput& belt = truth.belt;
   sim::FrictionCurve curve = s.belt.overdrive;
   curve.mu_max = belt.mu_max;
-  curve.peak_slip_percent = 100.0 * belt.peak_slip;
+  curve.peak_slip_percent = 100.0 * belt.peak_slip_share;
   const double torque_Nm = std::abs(belt.belt_torque_Nm);
   const double mu = torque_Nm * std::cos(s.variator.half_wedge_angle_rad) /
                     (2.0 * belt.primary_radius_m * force_N);
@@ -31,7 +31,7 @@ void count(const sim::VehicleScenario& s, const sim::VehicleTruth& truth, double
   const double belt_Nm = s.variator.primary_loss_Nm + s.variator.primary_loss_Nm_per_N * force_N;
   side.force_N += force_N * for_s;
   side.belt_W += belt_Nm * omega_p_rad_s * for_s;
-  side.slip_W += torque_Nm * omega_p_rad_s * carrying_slip(curve, mu) * for_s;
+  side.slip_W += torque_Nm * omega_p_rad_s * carrying_slip_share(curve, mu) * for_s;
   side.pump_W += estimator::pump_torque_Nm(pressure_Pa) * omega_p_rad_s * for_s;
 }
 
@@ -94,7 +94,7 @@ double min_clamp_command_N(const sim::VehicleScenario& s, const Law& law, double
   return std::min(own_force_N, std::max(needed_N, floor_N));
 }
 
-double carrying_slip(const sim::FrictionCurve& curve, double mu) {
+double carrying_slip_share(const sim::FrictionCurve& curve, double mu) {
   double low = 0.0, high = curve.peak_slip_percent / 100.0;
   if (mu >= curve.mu_max) return high;
   for (int i = 0; i < 30; ++i) {
@@ -136,7 +136,8 @@ double gross_slip_s(sim::VehicleScenario scenario, std::uint64_t seed, const Law
   while (!vehicle.finished()) {
     vehicle.step();
     const sim::DrivelineOutput& belt = vehicle.truth().belt;
-    if (counts(vehicle) && std::abs(belt.slip) > belt.fall_slip) slipping_s += scenario.step_s;
+    if (counts(vehicle) && std::abs(belt.slip_share) > belt.fall_slip_share)
+      slipping_s += scenario.step_s;
   }
   return slipping_s;
 }

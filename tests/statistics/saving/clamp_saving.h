@@ -43,6 +43,6 @@ double min_clamp_command_N(const sim::VehicleScenario& scenario, const Law& law,
                            double primary_radius_m, double omega_s_rad_s);
 // Slip at which the belt carries that coefficient, on the rise of its curve, as a fraction; the
 // peak's where it does not.
-double carrying_slip(const sim::FrictionCurve& curve, double mu);
+double carrying_slip_share(const sim::FrictionCurve& curve, double mu);
 
 }  // namespace beltgrip::saving

@@ -31,8 +31,8 @@ TEST(ClampSaving, TheLawIsTheDaemonsFormula) {
 TEST(ClampSaving, SlipIsWhereTheCurveCarriesTheTorque) {
   const sim::FrictionCurve curve;  // tanh, 0.105 at 2 %
   const double u = std::atanh(0.5 * std::tanh(2.2)) / 2.2;
-  EXPECT_NEAR(carrying_slip(curve, 0.0525), 0.02 * u, 1e-8);
-  EXPECT_EQ(carrying_slip(curve, 0.106), 0.02);
+  EXPECT_NEAR(carrying_slip_share(curve, 0.0525), 0.02 * u, 1e-8);
+  EXPECT_EQ(carrying_slip_share(curve, 0.106), 0.02);
 }
 
 TEST(ClampSaving, PaysAtALowFloorAndNotAtAHighOne) {

@@ -71,7 +71,7 @@ TEST(Across, TheWheelsTellWhichPulleyIsWhich) {
 std::vector<Window> coast_that_slips(double torque_Nm) {
   std::vector<Window> windows;
   for (int i = 0; i < 60; ++i) {
-    const double lowered = std::max(0.0, (i - 30) / 29.0), slip = 0.09 * lowered * lowered;
+    const double lowered = std::max(0.0, (i - 30) / 29.0), slip_share = 0.09 * lowered * lowered;
     Window window;
     window.mean.fill(std::numeric_limits<double>::quiet_NaN());
     window.change.fill(0.0);
@@ -80,11 +80,11 @@ std::vector<Window> coast_that_slips(double torque_Nm) {
     };
     const double primary = 200.0 - i;
     set(Role::kPrimarySpeed, primary);
-    set(Role::kSecondarySpeed, 2.25 / (1.0 - slip) * primary);
+    set(Role::kSecondarySpeed, 2.25 / (1.0 - slip_share) * primary);
     set(Role::kPrimaryTorque, torque_Nm);
     set(Role::kAcceleratorPedal, 0.0);
     window.mu_star = 0.05 + 0.05 * lowered;
-    window.slip_percent = (torque_Nm < 0.0 ? 100.0 : -100.0) * slip;
+    window.slip_percent = (torque_Nm < 0.0 ? 100.0 : -100.0) * slip_share;
     windows.push_back(window);
   }
   return windows;

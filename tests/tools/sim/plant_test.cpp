@@ -40,21 +40,21 @@ TEST(FrictionCurve, PeaksWhereItSaysAndIsOdd) {
   for (const CurveShape shape :
        {CurveShape::kTanhFall, CurveShape::kMagicFormula, CurveShape::kBroadTop}) {
     const FrictionCurve curve{shape, 0.105, 2.0, 1.5e-3};
-    double best_mu = 0.0, best_slip = 0.0;
-    for (double slip = 0.0; slip < 0.2; slip += 1e-5) {
-      const double mu = friction_at(curve, slip).mu;
-      if (mu > best_mu) best_mu = mu, best_slip = slip;
-      EXPECT_EQ(friction_at(curve, -slip).mu, -mu);
+    double best_mu = 0.0, best_slip_share = 0.0;
+    for (double slip_share = 0.0; slip_share < 0.2; slip_share += 1e-5) {
+      const double mu = friction_at(curve, slip_share).mu;
+      if (mu > best_mu) best_mu = mu, best_slip_share = slip_share;
+      EXPECT_EQ(friction_at(curve, -slip_share).mu, -mu);
     }
     EXPECT_NEAR(best_mu, 0.105, 1e-9);
-    EXPECT_NEAR(best_slip, 0.02, 2e-5);
+    EXPECT_NEAR(best_slip_share, 0.02, 2e-5);
   }
   const FrictionCurve fall{CurveShape::kTanhFall, 0.105, 2.0, 1.5e-3};
   EXPECT_NEAR(friction_at(fall, 0.12).mu, 0.105 - 10 * 1.5e-3, 1e-12);
   EXPECT_NEAR(friction_at(fall, 5.0).mu, 0.0525, 1e-12);
   FrictionCurve plateau = fall;
   plateau.plateau_percent = 1.5;
-  EXPECT_EQ(plateau.fall_slip(), 0.035);
+  EXPECT_EQ(plateau.fall_slip_share(), 0.035);
   EXPECT_EQ(friction_at(plateau, 0.02).mu, 0.105);
   EXPECT_EQ(friction_at(plateau, 0.034).mu, 0.105);
   EXPECT_EQ(friction_at(plateau, 0.034).slope, 0.0);
@@ -74,11 +74,13 @@ TEST(FrictionCurve, SlopeIsTheDerivative) {
   for (const CurveShape shape : {CurveShape::kTanhFall, CurveShape::kMagicFormula,
                                  CurveShape::kSaturating, CurveShape::kBroadTop}) {
     const FrictionCurve curve{shape, 0.1, 2.5, 2e-3};
-    for (const double slip : {-0.04, -0.01, 0.001, 0.012, 0.024, 0.03, 0.15}) {
+    for (const double slip_share : {-0.04, -0.01, 0.001, 0.012, 0.024, 0.03, 0.15}) {
       const double h = 1e-7;
       const double difference =
-          (friction_at(curve, slip + h).mu - friction_at(curve, slip - h).mu) / (2.0 * h);
-      EXPECT_NEAR(friction_at(curve, slip).slope, difference, 1e-5 * std::abs(difference) + 1e-7);
+          (friction_at(curve, slip_share + h).mu - friction_at(curve, slip_share - h).mu) /
+          (2.0 * h);
+      EXPECT_NEAR(friction_at(curve, slip_share).slope, difference,
+                  1e-5 * std::abs(difference) + 1e-7);
     }
   }
 }
@@ -91,8 +93,8 @@ TEST(Plant, SettlesWhereFrictionCarriesTheTorque) {
   EXPECT_NEAR(out.torque_p_Nm, 50.0, 1e-9);
   // Inverse of the tanh law by hand.
   const double mu = 50.0 * std::cos(kWedge_rad) / (2.0 * kPrimaryRadius_m * 5300.0);
-  const double slip = 0.02 / 2.2 * std::atanh(mu / 0.105 * std::tanh(2.2));
-  EXPECT_NEAR(out.slip, slip, 1e-5);
+  const double slip_share = 0.02 / 2.2 * std::atanh(mu / 0.105 * std::tanh(2.2));
+  EXPECT_NEAR(out.slip_share, slip_share, 1e-5);
   EXPECT_NEAR(out.geometric_ratio, 2.25 * (1.0 - 0.009635), 1e-4);
   EXPECT_FALSE(plant.settle(105.0, 50.0, 2900.0));  // needs 2983 N
 }
@@ -188,10 +190,10 @@ TEST(Plant, MacroSlipGrowsWithTheTorqueDeficit) {
   input.load_torque_Nm = belt_Nm * 1.01;
   input.drive_torque_Nm = 45.0;
   input.drive_torque_slope_Nm_s = -1e6;  // holds the speed
-  while (plant.output(2700.0).slip < 0.03) plant.step(input, 5e-4);
-  const double before = plant.output(2700.0).slip;
+  while (plant.output(2700.0).slip_share < 0.03) plant.step(input, 5e-4);
+  const double before = plant.output(2700.0).slip_share;
   for (int i = 0; i < 2000; ++i) plant.step(input, 5e-4);
-  const double rate_percent_s = 100.0 * (plant.output(2700.0).slip - before);
+  const double rate_percent_s = 100.0 * (plant.output(2700.0).slip_share - before);
   const double ratio = 2.25 * (1.0 - 1.818e-6 * 2700.0);
   EXPECT_NEAR(rate_percent_s, 100.0 * 0.01 * belt_Nm / (0.5 * ratio * 105.0), 2e-3);
 }

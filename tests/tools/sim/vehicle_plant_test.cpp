@@ -84,8 +84,8 @@ TEST(VehiclePlant, FromThePeakToTenPercentAsTabulated) {
       force_N -= row.ramp_N_per_s * 5e-4;
       t_s += 5e-4;
       plant.step(overrun(row.torque_Nm, force_N), 5e-4);
-      if (peak_s == 0.0 && -plant.output().slip >= 0.02) peak_s = t_s;
-      if (-plant.output().slip >= 0.10) ten_s = t_s;
+      if (peak_s == 0.0 && -plant.output().slip_share >= 0.02) peak_s = t_s;
+      if (-plant.output().slip_share >= 0.10) ten_s = t_s;
     }
     EXPECT_NEAR(ten_s - peak_s, row.time_s, 0.06 * row.time_s + 0.01)
         << row.torque_Nm << " Nm, " << row.ramp_N_per_s << " N/s";
@@ -98,7 +98,7 @@ TEST(VehiclePlant, MacroSlipPullsTheEngineDownInOverrunAndFlaresInDrive) {
     plant.settle(130.0 * 2.25 * 0.30 / 5.4, 2.25, 0.0);
     DrivelineInput input = overrun(-sign * 30.0, 0.8 * peak_force_N(30.0));
     for (int i = 0; i < 1000; ++i) plant.step(input, 5e-4);
-    EXPECT_GT(sign * plant.output().slip, 0.10);
+    EXPECT_GT(sign * plant.output().slip_share, 0.10);
     EXPECT_GT(sign * (plant.state().omega_p_rad_s - 130.0), 10.0);
     EXPECT_LT(plant.output().slip_power_W, 2000.0);
     EXPECT_GT(plant.output().slip_power_W, 300.0);
@@ -133,7 +133,7 @@ TEST(VehiclePlant, StandsStillUnderTheBrakeWithoutNoise) {
   }
   EXPECT_NEAR(plant.state().omega_s_rad_s, 0.0, 0.01);
   EXPECT_NEAR(plant.state().omega_p_rad_s, 0.0, 0.05);
-  EXPECT_LT(std::abs(plant.output().slip), 0.01);
+  EXPECT_LT(std::abs(plant.output().slip_share), 0.01);
 }
 
 TEST(VehiclePlant, RatioMovesBetweenItsStopsWithForceRatioAndSpeed) {
@@ -197,7 +197,7 @@ TEST(VehiclePlant, FrictionFollowsTemperatureRatioAndWear) {
   input.primary_force_N = 100.0;
   plant.step(input, 5e-4);
   EXPECT_NEAR(plant.output().mu_max, 0.105 * 1.03, 1e-12);
-  EXPECT_NEAR(plant.output().peak_slip, 0.035, 1e-12);
+  EXPECT_NEAR(plant.output().peak_slip_share, 0.035, 1e-12);
 }
 
 TEST(HydraulicActuator, DeadTimeThenLagThenFloor) {

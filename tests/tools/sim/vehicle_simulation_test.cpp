@@ -124,7 +124,7 @@ TEST(Scenarios, CityMeetsEverythingThatInhibits) {
     vehicle.step();
     ASSERT_TRUE(vehicle.finite());
     const Signals& s = vehicle.signals();
-    ASSERT_LT(std::abs(vehicle.truth().belt.slip), 0.10) << seconds(vehicle);
+    ASSERT_LT(std::abs(vehicle.truth().belt.slip_share), 0.10) << seconds(vehicle);
     if (s.speed_m_s < 0.1) ++seen["standing"];
     if (s.brake_pressed > 0.5) ++seen["brake"];
     if (s.lockup_closed < 0.5 && s.speed_m_s > 10.0) ++seen["open lock-up"];

@@ -64,7 +64,7 @@ TEST_F(ArmingTest, SettlesAfterOneAndAHalfSecondsAndFindsARamp) {
   EXPECT_TRUE(arming_.cleared());
   EXPECT_GE(arming_.plan().crossing.slip_rate_1_s, 0.02);
   EXPECT_LE(arming_.plan().crossing.slip_rate_1_s, 0.03);
-  EXPECT_GT(arming_.plan().crossing.peak_slip_max, 0.02);
+  EXPECT_GT(arming_.plan().crossing.peak_slip_max_share, 0.02);
 }
 
 struct Case {

@@ -77,7 +77,7 @@ struct Drive {
       point.mu_expected = known * 1.05;
       point.mu_least = known * 0.95;
     }
-    point.peak_slip = low ? 0.035 : 0.02;
+    point.peak_slip_share = low ? 0.035 : 0.02;
     point.fall = 100.0 * car.experiment.fall_max_per_percent;
     point.fall_at_fault = 0.5 * point.fall;
     for (double* const each : {&point.fall, &point.fall_at_fault}) {
@@ -163,8 +163,9 @@ Account account(const Drive& drive) {
   const double needed_s = drive.ramp_s(soon, safe ? here.crossing.slip_rate_1_s : 0.025) + 1.0;
   // Waiting is worth a tenth of a point of slip, or reach; with three seconds to spare, and where
   // the car slows by 5 % within 8 s.
-  const bool gains = later.crossing.peak_slip_told > here.crossing.peak_slip_told + 0.001 ||
-                     drive.peak_N(soon) < soon.floor_N;
+  const bool gains =
+      later.crossing.peak_slip_told_share > here.crossing.peak_slip_told_share + 0.001 ||
+      drive.peak_N(soon) < soon.floor_N;
   if (a * 8.0 > 0.05 * now_rad_s && needed_s + 3.0 < left_s && gains) {
     out.found.inhibits = inhibit_bit(Inhibit::kWait);
   } else if (!safe) {
@@ -233,11 +234,11 @@ void compare(const Drive& drive, int* count) {
   const RequestPlan &plan = arming.plan(), &wanted = expected.found.plan;
   EXPECT_NEAR(plan.crossing.slip_rate_1_s, wanted.crossing.slip_rate_1_s, 1e-9);
   EXPECT_NEAR(plan.crossing.ramp_top_N_per_s, wanted.crossing.ramp_top_N_per_s, 1e-6);
-  EXPECT_NEAR(plan.crossing.dearest.slip, wanted.crossing.dearest.slip, 1e-9);
+  EXPECT_NEAR(plan.crossing.dearest.slip_share, wanted.crossing.dearest.slip_share, 1e-9);
   EXPECT_NEAR(plan.crossing.dearest.time_s, wanted.crossing.dearest.time_s, 1e-9);
   EXPECT_NEAR(plan.crossing.dearest.area_s, wanted.crossing.dearest.area_s, 1e-9);
   EXPECT_NEAR(plan.crossing.dearest.late_s, wanted.crossing.dearest.late_s, 1e-9);
-  EXPECT_NEAR(plan.crossing.peak_slip_max, wanted.crossing.peak_slip_max, 1e-9);
+  EXPECT_NEAR(plan.crossing.peak_slip_max_share, wanted.crossing.peak_slip_max_share, 1e-9);
   EXPECT_NEAR(plan.mu_expected, wanted.mu_expected, 1e-12);
   EXPECT_NEAR(plan.mu_least, wanted.mu_least, 1e-12);
   EXPECT_EQ(plan.primary_radius_m, wanted.primary_radius_m);

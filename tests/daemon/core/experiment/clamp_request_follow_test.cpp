@@ -154,14 +154,14 @@ TEST_F(Followed, HasChangedSlowly) {
 // samples, 0.975 to that power.
 class Released : public Followed {
  protected:
-  void end_with(double slip) {
+  void end_with(double slip_share) {
     now_.t += 100 * kMillisecond;
-    now_.omega_s_rad_s = 315.0 * (1.0 + slip);
+    now_.omega_s_rad_s = 315.0 * (1.0 + slip_share);
     sample();
     request_.end(now_.t);
   }
-  int samples_until_held(double slip) {
-    now_.omega_s_rad_s = 315.0 * (1.0 + slip);
+  int samples_until_held(double slip_share) {
+    now_.omega_s_rad_s = 315.0 * (1.0 + slip_share);
     for (int i = 0; i < 400; ++i) {
       if (request_.held_again() != false) return i;
       now_.t += kSample;

@@ -50,11 +50,11 @@ class Stops : public testing::Test {
     return request_.backup_stop();
   }
   // Overrun makes the secondary fast, drive slow.
-  void slip(double share) {
+  void slip_share(double share) {
     now_.omega_s_rad_s = start_rad_s_ * kRatio * (1.0 + (now_.torque_Nm < 0.0 ? share : -share));
   }
   StopReason step_with(double share, Duration after = kApart) {
-    slip(share);
+    slip_share(share);
     return step(after);
   }
   // Slip that grows evenly, and friction with it up to level_from, until something ends it.
@@ -64,7 +64,7 @@ class Stops : public testing::Test {
       const double at_s = 5e-3 * i;
       share = rate_1_s * at_s;
       now_.mu_star = 0.05 + std::min(share, level_from);
-      slip(share + wave * std::sin(std::numbers::pi * at_s / 0.065));
+      slip_share(share + wave * std::sin(std::numbers::pi * at_s / 0.065));
       step(kSample);
     }
     return request_.backup_stop();
@@ -129,8 +129,8 @@ TEST_F(Stops, TwelvePercentOfSlipASecondWhateverFrictionDoes) {
   grow(0.1205, 1.0);
   expect(StopReason::kSlipRate, "slip grows by", 12.05, 12.0, "%/s");
   // At the first of the samples every 0.06 % that is beyond 0.75 %: before, noise has such rates.
-  EXPECT_GT(request_.slip_max(), 0.0075);
-  EXPECT_LT(request_.slip_max(), 0.0082);
+  EXPECT_GT(request_.slip_max_share(), 0.0075);
+  EXPECT_LT(request_.slip_max_share(), 0.0082);
 }
 
 // Before the noise of the rate is known, the same holds with level friction.
@@ -221,7 +221,7 @@ TEST_F(Stops, PowerOnTheWayToThePeakIsNone) {
 // Faster than 0.4 m/s for longer than 0.6 s: 300 rad/s and 0.1 m.
 TEST_F(Stops, FastSlipBeyondThePeak) {
   struct Case {
-    double slip;
+    double slip_share;
     Duration every;
     StopReason reason;
   };
@@ -234,8 +234,8 @@ TEST_F(Stops, FastSlipBeyondThePeak) {
     now_.omega_s_rad_s = 300.0 * kRatio;
     now_.torque_Nm = -3.0;
     begin_on_floor();
-    for (int i = 0; i < 6; ++i) step_with(c.slip, c.every);
-    EXPECT_EQ(request_.backup_stop(), c.reason) << c.slip;
+    for (int i = 0; i < 6; ++i) step_with(c.slip_share, c.every);
+    EXPECT_EQ(request_.backup_stop(), c.reason) << c.slip_share;
   }
   expect(StopReason::kSlipEnergy, "fast slip beyond the peak, for", 0.606, 0.6, "s");
 }
@@ -247,7 +247,7 @@ TEST_F(Stops, NoRoomForAPeak) {
   };
   for (const Case& c : {Case{0.03, 0.0195, 0.0205, 3.05}, Case{0.065, 0.0495, 0.0505, 6.565}}) {
     SetUp();
-    plan_.crossing.dearest.slip = 0.10 - c.room;
+    plan_.crossing.dearest.slip_share = 0.10 - c.room;
     begin();
     EXPECT_EQ(step_with(c.inside), StopReason::kNone);
     step_with(c.outside);

@@ -24,7 +24,7 @@ RampPoint point(double torque_Nm, double omega_p = 140.0) {
   p.mu_least = 0.085;
   p.fall = 0.8;
   p.fall_at_fault = 0.4;
-  p.peak_slip = 0.02;
+  p.peak_slip_share = 0.02;
   return p;
 }
 
@@ -40,7 +40,7 @@ CrossingSearch searched(const RampPoint& p, const Reaction& r) {
 
 // Explicit Euler with a microsecond-fine step, states and events written out.
 Excursion integrated(const RampPoint& p, const Reaction& r, double slip_rate, double fall,
-                     double slip_to_see, double reaction_s) {
+                     double slip_to_see_share, double reaction_s) {
   const double dt = 2e-6;
   const double peak_N = p.torque_Nm * p.wedge_cosine / (2.0 * p.primary_radius_m * p.mu_least);
   const double gain = p.torque_Nm * 1.05 / (p.inertia_kg_m2 * p.omega_p_rad_s);
@@ -49,7 +49,7 @@ Excursion integrated(const RampPoint& p, const Reaction& r, double slip_rate, do
   double force_N = low_N, t = 0.0, seen_s = -1.0, told_s = -1.0, x = 0.0;
   Excursion out;
   while (t < 5.0) {
-    if (seen_s < 0.0 && x >= slip_to_see) seen_s = t;
+    if (seen_s < 0.0 && x >= slip_to_see_share) seen_s = t;
     if (seen_s >= 0.0 && told_s < 0.0 && t >= seen_s + r.detection_s + reaction_s + r.dead_time_s) {
       told_s = t;
     }
@@ -59,7 +59,7 @@ Excursion integrated(const RampPoint& p, const Reaction& r, double slip_rate, do
     x += dt * gain * ((peak_N - force_N) / peak_N + fall * x / p.mu_least);
     t += dt;
     if (x <= 0.0 || x > 10.0) break;
-    out.slip = std::max(out.slip, x);
+    out.slip_share = std::max(out.slip_share, x);
     out.area_s += dt * x;
   }
   out.time_s = t;
@@ -88,13 +88,13 @@ TEST(Reachability, ClosedFormAgainstIntegrationOverTorqueSlipRateFallAndLag) {
             const Excursion exact = integrated(p, r, rate, fall, 0.005, reaction_s);
             SCOPED_TRACE(testing::Message() << torque << " Nm " << rate << " /s fall " << fall
                                             << " lag " << lag << " reaction " << reaction_s);
-            if (exact.slip > 1.0) {
+            if (exact.slip_share > 1.0) {
               ++lost;
-              EXPECT_GT(closed.slip, 0.10);
+              EXPECT_GT(closed.slip_share, 0.10);
               continue;
             }
             ++caught;
-            EXPECT_NEAR(closed.slip, exact.slip, 0.01 * exact.slip);
+            EXPECT_NEAR(closed.slip_share, exact.slip_share, 0.01 * exact.slip_share);
             EXPECT_NEAR(closed.time_s, exact.time_s, 0.01 * exact.time_s);
             EXPECT_NEAR(closed.area_s, exact.area_s, 0.01 * exact.area_s + 1e-5);
             EXPECT_NEAR(closed.late_s, std::max(0.0, exact.late_s), 0.01 * exact.time_s);
@@ -115,27 +115,27 @@ TEST(Reachability, CreepingOverThePeakTakesLonger) {
 }
 
 TEST(Reachability, WorseInEveryRespectIsWorse) {
-  const auto slip = [](const RampPoint& p, const Reaction& r, double rate, double fall,
-                       double reaction_s) {
-    return excursion(p, r, rate, fall, 0.003, reaction_s).slip;
+  const auto slip_share = [](const RampPoint& p, const Reaction& r, double rate, double fall,
+                             double reaction_s) {
+    return excursion(p, r, rate, fall, 0.003, reaction_s).slip_share;
   };
   const Reaction r = reaction(0.1);
-  const double base = slip(point(30.0), r, 0.02, 0.4, 0.06);
-  EXPECT_GT(slip(point(35.0), r, 0.02, 0.4, 0.06), base);
-  EXPECT_GT(slip(point(30.0), r, 0.03, 0.4, 0.06), base);
-  EXPECT_GT(slip(point(30.0), r, 0.02, 0.6, 0.06), base);
-  EXPECT_GT(slip(point(30.0), r, 0.02, 0.4, 0.08), base);
-  EXPECT_GT(slip(point(30.0), reaction(0.15), 0.02, 0.4, 0.06), base);
-  EXPECT_GT(slip(point(30.0, 110.0), r, 0.02, 0.4, 0.06), base);
+  const double base = slip_share(point(30.0), r, 0.02, 0.4, 0.06);
+  EXPECT_GT(slip_share(point(35.0), r, 0.02, 0.4, 0.06), base);
+  EXPECT_GT(slip_share(point(30.0), r, 0.03, 0.4, 0.06), base);
+  EXPECT_GT(slip_share(point(30.0), r, 0.02, 0.6, 0.06), base);
+  EXPECT_GT(slip_share(point(30.0), r, 0.02, 0.4, 0.08), base);
+  EXPECT_GT(slip_share(point(30.0), reaction(0.15), 0.02, 0.4, 0.06), base);
+  EXPECT_GT(slip_share(point(30.0, 110.0), r, 0.02, 0.4, 0.06), base);
   RampPoint light = point(30.0);
   light.inertia_kg_m2 = 0.12;
-  EXPECT_GT(slip(light, r, 0.02, 0.4, 0.06), base);
+  EXPECT_GT(slip_share(light, r, 0.02, 0.4, 0.06), base);
 }
 
 TEST(Reachability, AForceThatCannotCatchTheBeltIsNoEnd) {
   RampPoint p = point(50.0);
   p.own_force_N = peak_force_N(p, p.mu_least);  // the controller's own force is no more than that
-  EXPECT_GT(excursion(p, reaction(0.1), 0.03, 0.4, 0.003, 0.06).slip, 1.0);
+  EXPECT_GT(excursion(p, reaction(0.1), 0.03, 0.4, 0.003, 0.06).slip_share, 1.0);
   EXPECT_EQ(searched(p, reaction(0.1)).crossing().slip_rate_1_s, 0.0);
 }
 
@@ -148,7 +148,7 @@ TEST(Reachability, ARunawayBeyondAllFiguresIsNotCaught) {
   p.own_force_N = 3.0 * peak_force_N(p, p.mu_least);
   Reaction r;
   r.lag_s = 0.5;
-  EXPECT_GT(excursion(p, r, 0.02, 2.0, 0.002, 0.0).slip, 1.0);
+  EXPECT_GT(excursion(p, r, 0.02, 2.0, 0.002, 0.0).slip_share, 1.0);
 }
 
 // The force that is on its way at the top is what the ramp fell within the actuator's answer.
@@ -176,15 +176,16 @@ TEST(Reachability, TheCrossingKeepsEveryLimitAtTheLatestPeakWithRoom) {
           continue;
         }
         ++found;
-        EXPECT_GT(crossing.peak_slip_max, p.peak_slip);
+        EXPECT_GT(crossing.peak_slip_max_share, p.peak_slip_share);
         double nearest = 0.0;
         const auto expect_kept = [&](double fall, double to_see, double reaction_s) {
           const Excursion e = integrated(p, r, crossing.slip_rate_1_s, fall, to_see, reaction_s);
-          const double slip = crossing.peak_slip_max + e.slip;
+          const double slip_share = crossing.peak_slip_max_share + e.slip_share;
           const double energy_J =
-              fall > 0.05 ? (crossing.peak_slip_max * e.time_s + e.area_s) * torque * omega
-                          : 60.0 + slip * std::max(0.0, e.late_s) * torque * omega;
-          for (const double share : {slip / 0.10, slip * omega * 0.0784 / 0.8, energy_J / 90.0}) {
+              fall > 0.05 ? (crossing.peak_slip_max_share * e.time_s + e.area_s) * torque * omega
+                          : 60.0 + slip_share * std::max(0.0, e.late_s) * torque * omega;
+          for (const double share :
+               {slip_share / 0.10, slip_share * omega * 0.0784 / 0.8, energy_J / 90.0}) {
             EXPECT_LT(share, 1.02);
             nearest = std::max(nearest, share);
           }
@@ -204,8 +205,8 @@ TEST(Reachability, TheCrossingKeepsEveryLimitAtTheLatestPeakWithRoom) {
 TEST(Reachability, ASlowInputCostsRoom) {
   Reaction slow = reaction(0.1);
   slow.stale_s = 0.25;  // 10 Hz
-  EXPECT_LT(searched(point(20.0), slow).crossing().peak_slip_max,
-            searched(point(20.0), reaction(0.1)).crossing().peak_slip_max);
+  EXPECT_LT(searched(point(20.0), slow).crossing().peak_slip_max_share,
+            searched(point(20.0), reaction(0.1)).crossing().peak_slip_max_share);
 }
 
 // What the noise of the slip rate hides is seen later: 0.2 s of it, where that is more than 0.3
@@ -217,11 +218,12 @@ TEST(Reachability, NoiseOfTheSlipRateCostsRoom) {
   const Reaction r = reaction(0.08);
   const double rate = searched(quiet, r).crossing().slip_rate_1_s;
   ASSERT_EQ(rate, 0.025);
-  EXPECT_EQ(searched(loud, r).crossing().dearest.slip, searched(quiet, r).crossing().dearest.slip);
+  EXPECT_EQ(searched(loud, r).crossing().dearest.slip_share,
+            searched(quiet, r).crossing().dearest.slip_share);
   ASSERT_EQ(searched(louder, r).crossing().slip_rate_1_s, rate);
-  EXPECT_EQ(searched(louder, r).crossing().dearest.slip,
-            std::max(excursion(louder, r, rate, 0.8, 0.005, 0.01).slip,
-                     excursion(louder, r, rate, 0.4, 0.005, 0.06).slip));
+  EXPECT_EQ(searched(louder, r).crossing().dearest.slip_share,
+            std::max(excursion(louder, r, rate, 0.8, 0.005, 0.01).slip_share,
+                     excursion(louder, r, rate, 0.4, 0.005, 0.06).slip_share));
 }
 
 // A crossing that would run on for more than 1.8 points is none, whatever room there is.
@@ -229,7 +231,7 @@ TEST(Reachability, ACrossingNearToNotBeingCaughtIsNone) {
   for (double torque = 15.0; torque < 50.0; torque += 1.0) {
     const Crossing crossing = searched(point(torque), reaction(0.12)).crossing();
     if (crossing.slip_rate_1_s > 0.0) {
-      EXPECT_LT(crossing.dearest.slip, 0.018) << torque;
+      EXPECT_LT(crossing.dearest.slip_share, 0.018) << torque;
     }
   }
   EXPECT_EQ(searched(point(49.0), reaction(0.12)).crossing().slip_rate_1_s, 0.0);
@@ -239,8 +241,8 @@ TEST(Reachability, ACrossingNearToNotBeingCaughtIsNone) {
 TEST(Reachability, ThereIsLessRoomAtAHigherSpeed) {
   const Crossing crossing = searched(point(25.0), reaction(0.08)).crossing();
   ASSERT_GT(crossing.slip_rate_1_s, 0.0);
-  EXPECT_LT(peak_slip_max(crossing, SlipLimits{}, 25.0, 170.0, 0.0784),
-            peak_slip_max(crossing, SlipLimits{}, 25.0, 130.0, 0.0784));
+  EXPECT_LT(peak_slip_max_share(crossing, SlipLimits{}, 25.0, 170.0, 0.0784),
+            peak_slip_max_share(crossing, SlipLimits{}, 25.0, 130.0, 0.0784));
 }
 
 // At 30 Nm and 140 rad/s a whole turn of slip is 4200 W, and 0.8 m/s are 7.29 %. With a point of
@@ -250,7 +252,7 @@ TEST(Reachability, TheNearestLimitDecides) {
   const auto room = [](const Excursion& dearest) {
     Crossing crossing;
     crossing.dearest = dearest;
-    return peak_slip_max(crossing, SlipLimits{}, 30.0, 140.0, 0.0784);
+    return peak_slip_max_share(crossing, SlipLimits{}, 30.0, 140.0, 0.0784);
   };
   EXPECT_NEAR(room({0.01, 0.1, 0.002, 0.01}), 0.0629, 1e-4);
   EXPECT_NEAR(room({0.01, 0.4, 0.002, 0.01}), 0.0486, 1e-4);
@@ -269,7 +271,8 @@ Crossing chosen(const RampPoint& p, const Reaction& r) {
       const double reaction_s = silence_s + r.cycle_s;
       const Excursion steep = excursion(p, r, rate, fall, 0.003, reaction_s);
       const Excursion flat = excursion(p, r, rate, 0.05, 0.008, reaction_s);
-      tried.dearest.slip = std::max({tried.dearest.slip, steep.slip, flat.slip});
+      tried.dearest.slip_share =
+          std::max({tried.dearest.slip_share, steep.slip_share, flat.slip_share});
       tried.dearest.time_s = std::max(tried.dearest.time_s, steep.time_s);
       tried.dearest.area_s = std::max(tried.dearest.area_s, steep.area_s);
       tried.dearest.late_s = std::max(tried.dearest.late_s, flat.late_s);
@@ -279,13 +282,13 @@ Crossing chosen(const RampPoint& p, const Reaction& r) {
     const double peak_N = p.torque_Nm * p.wedge_cosine / (2.0 * p.primary_radius_m * p.mu_expected);
     const double w = p.torque_Nm * 1.05 / (p.inertia_kg_m2 * p.omega_p_rad_s);
     tried.ramp_top_N_per_s = rate / w * peak_N / (r.dead_time_s + r.lag_s);
-    tried.peak_slip_max =
-        peak_slip_max(tried, {}, p.torque_Nm, p.omega_p_rad_s, p.primary_radius_m);
+    tried.peak_slip_max_share =
+        peak_slip_max_share(tried, {}, p.torque_Nm, p.omega_p_rad_s, p.primary_radius_m);
     const double lasts_s = 0.008 / rate + r.detection_s + r.dead_time_s + r.lag_s;
-    tried.peak_slip_told =
-        std::min(tried.peak_slip_max, 60.0 / (p.torque_Nm * p.omega_p_rad_s * lasts_s));
-    if (tried.dearest.slip < 0.018 && tried.peak_slip_max > p.peak_slip &&
-        tried.peak_slip_told > best.peak_slip_told) {
+    tried.peak_slip_told_share =
+        std::min(tried.peak_slip_max_share, 60.0 / (p.torque_Nm * p.omega_p_rad_s * lasts_s));
+    if (tried.dearest.slip_share < 0.018 && tried.peak_slip_max_share > p.peak_slip_share &&
+        tried.peak_slip_told_share > best.peak_slip_told_share) {
       best = tried;
     }
   }
@@ -321,8 +324,8 @@ TEST(Reachability, TheSearchTakesTheRateThatTellsTheLatestPeak) {
             EXPECT_EQ(crossing.slip_rate_1_s, wanted.slip_rate_1_s);
             EXPECT_NEAR(crossing.ramp_top_N_per_s, wanted.ramp_top_N_per_s,
                         1e-9 * wanted.ramp_top_N_per_s);
-            EXPECT_DOUBLE_EQ(crossing.peak_slip_max, wanted.peak_slip_max);
-            EXPECT_DOUBLE_EQ(crossing.peak_slip_told, wanted.peak_slip_told);
+            EXPECT_DOUBLE_EQ(crossing.peak_slip_max_share, wanted.peak_slip_max_share);
+            EXPECT_DOUBLE_EQ(crossing.peak_slip_told_share, wanted.peak_slip_told_share);
             EXPECT_DOUBLE_EQ(crossing.dearest.area_s, wanted.dearest.area_s);
             EXPECT_DOUBLE_EQ(crossing.dearest.late_s, wanted.dearest.late_s);
             EXPECT_TRUE(search.step());
@@ -346,8 +349,8 @@ TEST(Reachability, TheSearchTakesTheRateThatTellsTheLatestPeak) {
 double runs_on(const RampPoint& p, const Reaction& r, double share) {
   const double silence_s = std::max(r.stale_s, r.timeout_s);
   return std::max(
-      excursion(p, r, 0.02, share * p.fall, 0.003, r.cycle_s).slip,
-      excursion(p, r, 0.02, share * p.fall_at_fault, 0.003, silence_s + r.cycle_s).slip);
+      excursion(p, r, 0.02, share * p.fall, 0.003, r.cycle_s).slip_share,
+      excursion(p, r, 0.02, share * p.fall_at_fault, 0.003, silence_s + r.cycle_s).slip_share);
 }
 
 TEST(Reachability, WhatStandsInTheWayIsToldWithItsNumbers) {
@@ -370,16 +373,16 @@ TEST(Reachability, WhatStandsInTheWayIsToldWithItsNumbers) {
   // A shaft that turns fast: 0.8 m/s at 450 rad/s and 78.4 mm are 2.27 % of slip, and the excursion
   // comes beside the peak.
   RampPoint fast = point(8.0, 450.0);
-  const CrossingDenied slip = searched(fast, reaction(0.05)).denied();
-  ASSERT_EQ(slip.wall, CrossingWall::kSlip);
-  EXPECT_DOUBLE_EQ(slip.limit, 0.02);
-  EXPECT_LT(slip.figure, 0.8 / (450.0 * 0.0784) - 0.008);
-  EXPECT_GT(slip.figure, 0.8 / (450.0 * 0.0784) - 0.018);
+  const CrossingDenied slip_share = searched(fast, reaction(0.05)).denied();
+  ASSERT_EQ(slip_share.wall, CrossingWall::kSlip);
+  EXPECT_DOUBLE_EQ(slip_share.limit, 0.02);
+  EXPECT_LT(slip_share.figure, 0.8 / (450.0 * 0.0784) - 0.008);
+  EXPECT_GT(slip_share.figure, 0.8 / (450.0 * 0.0784) - 0.018);
   // A late peak under much torque, where a fall is gentle: energy.
   RampPoint late = point(45.0, 140.0);
   late.own_force_N *= 3.0;
   late.fall = late.fall_at_fault = 0.1;
-  late.peak_slip = 0.06;
+  late.peak_slip_share = 0.06;
   const CrossingDenied energy = searched(late, reaction(0.1)).denied();
   ASSERT_EQ(energy.wall, CrossingWall::kEnergy);
   EXPECT_DOUBLE_EQ(energy.limit, 90.0);
@@ -391,7 +394,7 @@ TEST(Reachability, WhatIsNotCaughtIsTooMuchInEveryRespect) {
   RampPoint weak = point(50.0);
   weak.own_force_N = 0.5 * peak_force_N(weak, weak.mu_least);
   const Excursion lost = excursion(weak, reaction(0.1), 0.025, 0.8, 0.003, 0.06);
-  EXPECT_GT(lost.slip, 1e3);
+  EXPECT_GT(lost.slip_share, 1e3);
   EXPECT_GT(lost.time_s, 1e3);
   EXPECT_GT(lost.area_s, 1e3);
 }
@@ -407,7 +410,7 @@ TEST(Reachability, TheWallIsTheFirstThatAnotherAccountMeets) {
             RampPoint p = point(torque_Nm, omega_rad_s);
             p.fall = fall;
             p.fall_at_fault = share_at_fault * fall;
-            p.peak_slip = peak;
+            p.peak_slip_share = peak;
             // A controller with much reserve where the fault weighs as much as the fall.
             if (share_at_fault == 1.0) p.own_force_N *= 3.0;
             Reaction r = reaction(share_at_fault == 1.0 ? 0.04 : 0.08);
@@ -426,16 +429,16 @@ TEST(Reachability, TheWallIsTheFirstThatAnotherAccountMeets) {
               const double wait_s = fault ? silence_s : r.cycle_s;
               const Excursion one = excursion(p, r, 0.02, of, 0.003, wait_s);
               const Excursion other = excursion(p, r, 0.02, 0.05, 0.008, wait_s);
-              steep.slip = std::max({steep.slip, one.slip, other.slip});
+              steep.slip_share = std::max({steep.slip_share, one.slip_share, other.slip_share});
               steep.time_s = std::max(steep.time_s, one.time_s);
               steep.area_s = std::max(steep.area_s, one.area_s);
               flat.late_s = std::max(flat.late_s, other.late_s);
             }
-            const double room = std::min(SlipLimits{}.slip_max,
+            const double room = std::min(SlipLimits{}.slip_max_share,
                                          SlipLimits{}.slip_speed_max_m_s / (omega_rad_s * 0.0784));
-            if (steep.slip >= 0.018) {
+            if (steep.slip_share >= 0.018) {
               ++falls;
-              EXPECT_EQ(told.wall, CrossingWall::kFall) << steep.slip;
+              EXPECT_EQ(told.wall, CrossingWall::kFall) << steep.slip_share;
               // To a sixty-fourth, by both of its cases.
               const double share = told.figure / told.limit;
               if (runs_on(p, r, 1.0) >= 0.018) {  // else a flat top does
@@ -444,16 +447,16 @@ TEST(Reachability, TheWallIsTheFirstThatAnotherAccountMeets) {
               if (share > 0.0) {
                 EXPECT_LT(runs_on(p, r, share), 0.018);
               }
-            } else if (room - steep.slip <= peak) {
+            } else if (room - steep.slip_share <= peak) {
               ++slips;
-              EXPECT_EQ(told.wall, CrossingWall::kSlip) << steep.slip;
+              EXPECT_EQ(told.wall, CrossingWall::kSlip) << steep.slip_share;
             } else {
               ++energies;
-              ASSERT_EQ(told.wall, CrossingWall::kEnergy) << steep.slip;
+              ASSERT_EQ(told.wall, CrossingWall::kEnergy) << steep.slip_share;
               const double turn_W = torque_Nm * omega_rad_s;
               const double by_fall = turn_W * (peak * steep.time_s + steep.area_s);
               const double by_stop =
-                  SlipLimits{}.energy_stop_J + turn_W * flat.late_s * (peak + steep.slip);
+                  SlipLimits{}.energy_stop_J + turn_W * flat.late_s * (peak + steep.slip_share);
               by_stops += by_stop > by_fall ? 1 : 0;
               EXPECT_NEAR(told.figure, std::max(by_fall, by_stop), 1e-9 * told.figure);
             }

@@ -27,8 +27,8 @@ struct Ramp {
   }
   void run(int samples) {
     for (int i = 0; i < samples; ++i) {
-      const double slip = kRate_1_s * seconds(t.since_origin()) + noise_ * normal_(random_);
-      course.step(t, kRatio * (1.0 + slip));
+      const double slip_share = kRate_1_s * seconds(t.since_origin()) + noise_ * normal_(random_);
+      course.step(t, kRatio * (1.0 + slip_share));
       t += sample_;
     }
   }
@@ -46,7 +46,7 @@ struct Ramp {
 TEST(SlipCourse, ALineGivesItsRateAndItsMeanOver15Milliseconds) {
   Ramp ramp(kSample);
   ramp.run(201);  // the last at 1 s
-  EXPECT_NEAR(ramp.course.slip(), kRate_1_s * 0.9925, 1e-12);
+  EXPECT_NEAR(ramp.course.slip_share(), kRate_1_s * 0.9925, 1e-12);
   EXPECT_NEAR(ramp.course.rate_1_s(), kRate_1_s, 1e-9);
   EXPECT_NEAR(ramp.course.rate_deviation_1_s(), 0.0, 1e-9);
 }
@@ -54,9 +54,9 @@ TEST(SlipCourse, ALineGivesItsRateAndItsMeanOver15Milliseconds) {
 TEST(SlipCourse, SlipLowersTheRatioInDriveAndRaisesItInOverrun) {
   SlipCourse course;
   course.begin(kRatio, kOverrun_Nm);
-  EXPECT_NEAR(course.slip_at(1.02 * kRatio), 0.02, 1e-12);
+  EXPECT_NEAR(course.slip_share_at(1.02 * kRatio), 0.02, 1e-12);
   course.begin(kRatio, kDrive_Nm);
-  EXPECT_NEAR(course.slip_at(1.02 * kRatio), -0.02, 1e-12);
+  EXPECT_NEAR(course.slip_share_at(1.02 * kRatio), -0.02, 1e-12);
   for (int i = 0; i < 40; ++i)
     course.step(MonoTime{i * kSample}, kRatio * (1.0 - 0.03 * seconds(i * kSample)));
   EXPECT_NEAR(course.rate_1_s(), 0.03, 1e-9);
@@ -83,8 +83,8 @@ TEST(SlipCourse, ForgetsItsRateOverAGapAndEverythingAtTheNextBeginning) {
   ramp.run(1);
   EXPECT_EQ(ramp.course.rate_1_s(), 0.0);
   ramp.course.begin(kRatio, kOverrun_Nm);
-  EXPECT_EQ(ramp.course.slip(), 0.0);
-  EXPECT_EQ(ramp.course.slip_max(), 0.0);
+  EXPECT_EQ(ramp.course.slip_share(), 0.0);
+  EXPECT_EQ(ramp.course.slip_max_share(), 0.0);
   EXPECT_EQ(ramp.course.rate_deviation_1_s(), kUnknown);
 }
 
@@ -93,8 +93,8 @@ TEST(SlipCourse, KeepsTheLargestSlip) {
   course.begin(kRatio, kOverrun_Nm);
   for (int i = 0; i < 10; ++i) course.step(MonoTime{i * kSample}, 1.03 * kRatio);
   for (int i = 10; i < 20; ++i) course.step(MonoTime{i * kSample}, kRatio);
-  EXPECT_NEAR(course.slip(), 0.0, 1e-12);
-  EXPECT_NEAR(course.slip_max(), 0.03, 1e-12);
+  EXPECT_NEAR(course.slip_share(), 0.0, 1e-12);
+  EXPECT_NEAR(course.slip_max_share(), 0.03, 1e-12);
 }
 
 // A line that begins to slip: 60 ms later its rate is that of the new line alone, at 1000 Hz too.
@@ -104,11 +104,11 @@ TEST(SlipCourse, ItsRateIsThatOfTheLast60Milliseconds) {
     course.begin(kRatio, kOverrun_Nm);
     const MonoTime bend{300 * kMillisecond}, end = bend + SlipCourse::kRateOver;
     for (MonoTime t{}; t <= end; t += sample) {
-      const double slip = t > bend ? 0.04 * seconds(t - bend) : 0.0;
+      const double slip_share = t > bend ? 0.04 * seconds(t - bend) : 0.0;
       if (t == end) {
         EXPECT_LT(course.rate_1_s(), 0.04 - 1e-6) << sample;
       }
-      course.step(t, kRatio * (1.0 + slip));
+      course.step(t, kRatio * (1.0 + slip_share));
     }
     EXPECT_NEAR(course.rate_1_s(), 0.04, 1e-9) << sample;
   }
@@ -144,8 +144,8 @@ TEST(SlipCourse, KnowsHowMuchOfItsRateIsNoise) {
 
 // Slip, rate and deviation from all samples of a request, written anew.
 struct ByHand {
-  void step(MonoTime t, double slip) {
-    samples.push_back({t, slip});
+  void step(MonoTime t, double slip_share) {
+    samples.push_back({t, slip_share});
     double recent = 0.0, recent_n = 0.0, mean_s = 0.0, mean = 0.0, n = 0.0;
     const auto in_window = [&](const auto& use) {
       for (const auto& [at, value] : samples) {
@@ -155,7 +155,7 @@ struct ByHand {
     for (const auto& [at, value] : samples) {
       if (t - at <= 15 * kMillisecond) recent += value, recent_n += 1.0;
     }
-    mean_slip = recent / recent_n;
+    mean_slip_share = recent / recent_n;
     double oldest_s = 0.0;
     in_window([&](double at_s, double value) {
       mean_s += at_s, mean += value, n += 1.0;
@@ -182,7 +182,7 @@ struct ByHand {
   double deviation() const { return changes < 20.0 ? kUnknown : std::sqrt(0.5 * square); }
   std::vector<std::pair<MonoTime, double>> samples;
   std::vector<double> rates;
-  double mean_slip = 0.0, rate = 0.0, square = 0.0, changes = 0.0;
+  double mean_slip_share = 0.0, rate = 0.0, square = 0.0, changes = 0.0;
 };
 
 TEST(SlipCourse, IsWhatSumsOverAllSamplesOfTheRequestSay) {
@@ -193,10 +193,10 @@ TEST(SlipCourse, IsWhatSumsOverAllSamplesOfTheRequestSay) {
     course.begin(kRatio, kOverrun_Nm);
     ByHand hand;
     for (int i = 0; i < 400; ++i) {
-      const double slip = 0.02 + 1e-4 * i + (i < 250 ? 1e-4 : 1e-3) * normal(random);
-      course.step(MonoTime{i * sample}, kRatio * (1.0 + slip));
-      hand.step(MonoTime{i * sample}, slip);
-      ASSERT_NEAR(course.slip(), hand.mean_slip, 1e-12) << sample << ' ' << i;
+      const double slip_share = 0.02 + 1e-4 * i + (i < 250 ? 1e-4 : 1e-3) * normal(random);
+      course.step(MonoTime{i * sample}, kRatio * (1.0 + slip_share));
+      hand.step(MonoTime{i * sample}, slip_share);
+      ASSERT_NEAR(course.slip_share(), hand.mean_slip_share, 1e-12) << sample << ' ' << i;
       ASSERT_NEAR(course.rate_1_s(), hand.rate, 1e-9) << sample << ' ' << i;
       if (hand.deviation() == kUnknown) {
         ASSERT_EQ(course.rate_deviation_1_s(), kUnknown) << sample << ' ' << i;

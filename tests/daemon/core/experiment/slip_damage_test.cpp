@@ -79,13 +79,13 @@ TEST_F(Damage, KeepsAllThroughARiseThatMayBeNoise) {
 TEST_F(Damage, ForgetsAQuarterByOneRise) {
   now_.slip_speed_m_s = 0.5;
   run(0.4);
-  now_.slip = 0.02;
+  now_.slip_share = 0.02;
   lead_to(1.002 * kMu, 0.1);
   EXPECT_LE(damage_.energy_J(), 36.0 * 0.75);
   EXPECT_GE(damage_.energy_J(), 36.0 * (1.0 - 0.16 / 0.6));
   EXPECT_NEAR(damage_.fast_s() / 0.4, damage_.energy_J() / 36.0, 1e-9);
   EXPECT_FALSE(damage_.beyond());
-  EXPECT_EQ(damage_.slip_at_best(), 0.02);
+  EXPECT_EQ(damage_.slip_at_best_share(), 0.02);
 }
 
 // By 3 % in 0.5 s: each sample by 0.03 %, so at least 16 rises of 0.15 to 0.18 %.
@@ -113,14 +113,14 @@ TEST_F(Damage, TheBestIsSeenSomewhatLate) {
   for (int i = 1; i <= 400; ++i) {
     const double t = 0.005 * i;
     now_.mu_star = kMu * (1.0 + 0.2 * (t < 1.0 ? t : 2.0 - t));
-    now_.slip = 0.03 * t;
+    now_.slip_share = 0.03 * t;
     run(0.005);
   }
-  EXPECT_GT(damage_.slip_at_best(), 0.03 * 1.02);
-  EXPECT_LT(damage_.slip_at_best(), 0.03 * 1.07);
+  EXPECT_GT(damage_.slip_at_best_share(), 0.03 * 1.02);
+  EXPECT_LT(damage_.slip_at_best_share(), 0.03 * 1.07);
   EXPECT_TRUE(damage_.beyond());
   // What was counted between the last rises is kept in part: 90 W for less than 30 ms.
-  const double since_J = 90.0 * (2.0 - damage_.slip_at_best() / 0.03);
+  const double since_J = 90.0 * (2.0 - damage_.slip_at_best_share() / 0.03);
   EXPECT_GE(damage_.energy_J(), since_J);
   EXPECT_LT(damage_.energy_J(), since_J + 2.7);
 }
