@@ -43,8 +43,8 @@ StepWatch::Means StepWatch::means(std::size_t from, std::size_t to) const noexce
   return {share * (late.value - early.value), share * (late.slip_percent - early.slip_percent)};
 }
 
-bool StepWatch::step(double value, double slip_percent, double slip_noise, const Trend& trend,
-                     double slow_variance) noexcept {
+bool StepWatch::step(double value, double slip_percent, double slip_noise_percent2_s,
+                     const Trend& trend, double slow_variance) noexcept {
   sum_.value += value / per_cell_;
   sum_.slip_percent += slip_percent / per_cell_;
   if (++filled_ < per_cell_) return false;
@@ -71,7 +71,8 @@ bool StepWatch::step(double value, double slip_percent, double slip_noise, const
     const double change = after.value - expected;
     const double faster =
         (after.slip_percent - before.slip_percent) - (before.slip_percent - earlier.slip_percent);
-    if (change * before.value < 0.0 && faster > kFaster * std::sqrt(6.0 * slip_noise / length_s)) {
+    if (change * before.value < 0.0 &&
+        faster > kFaster * std::sqrt(6.0 * slip_noise_percent2_s / length_s)) {
       continue;
     }
     if (!(std::abs(change) > kShare * std::abs(before.value))) continue;

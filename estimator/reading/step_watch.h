@@ -19,9 +19,9 @@ class StepWatch {
  public:
   explicit StepWatch(double sample_rate_hz);
   void reset() noexcept;
-  // One sample; slip_noise: a density; trend and slow_variance: of the same channel as value. True
-  // when a step has just been seen; not where slip moves, which the value may follow.
-  bool step(double value, double slip_percent, double slip_noise, const Trend& trend,
+  // One sample; slip_noise_percent2_s: a density; trend and slow_variance: of the same channel as
+  // value. True when a step has just been seen; not where slip moves, which the value may follow.
+  bool step(double value, double slip_percent, double slip_noise_percent2_s, const Trend& trend,
             double slow_variance) noexcept;
 
  private:

@@ -81,8 +81,8 @@ bool ExperimentRecord::step(const Cell& sample) noexcept {
     if (first_force_N_ <= 0.0) first_force_N_ = force_N;
     lowered_ = force_N < kLowered * first_force_N_;
   }
-  if (lowered_ && torque_watch_.step(sample.torque_Nm, slip_percent, slip_noise(), torque_,
-                                     torque_slow_variance_)) {
+  if (lowered_ && torque_watch_.step(sample.torque_Nm, slip_percent, slip_noise_percent2_s(),
+                                     torque_, torque_slow_variance_)) {
     torque_stepped_s_ = std::min(torque_stepped_s_, sample.t_s);
   }
   if (!slips_) {

@@ -36,16 +36,16 @@ class ExperimentRecord {
   Held torque_held_at(double t_s) const noexcept;
   // Noise of the channels, as densities (variance of the mean over one second), without what is
   // true variation.
-  double torque_noise() const noexcept { return torque_.density(kNoiseScale_s); }
+  double torque_noise_Nm2_s() const noexcept { return torque_.density(kNoiseScale_s); }
   // Variance of the error that readings of the torque close in time share.
   double torque_slow_variance() const noexcept { return torque_slow_variance_; }
   // A shaft's speed is read with the same error at any speed; slip, which divides by it, is not.
-  double slip_noise() const noexcept {
+  double slip_noise_percent2_s() const noexcept {
     return slip_speed_.density(kNoiseScale_s) / (last_omega_rad_s_ * last_omega_rad_s_);
   }
   // Degrees of freedom of that: differences of neighbouring means overlap by half.
   double slip_noise_freedom() const noexcept { return 0.5 * slip_speed_.squares(0.0); }
-  double omega_noise() const noexcept { return omega_p_.density(kNoiseScale_s); }
+  double omega_noise_rad2_s() const noexcept { return omega_p_.density(kNoiseScale_s); }
   // Clamp force at a cell: of the line where it reaches, else as measured.
   double clamp_force_N(const Cell& cell) const noexcept {
     return force_line_.valid && cell.t_s >= force_line_.begin_s ? force_line_.at(cell.t_s)

@@ -52,7 +52,7 @@ void AfterStop::begin(const ExperimentRecord& record) noexcept {
     slip_before_percent_ += history.cell(0, kBeforeCells + i).slip_percent / kSwingCells;
     slip_at_end_percent_ = std::max(slip_at_end_percent_, history.cell(0, i).slip_percent);
   }
-  slip_noise_ = record.slip_noise();
+  slip_noise_percent2_s_ = record.slip_noise_percent2_s();
   force_limit_N_ = force.at(stop_t_s_) +
                    kForceDeviations * std::sqrt(force.variance_at(stop_t_s_) +
                                                 record.force().density(kGroup_s) / kGroup_s);
@@ -102,7 +102,7 @@ bool AfterStop::swung_back() const noexcept {
   const double watched_s = kKeep_s * swing_samples_ / static_cast<double>(samples_.size());
   if (watched_s < kSwingShortest_s) return false;
   const double gained = slip_at_end_percent_ - slip_before_percent_;
-  const double noise = std::sqrt(slip_noise_ / watched_s);
+  const double noise = std::sqrt(slip_noise_percent2_s_ / watched_s);
   return gained > kSwing_percent + kSwingDeviations * noise &&
          swing_slip_percent_ / swing_samples_ < slip_before_percent_ + kSwingShare * gained;
 }

@@ -39,7 +39,7 @@ class AfterStop {
   std::size_t read_before_group_ = 0;
   bool begun_ = false, over_ = false;
   double stop_t_s_ = 0.0, stop_slip_percent_ = 0.0, force_limit_N_ = 0.0;
-  double slip_before_percent_ = 0.0, slip_at_end_percent_ = 0.0, slip_noise_ = 0.0;
+  double slip_before_percent_ = 0.0, slip_at_end_percent_ = 0.0, slip_noise_percent2_s_ = 0.0;
   double swing_slip_percent_ = 0.0;  // sum
   int swing_samples_ = 0;
 };

@@ -15,19 +15,19 @@ constexpr double kLeastGap_percent = 0.02;
 constexpr std::size_t kFewest = 12;  // residuals
 
 struct Group {  // means
-  double slip, mu, force_N;
-  double variance, slip_variance;
+  double slip_percent, mu, force_N;
+  double variance, slip_variance_percent2;
   double t_s, duration_s;
 };
 
-Group group(const CurveSums& begin, const CurveSums& end, double slip_noise) {
+Group group(const CurveSums& begin, const CurveSums& end, double slip_noise_percent2_s) {
   const double weight = end.weight - begin.weight;
   const double duration_s = end.duration_s - begin.duration_s;
-  return {.slip = (end.slip - begin.slip) / weight,
+  return {.slip_percent = (end.slip_percent - begin.slip_percent) / weight,
           .mu = (end.mu - begin.mu) / weight,
           .force_N = (end.force_N - begin.force_N) / weight,
           .variance = 1.0 / weight,
-          .slip_variance = slip_noise / duration_s,
+          .slip_variance_percent2 = slip_noise_percent2_s / duration_s,
           .t_s = (end.t_s - begin.t_s) / duration_s,
           .duration_s = duration_s};
 }
@@ -45,9 +45,9 @@ double slow_in_lack(const Group& a, const Group& b, const Group& c, double share
 }
 
 double below(const Group& a, const Group& b, const Group& c, double slow_relative, double largest) {
-  const double span = c.slip - a.slip;
+  const double span = c.slip_percent - a.slip_percent;
   if (!(span > kLeastGap_percent)) return 0.0;
-  const double share = (b.slip - a.slip) / span;
+  const double share = (b.slip_percent - a.slip_percent) / span;
   if (share < kLeastShare || share > 1.0 - kLeastShare) return 0.0;
   const auto combined = [share](double at_a, double at_b, double at_c) {
     return square(1.0 - share) * at_a + square(share) * at_c + at_b;
@@ -56,7 +56,8 @@ double below(const Group& a, const Group& b, const Group& c, double slow_relativ
   const double slope = (c.mu - a.mu) / span;
   const double force = b.force_N - (1.0 - share) * a.force_N - share * c.force_N;
   double variance = combined(a.variance, b.variance, c.variance) + square(kFormTolerance * b.mu) +
-                    square(slope) * (combined(a.slip_variance, b.slip_variance, c.slip_variance) +
+                    square(slope) * (combined(a.slip_variance_percent2, b.slip_variance_percent2,
+                                              c.slip_variance_percent2) +
                                      square(kDeformation_percent_per_N * force));
   if (!(lacks > largest * std::sqrt(variance))) return 0.0;
   variance += slow_relative * square(b.mu) * slow_in_lack(a, b, c, share);
@@ -74,9 +75,9 @@ double below_chord(std::span<const CurveSums> sums, std::size_t length,
     const CurveSums& second = sums[i + length];
     const CurveSums& third = sums[i + 2 * length];
     const CurveSums& last = sums[i + 3 * length];
-    const Group a = group(first, second, errors.slip_noise);
-    const Group b = group(second, third, errors.slip_noise);
-    const Group c = group(third, last, errors.slip_noise);
+    const Group a = group(first, second, errors.slip_noise_percent2_s);
+    const Group b = group(second, third, errors.slip_noise_percent2_s);
+    const Group c = group(third, last, errors.slip_noise_percent2_s);
     largest = std::max(largest, below(a, b, c, errors.slow_relative, largest));
   }
   return largest;

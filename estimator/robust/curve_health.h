@@ -18,16 +18,16 @@ inline constexpr double kDeformation_percent_per_N = 2e-4;
 
 // Of all points before one, in the order of time.
 struct CurveSums {
-  double weight = 0.0;                         // 1 / variance of mu
-  double slip = 0.0, mu = 0.0, force_N = 0.0;  // times weight
-  double t_s = 0.0;                            // times duration
+  double weight = 0.0;                                 // 1 / variance of mu
+  double slip_percent = 0.0, mu = 0.0, force_N = 0.0;  // times weight
+  double t_s = 0.0;                                    // times duration
   double duration_s = 0.0;
 };
 
 // What is known of the errors, beside the points' own variance.
 struct SharedErrors {
-  double slip_noise = 0.0;     // of slip, a density
-  double slow_relative = 0.0;  // variance of the slow error of mu*, relative (slow_noise.h)
+  double slip_noise_percent2_s = 0.0;  // of slip, a density
+  double slow_relative = 0.0;          // variance of the slow error of mu*, relative (slow_noise.h)
 };
 
 // By how many deviations a group of `length` points lies below the chord of the groups before and

@@ -29,7 +29,7 @@ void FollowOn::begin(const ExperimentRecord& record) noexcept {
   if (begun_ || history.size(0) < kBeforeCell + kBeforeCells) return;
   begun_ = true;
   stop_t_s_ = record.duration_s();
-  slip_noise_ = record.slip_noise();
+  slip_noise_percent2_s_ = record.slip_noise_percent2_s();
   force_variance_N2_ = record.force().density(kMean_s) / kMean_s;
   before_cells_s_ = history.cell_s(0) * static_cast<double>(kBeforeCells);
   for (std::size_t i = kBeforeCell; i < kBeforeCell + kBeforeCells; ++i) {
@@ -74,10 +74,10 @@ bool FollowOn::stood_still(double mu, double traction_per_Nm_N,
   // Slip gained around the stop, less what the later pace, so many times over, would have gained.
   const double times =
       kSlower * (middle_.at_s() - before_.at_s()) / (late_.at_s() - middle_.at_s());
-  const double gained = middle_.slip() - before_.slip();
-  const double later = late_.slip() - middle_.slip();
-  const double variance =
-      slip_noise_ * (1.0 / before_cells_s_ + (square(1.0 + times) + square(times)) / kMean_s);
+  const double gained = middle_.mean_slip_percent() - before_.mean_slip_percent();
+  const double later = late_.mean_slip_percent() - middle_.mean_slip_percent();
+  const double variance = slip_noise_percent2_s_ *
+                          (1.0 / before_cells_s_ + (square(1.0 + times) + square(times)) / kMean_s);
   return gained - times * later > kDeviations * std::sqrt(variance);
 }
 

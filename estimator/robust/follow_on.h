@@ -29,7 +29,7 @@ class FollowOn {
     double n = 0.0, t_s = 0.0, slip_percent = 0.0, clamp_force_N = 0.0;  // sums
     void add(double after_s, const Cell& cell) noexcept;
     double at_s() const noexcept { return t_s / n; }
-    double slip() const noexcept { return slip_percent / n; }
+    double mean_slip_percent() const noexcept { return slip_percent / n; }
     double force_N() const noexcept { return clamp_force_N / n; }
   };
   // Slip is compared around kMiddle_s and at kTo_s, in means over kMean_s.
@@ -39,7 +39,7 @@ class FollowOn {
 
   bool begun_ = false;
   double stop_t_s_ = 0.0, after_s_ = 0.0;
-  double slip_noise_ = 0.0, before_cells_s_ = 0.0;
+  double slip_noise_percent2_s_ = 0.0, before_cells_s_ = 0.0;
   double force_variance_N2_ = 0.0;  // of a mean over kMean_s
   Mean before_, middle_, late_;
   // From kMiddle_s on.

@@ -48,7 +48,8 @@ ForceStep::Means ForceStep::means(std::size_t from, std::size_t to) const noexce
           share * (late.slip_percent - early.slip_percent)};
 }
 
-bool ForceStep::steps(std::size_t length, double slip_noise, const Trend& force) const noexcept {
+bool ForceStep::steps(std::size_t length, double slip_noise_percent2_s,
+                      const Trend& force) const noexcept {
   const double length_s = kCell_s * static_cast<double>(length);
   const std::size_t before_from = 2 * length + kGapCells;
   const Means earlier = means(before_from + length, before_from + 2 * length);
@@ -77,12 +78,12 @@ bool ForceStep::steps(std::size_t length, double slip_noise, const Trend& force)
   const double rise =
       1.0 - earlier.torque_Nm * before.force_N / (before.torque_Nm * earlier.force_N);
   const double jump = -jump_N / after.force_N;
-  const double slip_deviation = std::sqrt(slip_noise / length_s);
-  const double surely = kSlopeDeviations * std::sqrt(2.0) * slip_deviation;
+  const double slip_deviation_percent = std::sqrt(slip_noise_percent2_s / length_s);
+  const double surely = kSlopeDeviations * std::sqrt(2.0) * slip_deviation_percent;
   const double creep = before.slip_percent - earlier.slip_percent;
-  const double slip_jump = after.slip_percent - before.slip_percent -
-                           on * (creep + later.slip_percent - after.slip_percent);
-  const double slip_noise_percent = kSlipDeviations * spread * slip_deviation;
+  const double slip_jump_percent = after.slip_percent - before.slip_percent -
+                                   on * (creep + later.slip_percent - after.slip_percent);
+  const double slip_noise_percent = kSlipDeviations * spread * slip_deviation_percent;
   // No ramp is as quick as that, and slip shows nothing of it. A clamp that is given back is as
   // quick: then the force goes on falling no more.
   const double surely_falls_N = kSlopeDeviations * std::sqrt(2.0) * force_deviation_N;
@@ -93,7 +94,7 @@ bool ForceStep::steps(std::size_t length, double slip_noise, const Trend& force)
       std::max(kDeviations * (1.0 + kStudent / std::max(squares, 1.0)) * spread * force_deviation_N,
                kLargeShare * std::abs(before.force_N));
   if (falls_on && squares >= kFewestSquares && std::abs(jump_N) > large_N &&
-      -slip_jump * jump_N < slip_noise_percent * std::abs(jump_N)) {
+      -slip_jump_percent * jump_N < slip_noise_percent * std::abs(jump_N)) {
     return true;
   }
   if (!(rise > 0.0) || !(creep > surely)) return false;
@@ -109,10 +110,11 @@ bool ForceStep::steps(std::size_t length, double slip_noise, const Trend& force)
       expected = std::max(expected, before.slip_percent - past.slip_percent - surely);
     }
   }
-  return std::abs(slip_jump) + slip_noise_percent < kLeastMove * expected;
+  return std::abs(slip_jump_percent) + slip_noise_percent < kLeastMove * expected;
 }
 
-bool ForceStep::step(const Cell& sample, double slip_noise, const Trend& force) noexcept {
+bool ForceStep::step(const Cell& sample, double slip_noise_percent2_s,
+                     const Trend& force) noexcept {
   sum_.force_N += sample.clamp_force_N / per_cell_;
   sum_.torque_Nm += sample.torque_Nm / per_cell_;
   sum_.slip_percent += sample.slip_percent / per_cell_;
@@ -126,7 +128,7 @@ bool ForceStep::step(const Cell& sample, double slip_noise, const Trend& force) 
   sum_ = {};
   for (std::size_t length = kShortest; length <= kLongest; length *= 2) {
     if (count_ < 4 * length + kGapCells) break;
-    if (steps(length, slip_noise, force)) return true;
+    if (steps(length, slip_noise_percent2_s, force)) return true;
   }
   return false;
 }

@@ -22,9 +22,9 @@ class ForceStep {
   // resolution_N: of the clamp force, as its pressure's signal is rounded; 0: not known.
   ForceStep(double sample_rate_hz, double resolution_N);
   void reset() noexcept;
-  // One sample; slip_noise: a density, force: the trend of the clamp force. True when a step has
-  // just been seen.
-  bool step(const Cell& sample, double slip_noise, const Trend& force) noexcept;
+  // One sample; slip_noise_percent2_s: a density, force: the trend of the clamp force. True when a
+  // step has just been seen.
+  bool step(const Cell& sample, double slip_noise_percent2_s, const Trend& force) noexcept;
 
  private:
   struct Means {
@@ -33,7 +33,7 @@ class ForceStep {
   static constexpr std::size_t kCells = 512;  // of 50 ms
   // Over the cells from `from` to `to`, counted back from now.
   Means means(std::size_t from, std::size_t to) const noexcept;
-  bool steps(std::size_t length, double slip_noise, const Trend& force) const noexcept;
+  bool steps(std::size_t length, double slip_noise_percent2_s, const Trend& force) const noexcept;
 
   std::array<Means, kCells> sums_{};  // of all cells before
   std::size_t count_ = 0;

@@ -20,7 +20,7 @@ constexpr std::size_t kCellsPerStep = 48, kPointsPerStep = 64, kFormsPerStep = 4
 constexpr std::size_t kLevelsPerStep = 4;
 constexpr int kFormWork = 8000, kPointWork = 130, kSolveWork = 650;
 constexpr std::size_t kTermsPerStep = 16;
-constexpr double kSlipStep = 0.04;  // percent: slip moves on by this, or
+constexpr double kSlipStep_percent = 0.04;  // percent: slip moves on by this, or
 constexpr double kShortestPoint_s = 0.02;
 constexpr std::size_t kTailCells = 4;  // of a point; by so many deviations they leave its mean
 constexpr double kDrift = 3.0;
@@ -109,7 +109,7 @@ void PeakFit::begin(const ExperimentRecord& record, double traction_per_Nm_N, do
                     double stop_s) noexcept {
   record_ = &record;
   c_ = traction_per_Nm_N;
-  inertia_ = inertia_kg_m2;
+  inertia_kg_m2_ = inertia_kg_m2;
   stop_s_ = stop_s;
   stage_ = Stage::kCells;
   level_ = 0;
@@ -130,7 +130,7 @@ bool PeakFit::step() noexcept {
         return true;
       }
       next_cell_ = cell_count_;
-      last_slip_ = cells_[cell_count_ - 1].slip_percent;
+      last_slip_percent_ = cells_[cell_count_ - 1].slip_percent;
       stage_ = Stage::kPoints;
       return false;
     case Stage::kPoints:
@@ -176,10 +176,11 @@ bool PeakFit::step() noexcept {
     case Stage::kChords:
       // Groups of 1, 2, 4, ...: the longer ones are few.
       do {
-        result_.below_chord = std::max(
-            result_.below_chord,
-            below_chord({health_sums_.data(), health_count_}, next_,
-                        {.slip_noise = record_->slip_noise(), .slow_relative = slow_relative()}));
+        result_.below_chord =
+            std::max(result_.below_chord,
+                     below_chord({health_sums_.data(), health_count_}, next_,
+                                 {.slip_noise_percent2_s = record_->slip_noise_percent2_s(),
+                                  .slow_relative = slow_relative()}));
         next_ *= 2;
       } while (next_ > 4 && next_ <= kLargestGroup);
       if (next_ > kLargestGroup) go_to(Stage::kResiduals);
@@ -213,16 +214,17 @@ void PeakFit::gather_level() noexcept {
 }
 
 // By which slip has surely moved, from one mean over so long to the next.
-double PeakFit::slip_step(double duration_s) const noexcept {
-  return std::max(kSlipStep, 2.0 * std::sqrt(record_->slip_noise() / duration_s));
+double PeakFit::slip_step_percent(double duration_s) const noexcept {
+  return std::max(kSlipStep_percent,
+                  2.0 * std::sqrt(record_->slip_noise_percent2_s() / duration_s));
 }
 
 void PeakFit::make_points() noexcept {
-  const double slip_noise = record_->slip_noise();
+  const double slip_noise_percent2_s = record_->slip_noise_percent2_s();
   std::size_t budget = kCellsPerStep;
   while (next_cell_ > 0 && budget > 0) {
     const std::size_t begin = next_cell_;
-    double duration_s = 0.0, slip = 0.0;
+    double duration_s = 0.0, slip_percent_s = 0.0;
     double tail_s = 0.0, tail = 0.0;  // of its newest cells
     while (next_cell_ > 0) {
       --next_cell_;
@@ -231,23 +233,25 @@ void PeakFit::make_points() noexcept {
         sum_s += sign * lengths_s_[cell];
         sum += sign * lengths_s_[cell] * cells_[cell].slip_percent;
       };
-      count_in(next_cell_, 1.0, duration_s, slip);
+      count_in(next_cell_, 1.0, duration_s, slip_percent_s);
       count_in(next_cell_, 1.0, tail_s, tail);
       if (begin - next_cell_ > kTailCells) count_in(next_cell_ + kTailCells, -1.0, tail_s, tail);
       if (duration_s < kShortestPoint_s) continue;
-      if (std::abs(slip / duration_s - last_slip_) > slip_step(duration_s) ||
+      if (std::abs(slip_percent_s / duration_s - last_slip_percent_) >
+              slip_step_percent(duration_s) ||
           duration_s > kLongestPoint_s)
         break;
       // Slip that begins to run away is seen in the newest cells, before it moves the mean.
       const double head_s = duration_s - tail_s;
       if (head_s < 0.5 * kShortestPoint_s) continue;
-      const double drift = tail / tail_s - (slip - tail) / head_s;
+      const double drift = tail / tail_s - (slip_percent_s - tail) / head_s;
       if (std::abs(drift) >
-          std::max(kSlipStep, kDrift * std::sqrt(slip_noise * (1.0 / tail_s + 1.0 / head_s)))) {
+          std::max(kSlipStep_percent,
+                   kDrift * std::sqrt(slip_noise_percent2_s * (1.0 / tail_s + 1.0 / head_s)))) {
         break;
       }
     }
-    last_slip_ = slip / duration_s;
+    last_slip_percent_ = slip_percent_s / duration_s;
     add_point(begin, next_cell_);
   }
 }
@@ -275,18 +279,18 @@ void PeakFit::add_point(std::size_t begin, std::size_t end) noexcept {
     const double length_s = lengths_s_[i];
     point.duration_s += length_s;
     point.t_s += length_s * cells_[i].t_s;
-    point.slip += length_s * cells_[i].slip_percent;
+    point.slip_percent += length_s * cells_[i].slip_percent;
     point.force_N += length_s * record_->clamp_force_N(cells_[i]);
     torque += length_s * cells_[i].torque_Nm;
   }
   point.t_s /= point.duration_s;
-  point.slip /= point.duration_s;
+  point.slip_percent /= point.duration_s;
   point.force_N /= point.duration_s;
   torque /= point.duration_s;
-  const double noise = record_->torque_noise();
+  const double noise = record_->torque_noise_Nm2_s();
   double variance = noise / point.duration_s;
   point.torque_variance = variance;
-  if (inertia_ > 0.0) {
+  if (inertia_kg_m2_ > 0.0) {
     // The engine's torque changes slowly: of its line and the readings, by their variances.
     const Line& held = record_->torque_line();
     if (point.t_s > held.begin_s) {
@@ -302,11 +306,12 @@ void PeakFit::add_point(std::size_t begin, std::size_t end) noexcept {
     const double speed_0 = speed_at_edge(begin, t_0, weight_0);
     const double speed_1 = speed_at_edge(end, t_1, weight_1);
     const double span_s = std::max(1e-3, t_1 - t_0);
-    torque -= inertia_ * (speed_1 - speed_0) / span_s;
-    point.inertia_per_s = inertia_ / span_s;
-    point.speed_variance_begin = record_->omega_noise() / weight_0;
-    point.speed_variance_end = record_->omega_noise() / weight_1;
-    variance += square(inertia_ / span_s) * (point.speed_variance_begin + point.speed_variance_end);
+    torque -= inertia_kg_m2_ * (speed_1 - speed_0) / span_s;
+    point.inertia_per_s = inertia_kg_m2_ / span_s;
+    point.speed_variance_begin = record_->omega_noise_rad2_s() / weight_0;
+    point.speed_variance_end = record_->omega_noise_rad2_s() / weight_1;
+    variance +=
+        square(inertia_kg_m2_ / span_s) * (point.speed_variance_begin + point.speed_variance_end);
   }
   point.torque_Nm = torque;
   const double traction = c_ / point.force_N;
@@ -369,13 +374,14 @@ void PeakFit::find_stretch() noexcept {
   first_ = top_;
   while (first_ > oldest_ && belongs(first_ - 1)) --first_;
   // What the noise in slip does to mu*: by the slope around.
-  const double slip_noise = record_->slip_noise();
+  const double slip_noise_percent2_s = record_->slip_noise_percent2_s();
   for (std::size_t i = first_; i < point_count_; ++i) {
     points_[i].variance += square(kFormError * std::max(0.0, mu_top_ - points_[i].mu));
     const Point& a = points_[i > first_ + kNeighbours ? i - kNeighbours : first_];
     const Point& b = points_[std::min(point_count_ - 1, i + kNeighbours)];
-    const double slope = std::clamp((b.mu - a.mu) / std::max(0.1, b.slip - a.slip), 0.0, 0.1);
-    points_[i].variance += square(slope) * slip_noise / points_[i].duration_s;
+    const double slope =
+        std::clamp((b.mu - a.mu) / std::max(0.1, b.slip_percent - a.slip_percent), 0.0, 0.1);
+    points_[i].variance += square(slope) * slip_noise_percent2_s / points_[i].duration_s;
     result_.duration_s += points_[i].duration_s;
   }
 }
@@ -391,13 +397,13 @@ double PeakFit::force_variance(double begin_s, double end_s) const noexcept {
 // Mean torque by mean force is a mean of mu*, weighted by force: its largest was no less. Within a
 // window the speeds at its points' ends cancel, all but the first and the last.
 void PeakFit::find_reached(std::size_t length) noexcept {
-  double time_s = 0.0, torque = 0.0, force = 0.0, slip = 0.0, squares = 0.0;
+  double time_s = 0.0, torque = 0.0, force = 0.0, slip_percent_s = 0.0, squares = 0.0;
   const auto count_in = [&](const Point& point, double sign) {
     const double weight_s = sign * point.duration_s;
     time_s += weight_s;
     torque += weight_s * point.torque_Nm;
     force += weight_s * point.force_N;
-    slip += weight_s * point.slip;
+    slip_percent_s += weight_s * point.slip_percent;
     squares += weight_s * point.duration_s * point.torque_variance;
   };
   for (std::size_t i = first_; i < point_count_; ++i) {
@@ -410,9 +416,9 @@ void PeakFit::find_reached(std::size_t length) noexcept {
     if (mu < result_.reached * (1.0 - kReachedDeviations * result_.reached_deviation)) continue;
     const double T = torque / time_s, F = force / time_s;
     double torque_variance =
-        (squares + square(inertia_) * (begin.speed_variance_begin + end.speed_variance_end)) /
+        (squares + square(inertia_kg_m2_) * (begin.speed_variance_begin + end.speed_variance_end)) /
         square(time_s);
-    if (inertia_ > 0.0) {
+    if (inertia_kg_m2_ > 0.0) {
       torque_variance += square(end.held_share) * record_->torque_line().variance_at(end.t_s);
     }
     // Windows share the slow error: it is not the largest of many.
@@ -428,7 +434,7 @@ void PeakFit::find_reached(std::size_t length) noexcept {
     }
     result_.reached = mu;
     result_.reached_deviation = deviation;
-    result_.reached_slip = slip / time_s;
+    result_.reached_slip_percent = slip_percent_s / time_s;
   }
 }
 
@@ -438,10 +444,10 @@ double PeakFit::corner(std::size_t index) const noexcept {
 }
 
 void PeakFit::find_span() noexcept {
-  slip_low_ = slip_high_ = points_[first_].slip;
+  slip_low_percent_ = slip_high_percent_ = points_[first_].slip_percent;
   for (std::size_t i = first_; i < point_count_; ++i) {
-    slip_low_ = std::min(slip_low_, points_[i].slip);
-    slip_high_ = std::max(slip_high_, points_[i].slip);
+    slip_low_percent_ = std::min(slip_low_percent_, points_[i].slip_percent);
+    slip_high_percent_ = std::max(slip_high_percent_, points_[i].slip_percent);
   }
   slow_terms_.setZero();
   slow_spread_ = 1.0;
@@ -469,7 +475,7 @@ void PeakFit::whiten_terms() noexcept {
     slow_spread_ *= 1.0 - filter.gain * filter.per_Nm;
 
     Terms& terms = terms_[next_];
-    const double x = point.slip - slip_high_;
+    const double x = point.slip_percent - slip_high_percent_;
     terms(kOne) = 1.0;
     terms(kX) = x;
     terms(kY) = point.mu - mu_top_;
@@ -518,7 +524,8 @@ bool PeakFit::next_rise() noexcept {
 void PeakFit::sum_up(std::size_t at) noexcept {
   const Whitening& filter = whitening_[at];
   slow_rise_ *= filter.faded;
-  const double rest = rise_.at(points_[first_ + at].slip - slip_high_) - filter.per_Nm * slow_rise_;
+  const double rest =
+      rise_.at(points_[first_ + at].slip_percent - slip_high_percent_) - filter.per_Nm * slow_rise_;
   slow_rise_ += filter.gain * rest;
   const double e = rest * filter.per_deviation;
   rise_square_ += e * e;
@@ -580,7 +587,7 @@ void PeakFit::solve(std::size_t corner_number) noexcept {
   if (!(theta(1) >= 0.0) || (has_corner && !(theta(3) >= 0.0))) return;
 
   const double B = theta(1), d = theta(2), h = has_corner ? theta(3) : 0.0;
-  const double low = slip_low_ - slip_high_;
+  const double low = slip_low_percent_ - slip_high_percent_;
   const auto terms = [&](double x) {
     return Eigen::Vector4d(1.0, -rise.at(x), -x, has_corner ? -std::max(0.0, x - corner) : 0.0);
   };
@@ -613,7 +620,7 @@ void PeakFit::solve(std::size_t corner_number) noexcept {
                            .prior = prior,
                            .mu = mu_top_ + g.dot(theta),
                            .variance = factors.square_of(g),
-                           .slip = slip_high_ + best,
+                           .slip_percent = slip_high_percent_ + best,
                            .fall = g_fall.dot(theta),
                            .fall_variance = factors.square_of(g_fall),
                            .end_slope = g_end.dot(theta),
@@ -640,7 +647,7 @@ void PeakFit::average() noexcept {
     average_.mu += w * rest;
     average_.squares += w * rest * rest;
     average_.variance += w * form.variance * scale;
-    average_.slip += w * form.slip;
+    average_.slip_percent += w * form.slip_percent;
     // All of these curves bend down only: one that falls at the end of the data has its top in
     // them.
     const double deviation = std::max(kSmallestSlope, std::sqrt(form.end_slope_variance * scale));
@@ -660,9 +667,9 @@ void PeakFit::finish() noexcept {
   const double mu = a.mu / a.weight;
   result_.mu = mu_top_ + mu;
   result_.variance = a.variance / a.weight + std::max(0.0, a.squares / a.weight - mu * mu);
-  result_.slip = a.slip / a.weight;
+  result_.slip_percent = a.slip_percent / a.weight;
   result_.inside = a.inside / a.weight;
-  result_.end_slip = slip_high_;
+  result_.end_slip_percent = slip_high_percent_;
   result_.end_rise = a.end_rise / a.weight;
   result_.fall = a.fall / a.weight;
   result_.fall_variance = a.fall_variance / a.weight;
@@ -670,7 +677,7 @@ void PeakFit::finish() noexcept {
   for (std::size_t i = point_count_; i > first_; --i) {
     result_.t_s = points_[i - 1].t_s;
     result_.held_share = points_[i - 1].held_share;
-    if (points_[i - 1].slip <= result_.slip) break;
+    if (points_[i - 1].slip_percent <= result_.slip_percent) break;
   }
   result_.valid = std::isfinite(result_.mu) && result_.mu > 0.0;
   result_.passed = came_after();
@@ -689,15 +696,15 @@ bool PeakFit::came_after() const noexcept {
       point_count_ - std::max<std::size_t>(1, (point_count_ - first_) / 10);
   for (std::size_t i = first_; i < point_count_; ++i) {
     const Point& point = points_[i];
-    Side& side = point.slip > result_.slip ? beyond : before;
+    Side& side = point.slip_percent > result_.slip_percent ? beyond : before;
     side.time_s += point.duration_s;
     side.sum += point.duration_s * point.t_s;
     if (i < end_begin) continue;
     last.time_s += point.duration_s;
-    last.sum += point.duration_s * point.slip;
+    last.sum += point.duration_s * point.slip_percent;
   }
   return before.time_s > 0.0 && beyond.time_s > 0.0 && beyond.mean() > before.mean() &&
-         last.mean() > result_.slip;
+         last.mean() > result_.slip_percent;
 }
 
 // Where the clamp force has come to a stand, the load alone moves slip and mu* to and fro, by less
@@ -723,7 +730,7 @@ void PeakFit::sum_for_health() noexcept {
     const double w = 1.0 / (point.variance + point.force_variance);
     const CurveSums& before = health_sums_[health_count_ - 1];
     health_sums_[health_count_++] = {.weight = before.weight + w,
-                                     .slip = before.slip + w * point.slip,
+                                     .slip_percent = before.slip_percent + w * point.slip_percent,
                                      .mu = before.mu + w * point.mu,
                                      .force_N = before.force_N + w * point.force_N,
                                      .t_s = before.t_s + point.t_s * point.duration_s,
@@ -735,7 +742,7 @@ void PeakFit::sum_for_health() noexcept {
 // falls: else mu* rises at one slip, and no function of slip runs through such points.
 bool PeakFit::slip_moves(double until_s) const noexcept {
   struct Half {
-    double duration_s = 0.0, slip = 0.0, force_N = 0.0;
+    double duration_s = 0.0, slip_percent = 0.0, force_N = 0.0;
   };
   std::array<Half, 2> halves;
   const double middle_s = 0.5 * (points_[first_].t_s + until_s);
@@ -743,7 +750,7 @@ bool PeakFit::slip_moves(double until_s) const noexcept {
     const Point& point = points_[i];
     Half& half = halves[point.t_s < middle_s ? 0 : 1];
     half.duration_s += point.duration_s;
-    half.slip += point.duration_s * point.slip;
+    half.slip_percent += point.duration_s * point.slip_percent;
     half.force_N += point.duration_s * point.force_N;
   }
   if (!(halves[0].duration_s > 0.0) || !(halves[1].duration_s > 0.0)) return true;
@@ -751,7 +758,7 @@ bool PeakFit::slip_moves(double until_s) const noexcept {
     return std::abs(halves[1].*what / halves[1].duration_s -
                     halves[0].*what / halves[0].duration_s);
   };
-  return moved(&Half::slip) > kDeformation_percent_per_N * moved(&Half::force_N);
+  return moved(&Half::slip_percent) > kDeformation_percent_per_N * moved(&Half::force_N);
 }
 
 // Variance of mu* by the torque's slow error.
@@ -770,7 +777,7 @@ void PeakFit::test_best_form() noexcept {
   std::size_t used = 0;
   for (std::size_t i = first_; i < point_count_ && points_[i].t_s < until_s; ++i) {
     const Point& point = points_[i];
-    const double fitted = fitted_at(point.slip - slip_high_);
+    const double fitted = fitted_at(point.slip_percent - slip_high_percent_);
     // Further down deformation makes of it what is no function of slip any more.
     if (fitted < kNearTop * result_.mu) continue;
     residuals_[used++] = {

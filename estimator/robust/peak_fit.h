@@ -29,10 +29,10 @@ inline constexpr double kReachedDeviations = 3.3;
 
 struct PeakFitResult {
   bool valid = false;
-  double mu = 0.0;        // largest value of the curve within the data
-  double variance = 0.0;  // of mu, with the torque's slow error, without what all points share
-  double slip = 0.0;      // where it is
-  double t_s = 0.0;       // when slip was there last
+  double mu = 0.0;            // largest value of the curve within the data
+  double variance = 0.0;      // of mu, with the torque's slow error, without what all points share
+  double slip_percent = 0.0;  // where it is
+  double t_s = 0.0;           // when slip was there last
   // Part that the line of the engine's torque has in the torque there; the readings have the rest.
   double held_share = 0.0;
   double inside = 0.0;  // probability that the curve turns down within the data
@@ -44,10 +44,10 @@ struct PeakFitResult {
   // largest; its relative deviation by the noise of torque, speed and clamp force.
   double reached = 0.0;
   double reached_deviation = 0.0;
-  double reached_slip = 0.0;
+  double reached_slip_percent = 0.0;
   // Where the data end, for what the curve may still rise: its expected slope there, 1/percent,
   // falling taken for level.
-  double end_slip = 0.0;
+  double end_slip_percent = 0.0;
   double end_rise = 0.0;
   // Do the points lie on one curve? In deviations (curve_health.h).
   double below_chord = 0.0;
@@ -67,7 +67,7 @@ class PeakFit {
 
  private:
   struct Point {  // means over a stretch of time
-    double t_s, slip, mu, force_N, duration_s;
+    double t_s, slip_percent, mu, force_N, duration_s;
     double variance;        // of mu, with what the noise in slip does to it
     double force_variance;  // of mu, by readings of the force where its line does not reach
     double held_share;
@@ -78,7 +78,7 @@ class PeakFit {
     double speed_variance_end;
   };
   struct Form {
-    double chi2, prior, mu, variance, slip, fall, fall_variance;
+    double chi2, prior, mu, variance, slip_percent, fall, fall_variance;
     double end_slope, end_slope_variance;
   };
   enum class Stage {
@@ -115,13 +115,13 @@ class PeakFit {
     double faded, per_Nm, gain, per_deviation;
   };
   struct Average {
-    double weight = 0, mu = 0, squares = 0, variance = 0, slip = 0, inside = 0, end_rise = 0,
-           fall = 0, fall_variance = 0;
+    double weight = 0, mu = 0, squares = 0, variance = 0, slip_percent = 0, inside = 0,
+           end_rise = 0, fall = 0, fall_variance = 0;
   };
 
   void go_to(Stage stage) noexcept;
   void gather_level() noexcept;
-  double slip_step(double duration_s) const noexcept;
+  double slip_step_percent(double duration_s) const noexcept;
   void make_points() noexcept;
   void add_point(std::size_t begin, std::size_t end) noexcept;
   double mean_mu(std::size_t point) const noexcept;
@@ -131,7 +131,7 @@ class PeakFit {
   void find_reached(std::size_t length) noexcept;
   bool came_after() const noexcept;
   double force_variance(double begin_s, double end_s) const noexcept;
-  double span() const noexcept { return std::max(0.3, slip_high_ - slip_low_); }
+  double span() const noexcept { return std::max(0.3, slip_high_percent_ - slip_low_percent_); }
   double corner(std::size_t index) const noexcept;
   void find_span() noexcept;
   void whiten_terms() noexcept;
@@ -150,7 +150,7 @@ class PeakFit {
   double speed_at_edge(std::size_t cell, double& t_s, double& weight_s) const noexcept;
 
   const ExperimentRecord* record_ = nullptr;
-  double c_ = 0.0, inertia_ = 0.0;
+  double c_ = 0.0, inertia_kg_m2_ = 0.0;
   double stop_s_ = 0.0;
   Stage stage_ = Stage::kIdle;
   std::size_t level_ = 0;
@@ -162,15 +162,15 @@ class PeakFit {
   std::vector<Point> points_;  // oldest first
   std::size_t point_count_ = 0;
   std::vector<Eigen::Vector2d> sums_;  // of weight and weight * mu before each point
-  double last_slip_ = 0.0;
+  double last_slip_percent_ = 0.0;
   std::size_t oldest_ = 0;           // that counts
   std::size_t first_ = 0, top_ = 0;  // the stretch that is fitted begins at first
   double mu_top_ = 0.0;
-  double slip_low_ = 0.0, slip_high_ = 0.0;  // of the stretch
-  std::vector<Whitening> whitening_;         // of the points of the stretch
-  std::vector<Terms> terms_;                 // likewise
-  Terms slow_terms_ = Terms::Zero();         // slow error in them, as expected
-  double slow_spread_ = 1.0;                 // its variance, in that of the slow error
+  double slip_low_percent_ = 0.0, slip_high_percent_ = 0.0;  // of the stretch
+  std::vector<Whitening> whitening_;                         // of the points of the stretch
+  std::vector<Terms> terms_;                                 // likewise
+  Terms slow_terms_ = Terms::Zero();                         // slow error in them, as expected
+  double slow_spread_ = 1.0;  // its variance, in that of the slow error
   Eigen::Matrix<double, kTermCount, kTermCount> term_sums_;
   std::size_t next_ = 0;             // where the work on this stage goes on
   Rise rise_;                        // that is being fitted, with

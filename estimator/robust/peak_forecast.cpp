@@ -76,11 +76,11 @@ PeakForecast::PeakForecast(double sample_rate_hz)
       value_[form][i] = u <= 1.0 ? kFormTable[form].function(u, kFormTable[form].parameter)
                                  : 1.0 - kFallBeyond * (u - 1.0);
     }
-    double slip_peak = kFirstPeak_percent;
-    for (std::size_t k = 0; k < kPeaks; ++k, slip_peak *= kPeakFactor) {
+    double slip_peak_percent = kFirstPeak_percent;
+    for (std::size_t k = 0; k < kPeaks; ++k, slip_peak_percent *= kPeakFactor) {
       for (std::size_t d = 0; d < kDeformations; ++d) {
         curves_[index].form = form;
-        curves_[index].slip_peak = slip_peak;
+        curves_[index].slip_peak_percent = slip_peak_percent;
         curves_[index].deformation =
             kDeformationStep_percent * (static_cast<double>(d) - 0.5 * (kDeformations - 1));
         ++index;
@@ -91,9 +91,9 @@ PeakForecast::PeakForecast(double sample_rate_hz)
 
 void PeakForecast::reset(double traction_per_Nm_N, double inertia_kg_m2) noexcept {
   c_ = traction_per_Nm_N;
-  inertia_ = inertia_kg_m2;
-  sum_s_ = sum_slip_ = sum_torque_ = sum_force_ = 0.0;
-  last_slip_ = last_force_N_ = top_mu_ = reached_ = 0.0;
+  inertia_kg_m2_ = inertia_kg_m2;
+  sum_s_ = sum_slip_percent_s_ = sum_torque_ = sum_force_ = 0.0;
+  last_slip_percent_ = last_force_N_ = top_mu_ = reached_ = 0.0;
   means_.fill({0.0, 0.0});
   first_force_N_ = 0.0;
   points_ = 0;
@@ -107,36 +107,36 @@ void PeakForecast::collect(const ExperimentRecord& record) noexcept {
   const double cell_s = record.history().cell_s(0);
   if (sum_s_ == 0.0) {
     begin_s_ = cell.t_s;
-    begin_omega_ = cell.omega_p_rad_s;
+    begin_omega_rad_s_ = cell.omega_p_rad_s;
   }
   sum_s_ += cell_s;
-  sum_slip_ += cell_s * cell.slip_percent;
+  sum_slip_percent_s_ += cell_s * cell.slip_percent;
   sum_torque_ += cell_s * cell.torque_Nm;
   sum_force_ += cell_s * record.clamp_force_N(cell);
   if (sum_s_ < kShortestPoint_s || stage_ != Stage::kIdle) return;
   double torque = sum_torque_ / sum_s_;
-  double torque_variance = record.torque_noise() / sum_s_;
-  if (inertia_ > 0.0) {
+  double torque_variance = record.torque_noise_Nm2_s() / sum_s_;
+  if (inertia_kg_m2_ > 0.0) {
     const double span_s = cell.t_s - begin_s_;
-    torque -= inertia_ * (cell.omega_p_rad_s - begin_omega_) / span_s;
-    torque_variance += square(inertia_ / span_s) * 2.0 * record.omega_noise() / cell_s;
+    torque -= inertia_kg_m2_ * (cell.omega_p_rad_s - begin_omega_rad_s_) / span_s;
+    torque_variance += square(inertia_kg_m2_ / span_s) * 2.0 * record.omega_noise_rad2_s() / cell_s;
   }
   const double force = sum_force_ / sum_s_;
-  const double slip = sum_slip_ / sum_s_;
+  const double slip_percent = sum_slip_percent_s_ / sum_s_;
   const double mu = c_ * torque / force;
   const double mu_deviation = c_ / force * std::sqrt(torque_variance);
-  const double slip_variance = record.slip_noise() / sum_s_;
+  const double slip_variance_percent2 = record.slip_noise_percent2_s() / sum_s_;
   // By force, not by mu*: points that ended where noise lifts mu* would be too high.
-  const bool moved =
-      std::abs(force - last_force_N_) > kForceStep * last_force_N_ ||
-      std::abs(slip - last_slip_) > std::max(kSlipStep_percent, 3.0 * std::sqrt(slip_variance));
+  const bool moved = std::abs(force - last_force_N_) > kForceStep * last_force_N_ ||
+                     std::abs(slip_percent - last_slip_percent_) >
+                         std::max(kSlipStep_percent, 3.0 * std::sqrt(slip_variance_percent2));
   if (!moved || !(mu > 0.0) || !(force > 0.0)) return;
   if (points_ == 0) first_force_N_ = force;
-  point_ = {slip, mu, force / first_force_N_, square(mu_deviation), slip_variance};
+  point_ = {slip_percent, mu, force / first_force_N_, square(mu_deviation), slip_variance_percent2};
   last_force_N_ = force;
-  last_slip_ = slip;
+  last_slip_percent_ = slip_percent;
   top_mu_ = std::max(top_mu_, mu);
-  sum_s_ = sum_slip_ = sum_torque_ = sum_force_ = 0.0;
+  sum_s_ = sum_slip_percent_s_ = sum_torque_ = sum_force_ = 0.0;
   ++points_;
   stage_ = Stage::kTakeIn;
   next_ = kept_ = 0;
@@ -171,16 +171,18 @@ void PeakForecast::add_point(Curve& curve) const noexcept {
     curve.weights = 1.0;
   }
   const auto& table = value_[curve.form];
-  const double u = (point_.slip - curve.deformation * point_.force_share) / curve.slip_peak;
+  const double u =
+      (point_.slip_percent - curve.deformation * point_.force_share) / curve.slip_peak_percent;
   const double place = std::min(std::abs(u) / kLargestU, 1.0 - 1e-9) * kTable;
   const auto i = static_cast<std::size_t>(static_cast<int>(place));
   const double step = table[i + 1] - table[i];
   const double g = std::copysign(table[i] + (place - static_cast<double>(i)) * step, u);
   const double slope = step * kTable / kLargestU;
-  const double per_percent = point_.mu * slope / (std::max(0.3, std::abs(g)) * curve.slip_peak);
+  const double per_percent =
+      point_.mu * slope / (std::max(0.3, std::abs(g)) * curve.slip_peak_percent);
   const double form_variance = square(kFormError * point_.mu);
-  const double w =
-      1.0 / (point_.variance_mu + square(per_percent) * point_.variance_slip + form_variance);
+  const double w = 1.0 / (point_.variance_mu + square(per_percent) * point_.variance_slip_percent2 +
+                          form_variance);
   const std::array<double, kTerms> phi{slope, slope * point_.force_share, -u * slope, g};
   std::size_t at = 0;
   for (std::size_t row = 0; row < kTerms; ++row) {
@@ -201,7 +203,7 @@ void PeakForecast::add_point(Curve& curve) const noexcept {
 
 // Weighted least squares by elimination; m comes last, so that it needs no substitution back.
 void PeakForecast::fit(Curve& curve) const noexcept {
-  const double per_shift = square(curve.slip_peak / top_mu_);
+  const double per_shift = square(curve.slip_peak_percent / top_mu_);
   const double per_top = 1.0 / square(top_mu_);
   const std::array<double, kTerms> prior{per_shift * (1.0 / square(kEndStop_percent)),
                                          per_shift * (1.0 / square(kDeformation_percent)),
@@ -254,7 +256,7 @@ void PeakForecast::take_in() noexcept {
   stage_ = enough ? Stage::kSum : Stage::kIdle;
   next_ = 0;
   std::fill(bins_.begin(), bins_.end(), 0.0);
-  sum_ = sum_all_ = sum_slip_peak_ = 0.0;
+  sum_ = sum_all_ = sum_slip_peak_percent_ = 0.0;
 }
 
 // Into a histogram over ln(mu_max / top so far), each fit as a normal distribution: three places
@@ -279,7 +281,8 @@ void PeakForecast::sum_up() noexcept {
     add(curve.mu, weight * 2.0 / 3.0);
     add(curve.mu + away, weight / 6.0);
     add(curve.mu - away, weight / 6.0);
-    sum_slip_peak_ += weight * (curve.slip_peak + curve.deformation * point_.force_share);
+    sum_slip_peak_percent_ +=
+        weight * (curve.slip_peak_percent + curve.deformation * point_.force_share);
   }
   if (next_ == left_) stage_ = Stage::kQuantiles;
 }
@@ -301,7 +304,7 @@ void PeakForecast::conclude() noexcept {
     }
     below += bins_[i];
   }
-  forecast_ = {true, quantiles[1], quantiles[0], quantiles[2], sum_slip_peak_ / sum_all_};
+  forecast_ = {true, quantiles[1], quantiles[0], quantiles[2], sum_slip_peak_percent_ / sum_all_};
 }
 
 bool PeakForecast::step() noexcept {

@@ -53,7 +53,7 @@ class PeakForecast {
   enum class Stage : std::uint8_t { kIdle, kTakeIn, kSum, kQuantiles };
   struct Curve {  // one of the grid
     std::size_t form;
-    double slip_peak, deformation;
+    double slip_peak_percent, deformation;
     std::array<double, 10> A;  // normal equations so far, lower triangle; the last term is m
     std::array<double, kTerms> b;
     double yy;
@@ -61,7 +61,7 @@ class PeakForecast {
     double log_likelihood, mu, variance;  // of the last fit
   };
   struct Point {
-    double slip, mu, force_share, variance_mu, variance_slip;
+    double slip_percent, mu, force_share, variance_mu, variance_slip_percent2;
   };
   void raise_reached(double force_variance) noexcept;
   void add_point(Curve& curve) const noexcept;
@@ -75,12 +75,12 @@ class PeakForecast {
   std::vector<std::uint16_t> order_;  // the curves that are left
   std::vector<double> bins_;
   int work_per_step_;
-  double c_ = 0.0, inertia_ = 0.0;
+  double c_ = 0.0, inertia_kg_m2_ = 0.0;
   double first_force_N_ = 0.0;
   // The point that is being collected.
-  double sum_s_ = 0.0, sum_slip_ = 0.0, sum_torque_ = 0.0, sum_force_ = 0.0;
-  double begin_s_ = 0.0, begin_omega_ = 0.0;
-  double last_slip_ = 0.0, last_force_N_ = 0.0;
+  double sum_s_ = 0.0, sum_slip_percent_s_ = 0.0, sum_torque_ = 0.0, sum_force_ = 0.0;
+  double begin_s_ = 0.0, begin_omega_rad_s_ = 0.0;
+  double last_slip_percent_ = 0.0, last_force_N_ = 0.0;
   double top_mu_ = 0.0;
   Point point_{};
   std::array<std::array<double, 2>, kReachedScales>
@@ -91,7 +91,7 @@ class PeakForecast {
   Stage stage_ = Stage::kIdle;
   std::size_t next_ = 0, kept_ = 0, left_ = kCurves;
   double best_ = 0.0, best_before_ = 0.0;
-  double sum_ = 0.0, sum_all_ = 0.0, sum_slip_peak_ = 0.0;  // of weights: possible, all
+  double sum_ = 0.0, sum_all_ = 0.0, sum_slip_peak_percent_ = 0.0;  // of weights: possible, all
   Forecast forecast_;
 };
 

@@ -34,7 +34,7 @@ constexpr int kFollowedPerStep = 3;
 constexpr double kClimb = 1.05;    // mu* at the stop, of the first one; or
 constexpr double kLowered = 0.99;  // the clamp force
 // A jump of the reading by more is looked at: of a speed and of the torque, relative; of noise.
-constexpr double kGlitchSlip = 0.005, kGlitchTorque = 0.2, kGlitchDeviations = 5.0;
+constexpr double kGlitchSlip_share = 0.005, kGlitchTorque = 0.2, kGlitchDeviations = 5.0;
 constexpr double kNoiseKnown_s = 1.0;
 constexpr double kFittedDeviations = 2.6;  // by which the fit's top is lowered for a bound
 constexpr double kChordDeviations = 5.5;   // beyond these the points lie on no one curve
@@ -194,12 +194,13 @@ class RobustEstimator final : public SlipCurveEstimator {
     const auto least = [this](double density) {
       return kGlitchDeviations * std::sqrt(density * sample_rate_hz_);
     };
-    const double slip = std::max(kGlitchSlip, least(record_.slip_noise()) / kPercent);
+    const double glitch_share =
+        std::max(kGlitchSlip_share, least(record_.slip_noise_percent2_s()) / kPercent);
     VariatorSample clean = sample;
-    clean.omega_p_rad_s = omega_p_.without_glitch(sample.omega_p_rad_s, slip, 0.0);
-    clean.omega_s_rad_s = omega_s_.without_glitch(sample.omega_s_rad_s, slip, 0.0);
-    clean.torque_Nm =
-        torque_.without_glitch(sample.torque_Nm, kGlitchTorque, least(record_.torque_noise()));
+    clean.omega_p_rad_s = omega_p_.without_glitch(sample.omega_p_rad_s, glitch_share, 0.0);
+    clean.omega_s_rad_s = omega_s_.without_glitch(sample.omega_s_rad_s, glitch_share, 0.0);
+    clean.torque_Nm = torque_.without_glitch(sample.torque_Nm, kGlitchTorque,
+                                             least(record_.torque_noise_Nm2_s()));
     if (omega_p_.jumped()) omega_p_.take_step(record_.duration_s());
     if (omega_s_.jumped()) omega_s_.take_step(record_.duration_s());
     return clean;
@@ -208,7 +209,7 @@ class RobustEstimator final : public SlipCurveEstimator {
   void begin_fit() noexcept { fit_.begin(record_, traction_, inertia_kg_m2_, stop_s_); }
 
   void watch_force(const Cell& cell) noexcept {
-    if (force_step_.step(cell, record_.slip_noise(), record_.force())) {
+    if (force_step_.step(cell, record_.slip_noise_percent2_s(), record_.force())) {
       pressure_.take_step(cell.t_s);
     }
   }
@@ -271,13 +272,15 @@ class RobustEstimator final : public SlipCurveEstimator {
     const double deformed =
         drive ? kPercent * kDeformationMost_1_N * record_.force_line().at(record_.duration_s())
               : 0.0;
-    const double to_come = std::max(0.0, kFrictionTo_percent - (fit.end_slip - deformed));
+    const double to_come = std::max(0.0, kFrictionTo_percent - (fit.end_slip_percent - deformed));
     const double unseen = kNormal95 * std::sqrt(1.0 - fit.inside) * kUnseenRise * fit.mu * to_come;
     // Of all slips that it may be, the one from which a power law rises most.
-    const double slip = std::min(
-        fit.end_slip, std::max(fit.end_slip - deformed, kFrictionTo_percent / std::numbers::e));
-    if (!(slip > 0.0)) return unseen;
-    const double seen = fit.end_rise * slip * std::max(0.0, std::log(kFrictionTo_percent / slip));
+    const double slip_percent =
+        std::min(fit.end_slip_percent,
+                 std::max(fit.end_slip_percent - deformed, kFrictionTo_percent / std::numbers::e));
+    if (!(slip_percent > 0.0)) return unseen;
+    const double seen =
+        fit.end_rise * slip_percent * std::max(0.0, std::log(kFrictionTo_percent / slip_percent));
     return std::hypot(unseen, seen);
   }
 
@@ -387,7 +390,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     peak_.contradictory = contradictory(fit);
     if (peak_.contradictory) {
       // What its top would be, if it is one: no belt's friction is the likelier cause then.
-      if (fit.valid && fit.inside >= kInsideWithoutStop && fit.slip > kSlipOfATop_percent) {
+      if (fit.valid && fit.inside >= kInsideWithoutStop && fit.slip_percent > kSlipOfATop_percent) {
         peak_.mu_refused = fit.mu;
         peak_.clamp_force_N = record_.force_line().at(fit.t_s);
         peak_.omega_s_rad_s = omega_s_at(fit.t_s);
@@ -411,7 +414,7 @@ class RobustEstimator final : public SlipCurveEstimator {
       peak_.mu_max_std = (peak_.ci95_high - peak_.ci95_low) / (2.0 * kNormal95);
       peak_.clamp_force_N = F;
       peak_.omega_s_rad_s = omega_s_at(fit.t_s);
-      peak_.sigma_peak_percent = fit.slip;
+      peak_.sigma_peak_percent = fit.slip_percent;
     } else if (fit.reached > 0.0) {
       take_lower_bound(fit);
     }
@@ -433,7 +436,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     const bool better = fitted > surely;
     peak_.kind = PeakKind::kLowerBound;
     peak_.mu_max = better ? fitted : surely;
-    peak_.sigma_peak_percent = better ? fit.slip : fit.reached_slip;
+    peak_.sigma_peak_percent = better ? fit.slip_percent : fit.reached_slip_percent;
     peak_.clamp_force_N = F;
     peak_.omega_s_rad_s = omega_s_at(record_.duration_s());
   }

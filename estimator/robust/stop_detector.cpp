@@ -13,9 +13,9 @@ namespace {
 
 constexpr double kShortestWindow_s = 0.12;
 constexpr double kWindowFactor = 1.3;
-constexpr double kSmallestLevelSlip = 0.5;  // percent: slip taken for elasticity at least
-constexpr double kQuietDeviation = 0.05;    // percent: noise of the smallest slip at most
-constexpr double kSettle_s = 1.2;           // load is being taken up: no slope before
+constexpr double kSmallestLevelSlip_percent = 0.5;  // percent: slip taken for elasticity at least
+constexpr double kQuietDeviation = 0.05;            // percent: noise of the smallest slip at most
+constexpr double kSettle_s = 1.2;                   // load is being taken up: no slope before
 constexpr double kTiny = 1e-12;
 
 struct Known {
@@ -93,12 +93,12 @@ void StopDetector::fill_slow(SlowTable& table, Weights (*weights)(double)) const
 
 void StopDetector::reset(double traction_per_Nm_N, double inertia_kg_m2) noexcept {
   c_ = traction_per_Nm_N;
-  inertia_ = inertia_kg_m2;
+  inertia_kg_m2_ = inertia_kg_m2;
   turn_ = 0;
-  smallest_slip_ = 1e9;
+  smallest_slip_percent_ = 1e9;
   slope_ = 0.0;
   seen_ = level_ = false;
-  level_slip_ = level_until_s_ = 0.0;
+  level_slip_percent_ = level_until_s_ = 0.0;
 }
 
 StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
@@ -137,7 +137,7 @@ StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
   if (out.gained < limits_.smallest_gain_percent + deformation) return out;
   // In a Gaussian's far tail: twice the logarithm of how much less often the window is a new one.
   // While the noise itself is known from few data, Student's tail is as much longer (Wallace).
-  const double gained_variance = 2.0 * record.slip_noise() * per_quarter / cell_s;
+  const double gained_variance = 2.0 * record.slip_noise_percent2_s() * per_quarter / cell_s;
   const double freedom = std::max(1.0, record.slip_noise_freedom());
   const double normal_squared =
       square(limits_.gain_deviations) - 2.0 * std::log(W / kShortestWindow_s);
@@ -156,7 +156,7 @@ StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
   const Line& force = record.force_line();
   const Line& held = record.torque_line();
   const double F_1 = t_1 >= force.begin_s ? force.at(t_1) : force_before;
-  const double noise = record.torque_noise();
+  const double noise = record.torque_noise_Nm2_s();
   const double density = std::max(noise, record.torque().density(W));
   const double variation = density - noise;  // of the true torque, at this time scale
   // Torque if it is held: of the line, of the readings, or between, by their variances.
@@ -171,7 +171,7 @@ StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
   Eigen::Matrix2d A = Eigen::Matrix2d::Zero();
   Eigen::Vector2d y = Eigen::Vector2d::Zero();
   double hold_top = 0.0, hold_bottom = 0.0;
-  const bool engine = inertia_ > 0.0;
+  const bool engine = inertia_kg_m2_ > 0.0;
   const double omega_reference = history.cell(level, cells / 2).omega_p_rad_s;
   for (std::size_t i = 0; i < cells; ++i) {
     const Cell& cell = history.cell(level, cells - 1 - i);
@@ -182,7 +182,8 @@ StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
     if (engine) {
       // - integral of w domega/dt = integral of dw/dt omega.
       const double T = line_share * held.at(cell.t_s) + (1.0 - line_share) * cell.torque_Nm;
-      y += w.value * T + w.derivative * (inertia_ / W * (cell.omega_p_rad_s - omega_reference));
+      y += w.value * T +
+           w.derivative * (inertia_kg_m2_ / W * (cell.omega_p_rad_s - omega_reference));
     } else {
       y += w.value * cell.torque_Nm;
     }
@@ -195,7 +196,7 @@ StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
   const Moments& moments = engine ? engine_moments_[cells] : sensor_moments_[cells];
   Eigen::Matrix2d N = moments.value * noise;
   if (engine) {
-    N = moments.derivative * (square(inertia_ / W) * record.omega_noise()) +
+    N = moments.derivative * (square(inertia_kg_m2_ / W) * record.omega_noise_rad2_s()) +
         moments.value * (square(line_share) * variation + square(1.0 - line_share) * noise);
   }
   N *= square(c_) / cell_s;
@@ -209,9 +210,9 @@ StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
     const double rate_before =
         (begin.omega_p_rad_s - history.cell(level, 2 * cells - 1).omega_p_rad_s) / span;
     const double rate_after = (history.cell(level, 0).omega_p_rad_s - begin.omega_p_rad_s) / W;
-    m_1 -= c_ * inertia_ * rate_before / F_1;
-    m_1_variance += square(inertia_) *
-                    (square(rate_after - rate_before) + 12.0 * record.omega_noise() / (W * W * W));
+    m_1 -= c_ * inertia_kg_m2_ * rate_before / F_1;
+    m_1_variance += square(inertia_kg_m2_) * (square(rate_after - rate_before) +
+                                              12.0 * record.omega_noise_rad2_s() / (W * W * W));
   } else {
     const Known torque = torque_at_begin(record, t_1, {torque_before, density / W}, variation / W);
     m_1 = c_ * torque.value / F_1;
@@ -241,8 +242,9 @@ StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
   out.hold = mu_1 * F_1 * hold_top / hold_bottom;
   out.hold_deviation = std::sqrt(square(out.hold) * gain_variance + force_variance +
                                  square(c_ / (F_1 * out.gained)) * hold_variance);
-  out.slip = s_2;
-  out.level = limits_.level_elasticity * mu_1 / std::max(s_2 - smallest_slip_, kSmallestLevelSlip);
+  out.slip_percent = s_2;
+  out.level = limits_.level_elasticity * mu_1 /
+              std::max(s_2 - smallest_slip_percent_, kSmallestLevelSlip_percent);
   out.duration_s = W;
   out.valid = std::isfinite(out.k) && std::isfinite(out.k_deviation) && out.level > 0.0;
   return out;
@@ -252,11 +254,11 @@ void StopDetector::update_smallest_slip(const ExperimentRecord& record) noexcept
   const History& history = record.history();
   std::size_t level = 3;
   while (level + 1 < History::kLevels &&
-         record.slip_noise() > square(kQuietDeviation) * history.cell_s(level)) {
+         record.slip_noise_percent2_s() > square(kQuietDeviation) * history.cell_s(level)) {
     ++level;
   }
   if (history.size(level) > 0) {
-    smallest_slip_ = std::min(smallest_slip_, history.cell(level, 0).slip_percent);
+    smallest_slip_percent_ = std::min(smallest_slip_percent_, history.cell(level, 0).slip_percent);
   }
 }
 
@@ -269,16 +271,17 @@ StopReason StopDetector::backup(const ExperimentRecord& record) const noexcept {
   double s = 0.0, st = 0.0;
   const double middle = 0.5 * (n - 1.0);
   for (std::size_t i = 0; i < cells; ++i) {
-    const double slip = history.cell(0, i).slip_percent;
-    s += slip / n;
-    st += slip * (middle - static_cast<double>(i));
+    const double slip_percent = history.cell(0, i).slip_percent;
+    s += slip_percent / n;
+    st += slip_percent * (middle - static_cast<double>(i));
   }
   const double moment = n * (n * n - 1.0) / 12.0;
   const double cell_s = history.cell_s(0);
   const double rate = st / moment / cell_s;
-  const double rate_deviation = std::sqrt(record.slip_noise() / cell_s / moment) / cell_s;
+  const double rate_deviation =
+      std::sqrt(record.slip_noise_percent2_s() / cell_s / moment) / cell_s;
   const double now = s + rate * middle * cell_s;
-  if (s - smallest_slip_ > limits_.backup_slip_percent) return StopReason::kSlip;
+  if (s - smallest_slip_percent_ > limits_.backup_slip_percent) return StopReason::kSlip;
   if (now + (rate - 4.0 * rate_deviation) * limits_.backup_ahead_s > limits_.backup_ahead_percent) {
     return StopReason::kSlipRate;
   }
@@ -288,7 +291,7 @@ StopReason StopDetector::backup(const ExperimentRecord& record) const noexcept {
 StopReason StopDetector::step(const ExperimentRecord& record) noexcept {
   if (!record.force_line().valid || !record.torque_line().valid) return StopReason::kNone;
   update_smallest_slip(record);
-  if (smallest_slip_ > 1e8) return StopReason::kNone;
+  if (smallest_slip_percent_ > 1e8) return StopReason::kNone;
   ++turn_;
   const double now_s = record.duration_s();
   if (now_s > level_until_s_) level_ = false;
@@ -315,20 +318,21 @@ StopReason StopDetector::step(const ExperimentRecord& record) noexcept {
         std::max(1.0, slope.gained / limits_.large_gain_percent);
     if (slope.k + evidence * slope.k_deviation < slope.level ||
         slope.hold + 2.0 * slope.hold_deviation < slope.level) {
-      if (!level_) level_slip_ = slope.slip - slope.gained;
+      if (!level_) level_slip_percent_ = slope.slip_percent - slope.gained;
       level_ = true;
       level_until_s_ = std::max(level_until_s_, now_s + slope.duration_s);
     }
     // A friction curve rises less and less: where it rises now it was not level before.
-    if (level_ && slope.slip - slope.gained >= level_slip_ &&
+    if (level_ && slope.slip_percent - slope.gained >= level_slip_percent_ &&
         slope.k - limits_.falling_deviations * slope.k_deviation > slope.level) {
       level_ = false;
       level_until_s_ = now_s;
     }
     const bool falling =
         slope.k + std::max(limits_.falling_deviations, evidence) * slope.k_deviation < 0.0;
-    if (falling || (level_ && slope.slip + limits_.ahead_s * 2.0 * slope.gained / slope.duration_s >
-                                  level_slip_ + limits_.follow_percent)) {
+    if (falling ||
+        (level_ && slope.slip_percent + limits_.ahead_s * 2.0 * slope.gained / slope.duration_s >
+                       level_slip_percent_ + limits_.follow_percent)) {
       stop = StopReason::kSlope;
     }
   }

@@ -73,7 +73,7 @@ class StopDetector {
   double slope() const noexcept { return slope_; }
   bool rising() const noexcept { return seen_ && !level_; }  // slip grows, mu* with it
   bool level() const noexcept { return level_; }
-  double smallest_slip_percent() const noexcept { return smallest_slip_; }
+  double smallest_slip_percent() const noexcept { return smallest_slip_percent_; }
 
  private:
   // Weighted over tau = 0..1, the window from begin to end.
@@ -100,7 +100,7 @@ class StopDetector {
   struct Slope {
     bool valid = false;
     double gained = 0.0;
-    double slip = 0.0;  // at the end
+    double slip_percent = 0.0;  // at the end
     double k = 0.0, k_deviation = 0.0;
     double hold = 0.0, hold_deviation = 0.0;  // k_hold
     double level = 0.0;                       // slope that counts as level
@@ -114,14 +114,14 @@ class StopDetector {
   MomentTable sensor_moments_, engine_moments_;
   SlowTable sensor_slow_, engine_slow_;
   double c_ = 0.0;
-  double inertia_ = 0.0;
+  double inertia_kg_m2_ = 0.0;
   std::array<double, kWindows> window_s_{};
   std::size_t turn_ = 0;
-  double smallest_slip_ = 0.0;
+  double smallest_slip_percent_ = 0.0;
   double slope_ = 0.0;
   bool seen_ = false;
   bool level_ = false;
-  double level_slip_ = 0.0;
+  double level_slip_percent_ = 0.0;
   double level_until_s_ = 0.0;
 };
 

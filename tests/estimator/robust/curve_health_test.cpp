@@ -25,13 +25,13 @@ std::vector<CurveSums> sums_of(double (*curve)(double), std::uint64_t seed) {
   std::normal_distribution<double> normal;
   std::vector<CurveSums> sums(1);
   for (int i = 0; i < 100; ++i) {
-    const double slip = 0.02 * i;
-    const double mu = curve(slip) + kNoise * normal(random);
+    const double slip_percent = 0.02 * i;
+    const double mu = curve(slip_percent) + kNoise * normal(random);
     const double weight = 1.0 / (kNoise * kNoise);
     const CurveSums& before = sums.back();
-    sums.push_back({before.weight + weight, before.slip + weight * slip, before.mu + weight * mu,
-                    before.force_N + weight * 3000.0, before.t_s + 0.05 * 0.05 * (i + 0.5),
-                    before.duration_s + 0.05});
+    sums.push_back({before.weight + weight, before.slip_percent + weight * slip_percent,
+                    before.mu + weight * mu, before.force_N + weight * 3000.0,
+                    before.t_s + 0.05 * 0.05 * (i + 0.5), before.duration_s + 0.05});
   }
   return sums;
 }
@@ -40,26 +40,34 @@ double largest(double (*curve)(double), std::uint64_t seed) {
   double out = 0.0;
   const std::vector<CurveSums> sums = sums_of(curve, seed);
   for (std::size_t length = 1; length <= 16; length *= 2) {
-    out = std::max(out, below_chord(sums, length, {.slip_noise = 1e-8}));
+    out = std::max(out, below_chord(sums, length, {.slip_noise_percent2_s = 1e-8}));
   }
   return out;
 }
 
 TEST(CurveHealth, ConcaveCurvesAreWhole) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
-    EXPECT_LT(largest([](double slip) { return 0.1 * std::tanh(slip); }, seed), 5.5);
-    EXPECT_LT(largest([](double slip) { return 0.05 * std::min(slip, 1.5); }, seed), 5.5);
+    EXPECT_LT(largest([](double slip_percent) { return 0.1 * std::tanh(slip_percent); }, seed),
+              5.5);
+    EXPECT_LT(largest([](double slip_percent) { return 0.05 * std::min(slip_percent, 1.5); }, seed),
+              5.5);
   }
 }
 
 TEST(CurveHealth, AStepOfTorqueOrSlipIsNot) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
-    EXPECT_GT(largest([](double slip) { return 0.1 * std::tanh(slip) * (slip < 1.0 ? 1.0 : 1.05); },
-                      seed),
+    EXPECT_GT(largest(
+                  [](double slip_percent) {
+                    return 0.1 * std::tanh(slip_percent) * (slip_percent < 1.0 ? 1.0 : 1.05);
+                  },
+                  seed),
               5.5);
-    EXPECT_GT(
-        largest([](double slip) { return 0.1 * std::tanh(slip < 1.0 ? slip : slip - 0.3); }, seed),
-        5.5);
+    EXPECT_GT(largest(
+                  [](double slip_percent) {
+                    return 0.1 * std::tanh(slip_percent < 1.0 ? slip_percent : slip_percent - 0.3);
+                  },
+                  seed),
+              5.5);
   }
 }
 
@@ -83,7 +91,7 @@ TEST(CurveHealth, AnErrorThatWandersLeavesTheChord) {
     for (const double step : {0.0, 0.4}) {
       const std::vector<double> slow = wandering(100, 0.05, random);
       std::vector<CurveSums> sums =
-          sums_of([](double slip) { return 0.1 * std::tanh(slip); }, seed);
+          sums_of([](double slip_percent) { return 0.1 * std::tanh(slip_percent); }, seed);
       double wandered = 0.0;
       for (std::size_t i = 1; i < sums.size(); ++i) {
         const double mu = (sums[i].mu - sums[i - 1].mu + wandered) * kNoise * kNoise;
@@ -139,7 +147,7 @@ TEST(CurveHealth, ResidualsOfNoiseAreNoneOfACurve) {
 }
 
 TEST(StepWatch, SeesAStepAndNoDriftAndNoneWhereSlipMoves) {
-  const auto steps = [](double (*torque)(double), double (*slip)(double)) {
+  const auto steps = [](double (*torque)(double), double (*slip_percent)(double)) {
     std::mt19937_64 random(1);
     std::normal_distribution<double> normal;
     StepWatch watch(200.0);
@@ -148,8 +156,8 @@ TEST(StepWatch, SeesAStepAndNoDriftAndNoneWhereSlipMoves) {
     for (int i = 0; i < 4000; ++i) {
       const double t = i / 200.0;
       const double value = torque(t) + 0.3 * normal(random);
-      trend.step(t, value, slip(t));
-      seen |= watch.step(value, slip(t), 1e-6, trend, 0.0);
+      trend.step(t, value, slip_percent(t));
+      seen |= watch.step(value, slip_percent(t), 1e-6, trend, 0.0);
     }
     return seen;
   };
@@ -224,7 +232,7 @@ TEST(ForceStep, SeesAReadingThatStepsWhereSlipStaysAndNoForceThatSlipFollows) {
   using Force = double (*)(double);
   // rounded_to_N: what the signal shows changes by; known_N: by what it is known to.
   const auto steps = [](Force truth, Force read_of_truth, double rounded_to_N = 0.0,
-                        double known_N = 0.0, double slip_noise = 0.02) {
+                        double known_N = 0.0, double slip_noise_percent2_s = 0.02) {
     std::mt19937_64 random(1);
     std::normal_distribution<double> normal;
     ForceStep watch(200.0, known_N);
@@ -234,12 +242,13 @@ TEST(ForceStep, SeesAReadingThatStepsWhereSlipStaysAndNoForceThatSlipFollows) {
       const double t = i / 200.0;
       double force_N = truth(t) * read_of_truth(t) + 10.0 * normal(random);
       if (rounded_to_N > 0.0) force_N = std::round(force_N / rounded_to_N) * rounded_to_N;
-      const Cell cell{.t_s = t,
-                      .slip_percent = 8000.0 / truth(t) - 1.0 + slip_noise * normal(random),
-                      .torque_Nm = 50.0,
-                      .clamp_force_N = force_N,
-                      .omega_p_rad_s = 100.0};
-      seen |= watch.step(cell, slip_noise * slip_noise / 200.0, trend);
+      const Cell cell{
+          .t_s = t,
+          .slip_percent = 8000.0 / truth(t) - 1.0 + slip_noise_percent2_s * normal(random),
+          .torque_Nm = 50.0,
+          .clamp_force_N = force_N,
+          .omega_p_rad_s = 100.0};
+      seen |= watch.step(cell, slip_noise_percent2_s * slip_noise_percent2_s / 200.0, trend);
       trend.step(t, force_N, 0.0);
     }
     return seen;
@@ -296,7 +305,7 @@ double clamped_again_N(double t) {
 // Slip runs from 10 s on and is stopped 0.1 s later; mu* is c T / F with c = 6.
 TEST(FollowOn, TellsSlipThatComesToAStandFromSlipThatGoesOn) {
   constexpr double kStop_s = 10.1;
-  const auto stood = [](double (*slip)(double), double (*force_N)(double),
+  const auto stood = [](double (*slip_percent)(double), double (*force_N)(double),
                         double (*torque_Nm)(double)) {
     std::mt19937_64 random(1);
     std::normal_distribution<double> normal;
@@ -305,7 +314,7 @@ TEST(FollowOn, TellsSlipThatComesToAStandFromSlipThatGoesOn) {
     for (int i = 0; i < 2200; ++i) {
       const double t = i / 200.0;
       const Cell sample{.t_s = t,
-                        .slip_percent = slip(t) + 0.02 * normal(random),
+                        .slip_percent = slip_percent(t) + 0.02 * normal(random),
                         .torque_Nm = torque_Nm(t) + 0.3 * normal(random),
                         .clamp_force_N = force_N(t) + 30.0 * normal(random),
                         .omega_p_rad_s = 105.0 + 0.02 * normal(random)};

@@ -189,11 +189,11 @@ TEST(Robust, ARisingCurveGivesALowerBound) {
 }
 
 // Level within 0.1 % from 1.4 % of slip on.
-double saturates(double slip) { return 0.105 * (1.0 - std::exp(-5.0 * slip)); }
+double saturates(double slip_percent) { return 0.105 * (1.0 - std::exp(-5.0 * slip_percent)); }
 
 TEST(Robust, APlateauThatEndsIsAValue) {
-  const auto plateau = [](double slip) {
-    return saturates(slip) - 1.5e-3 * std::max(0.0, slip - 2.0);
+  const auto plateau = [](double slip_percent) {
+    return saturates(slip_percent) - 1.5e-3 * std::max(0.0, slip_percent - 2.0);
   };
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Outcome out = run({.friction = plateau, .seed = seed});
@@ -231,7 +231,9 @@ TEST(Robust, AnIntervalThatIsTooWideIsALowerBound) {
 
 TEST(Robust, WhereFrictionRisesOnTheUpperEndOfTheIntervalIsOpen) {
   // Nearly all of the rise comes with the first five percent, the rest evenly up to 10 %.
-  const auto rising = [](double slip) { return 0.09 * std::tanh(0.5 * slip) + 0.0005 * slip; };
+  const auto rising = [](double slip_percent) {
+    return 0.09 * std::tanh(0.5 * slip_percent) + 0.0005 * slip_percent;
+  };
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Outcome out = run({.friction = rising, .seed = seed});
     ASSERT_EQ(out.peak.kind, PeakKind::kValue) << seed;
@@ -243,7 +245,9 @@ TEST(Robust, WhereFrictionRisesOnTheUpperEndOfTheIntervalIsOpen) {
 
 TEST(Robust, WhatRisesOnToTheBackupsIsAValueThatHoldsTheRestOfTheRise) {
   // A power law: it rises by 2 % from 8.5 to 10 % of slip. The ratio gives way by 0.35 % per kN.
-  const auto rising = [](double slip) { return 0.08 * std::pow(std::max(0.0, slip), 0.12); };
+  const auto rising = [](double slip_percent) {
+    return 0.08 * std::pow(std::max(0.0, slip_percent), 0.12);
+  };
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     const Outcome out = run({.friction = rising,
                              .mu_begin = 0.07,

@@ -194,8 +194,9 @@ std::string speed_noise_text(Drawer& draw, std::optional<NoiseBand> noise) {
   double primary_ripple = draw.between(0.0, 1e-3), secondary_ripple = draw.between(0.0, 1e-3);
   if (noise) {
     const double percent =
-        100.0 * slip_noise({primary_rad_s, primary_ripple}, {secondary_rad_s, secondary_ripple},
-                           kCrossingPrimary_rad_s, kCrossingSecondary_rad_s);
+        100.0 * slip_noise_percent2_s({primary_rad_s, primary_ripple},
+                                      {secondary_rad_s, secondary_ripple}, kCrossingPrimary_rad_s,
+                                      kCrossingSecondary_rad_s);
     const double factor = kClassNoise_percent.at(static_cast<std::size_t>(*noise)) / percent;
     for (double* each : {&primary_rad_s, &secondary_rad_s, &primary_ripple, &secondary_ripple}) {
       *each *= factor;

@@ -143,8 +143,8 @@ double crossing_energy_J(const ReachPoint& point) {
   return point.torque_Nm * point.omega_p_rad_s * point.peak_slip_share * lasts_s;
 }
 
-double slip_noise(const SpeedNoise& primary, const SpeedNoise& secondary, double omega_p_rad_s,
-                  double omega_s_rad_s) {
+double slip_noise_percent2_s(const SpeedNoise& primary, const SpeedNoise& secondary,
+                             double omega_p_rad_s, double omega_s_rad_s) {
   const double white =
       std::hypot(primary.white_rad_s / omega_p_rad_s, secondary.white_rad_s / omega_s_rad_s);
   return std::hypot(white, std::hypot(primary.ripple, secondary.ripple) / std::sqrt(2.0));
@@ -184,9 +184,10 @@ Reach reach_of(const sim::VehicleScenario& scenario, const RequestKeys& keys, st
   if (reach.wall == Wall::kNone && falls) reach.wall = Wall::kFall;
   const sim::SensorParameters& s = scenario.sensors;
   if (omega_p_rad_s > 0.0) {
-    reach.slip_noise_percent = kPercent * slip_noise({s.primary_speed.noise, s.primary_ripple},
-                                                     {s.secondary_speed.noise, s.secondary_ripple},
-                                                     omega_p_rad_s, omega_s_rad_s);
+    reach.slip_noise_percent =
+        kPercent * slip_noise_percent2_s({s.primary_speed.noise, s.primary_ripple},
+                                         {s.secondary_speed.noise, s.secondary_ripple},
+                                         omega_p_rad_s, omega_s_rad_s);
   }
   reach.noise = reach.slip_noise_percent < kLabMost_percent          ? NoiseBand::kLab
                 : reach.slip_noise_percent < kProductionMost_percent ? NoiseBand::kProduction

@@ -61,8 +61,8 @@ struct SpeedNoise {
   double white_rad_s = 0.0, ripple = 0.0;
 };
 // Of slip, read from one sample of both.
-double slip_noise(const SpeedNoise& primary, const SpeedNoise& secondary, double omega_p_rad_s,
-                  double omega_s_rad_s);
+double slip_noise_percent2_s(const SpeedNoise& primary, const SpeedNoise& secondary,
+                             double omega_p_rad_s, double omega_s_rad_s);
 
 struct Reach {
   Wall wall = Wall::kNoPeak;        // of the instant that comes furthest
