@@ -22,15 +22,15 @@ SignalTable swinging(const estimator::VariatorParameters& variator) {
   SignalTable table;
   for (int i = 0; i < 4000; ++i) {
     const double t_s = 0.005 * i;
-    const double slip = 0.007 + 0.003 * std::sin(2.0 * std::numbers::pi * t_s);
+    const double slip_share = 0.007 + 0.003 * std::sin(2.0 * std::numbers::pi * t_s);
     const auto add = [&](Role role, double value) {
       table[role].t_s.push_back(t_s);
       table[role].value.push_back(value);
     };
     add(Role::kPrimarySpeed, 100.0);
-    add(Role::kSecondarySpeed, 100.0 * variator.ratio_overdrive * (1.0 - slip));
+    add(Role::kSecondarySpeed, 100.0 * variator.ratio_overdrive * (1.0 - slip_share));
     add(Role::kSecondaryPressure, kPressure_Pa);
-    add(Role::kPrimaryTorque, capacity_Nm * curve.evaluate(slip / kPeakSlip).value);
+    add(Role::kPrimaryTorque, capacity_Nm * curve.evaluate(slip_share / kPeakSlip).value);
   }
   return table;
 }

@@ -110,9 +110,9 @@ ExperimentData shafts(double step_rad_s, double noise_rad_s) {
 
 TEST(Rounding, StaysWhereNoNoiseCarriesTheSamplesFromStepToStep) {
   const double held = 0.1 / std::sqrt(12.0) * std::hypot(1.0 / 100.0, 1.0 / 222.0);
-  EXPECT_NEAR(shafts(0.1, 0.0).rounding_slip, held, 0.1 * held);
-  EXPECT_LT(shafts(0.1, 0.1).rounding_slip, 0.4 * held);
-  EXPECT_LT(shafts(1e-4, 0.02).rounding_slip, 0.001 * held);
+  EXPECT_NEAR(shafts(0.1, 0.0).rounding_slip_share, held, 0.1 * held);
+  EXPECT_LT(shafts(0.1, 0.1).rounding_slip_share, 0.4 * held);
+  EXPECT_LT(shafts(1e-4, 0.02).rounding_slip_share, 0.001 * held);
 }
 
 // A pressure that is held, then falls, and is held again; in steps of step_Pa.

@@ -71,9 +71,9 @@ double at(const ArrayXd& grid, double t_s) {
   return (1.0 - share) * grid[k] + share * grid[k + 1];
 }
 
-double traction(double slip, double peak_slip) {
+double traction(double slip_share, double peak_slip_share) {
   const double stiffness = std::tan(std::numbers::pi / 2.6);
-  return std::sin(1.3 * std::atan(stiffness * slip / peak_slip));
+  return std::sin(1.3 * std::atan(stiffness * slip_share / peak_slip_share));
 }
 
 double capacity_Nm(double force_N, double radius_m) {
@@ -118,8 +118,8 @@ SignalTable rig(double measured_slip = 0.01, double steepness = 20.0) {
 double rig_rate(const ExperimentData& data, double t_s, double omega_s) {
   const double force_N = kArea_m2 * at(data.pressure.value, t_s) + kSpring_N;
   const double ratio = kLow * (1.0 - kDeformationPerN * force_N);
-  const double slip = 1.0 - omega_s / (at(data.omega_p.value, t_s) * ratio);
-  const double belt_Nm = capacity_Nm(force_N, kRadiusLow_m) * traction(slip, kPeakSlipLow);
+  const double slip_share = 1.0 - omega_s / (at(data.omega_p.value, t_s) * ratio);
+  const double belt_Nm = capacity_Nm(force_N, kRadiusLow_m) * traction(slip_share, kPeakSlipLow);
   return (belt_Nm / ratio - at(data.torque_s.value, t_s) - kDrag_Nm - kDragPerSpeed_Nms * omega_s) /
          kSecondaryInertia_kgm2;
 }
@@ -139,8 +139,8 @@ TEST(Forward, StiffRigFollowsTheFineIntegrationUpToThePeakAndEndsThere) {
   const ArrayXd truth = integrated(rate, simulated[begin], begin, end + 1, 1e-5);
   for (int k = begin + 1; k <= end; ++k) {
     // A speed sensor resolves 1e-4 at best. Where friction hardly resists any more, errors grow.
-    const double slip = 1.0 - truth[k] / (data.omega_p.value[k] * kLow);
-    EXPECT_NEAR(simulated[k] / truth[k], 1.0, slip < 0.7 * kPeakSlipLow ? 1e-5 : 2e-4) << k;
+    const double slip_share = 1.0 - truth[k] / (data.omega_p.value[k] * kLow);
+    EXPECT_NEAR(simulated[k] / truth[k], 1.0, slip_share < 0.7 * kPeakSlipLow ? 1e-5 : 2e-4) << k;
   }
   // The next sample is beyond the peak in truth too.
   const double force_N = kArea_m2 * data.pressure.value[end + 1] + kSpring_N;
@@ -164,11 +164,12 @@ TEST(Forward, PredictsTheTorqueAtTheRigsPrimaryShaft) {
     if (!forward.grips[static_cast<std::size_t>(k)]) continue;
     const double force_N = kArea_m2 * data.pressure.value[k] + kSpring_N;
     const double ratio = kLow * (1.0 - kDeformationPerN * force_N);
-    const double slip = 1.0 - omega_s[k] / (data.omega_p.value[k] * ratio);
+    const double slip_share = 1.0 - omega_s[k] / (data.omega_p.value[k] * ratio);
     const double loss_Nm =
         kLoss_Nm + kLossPerSpeed_Nms * data.omega_p.value[k] + kLossPerN_Nm * force_N;
     EXPECT_NEAR(torque[k],
-                capacity_Nm(force_N, kRadiusLow_m) * traction(slip, kPeakSlipLow) + loss_Nm, 1e-4);
+                capacity_Nm(force_N, kRadiusLow_m) * traction(slip_share, kPeakSlipLow) + loss_Nm,
+                1e-4);
     ++compared;
   }
   EXPECT_GT(compared, 60);
@@ -193,9 +194,9 @@ TEST(Forward, VehicleFollowsTheFineIntegration) {
   const auto rate = [&](double t_s, double omega_p) {
     const double force_N = kArea_m2 * at(data.pressure.value, t_s) + kSpring_N;
     const double ratio = kOverdrive * (1.0 - kDeformationPerN * force_N);
-    const double slip = 1.0 - at(data.omega_s.value, t_s) / (omega_p * ratio);
+    const double slip_share = 1.0 - at(data.omega_s.value, t_s) / (omega_p * ratio);
     const double belt_Nm =
-        capacity_Nm(force_N, kRadiusOverdrive_m) * traction(slip, kPeakSlipOverdrive);
+        capacity_Nm(force_N, kRadiusOverdrive_m) * traction(slip_share, kPeakSlipOverdrive);
     const double loss_Nm = kLoss_Nm + kLossPerSpeed_Nms * omega_p + kLossPerN_Nm * force_N;
     return (at(data.torque.value, t_s) - loss_Nm - belt_Nm) / kPrimaryInertia_kgm2;
   };
@@ -208,9 +209,9 @@ TEST(Forward, VehicleFollowsTheFineIntegration) {
   for (int k = begin + 5; k < end - 5; ++k) {
     const double force_N = kArea_m2 * data.pressure.value[k] + kSpring_N;
     const double ratio = kOverdrive * (1.0 - kDeformationPerN * force_N);
-    const double slip = 1.0 - data.omega_s.value[k] / (truth[k] * ratio);
+    const double slip_share = 1.0 - data.omega_s.value[k] / (truth[k] * ratio);
     const double belt_Nm =
-        capacity_Nm(force_N, kRadiusOverdrive_m) * traction(slip, kPeakSlipOverdrive);
+        capacity_Nm(force_N, kRadiusOverdrive_m) * traction(slip_share, kPeakSlipOverdrive);
     const double acceleration = (data.omega_s.value[k + 1] - data.omega_s.value[k - 1]) / 0.2;
     const double drag_Nm = kDrag_Nm + kDragPerSpeed_Nms * data.omega_s.value[k];
     EXPECT_NEAR(torque_s[k], belt_Nm / ratio - kSecondaryInertia_kgm2 * acceleration - drag_Nm,
@@ -233,11 +234,12 @@ TEST(Forward, RigWithoutSecondaryTorqueCarriesThePrimaryOne) {
     if (!std::isfinite(omega_s[k])) continue;
     const double force_N = kArea_m2 * data.pressure.value[k] + kSpring_N;
     const double ratio = kLow * (1.0 - kDeformationPerN * force_N);
-    const double slip = 1.0 - omega_s[k] / (data.omega_p.value[k] * ratio);
-    if (slip > 0.7 * kPeakSlipLow) continue;  // about to run away: no longer at rest
+    const double slip_share = 1.0 - omega_s[k] / (data.omega_p.value[k] * ratio);
+    if (slip_share > 0.7 * kPeakSlipLow) continue;  // about to run away: no longer at rest
     const double carried_Nm =
         17.0 - kLoss_Nm - kLossPerSpeed_Nms * data.omega_p.value[k] - kLossPerN_Nm * force_N;
-    EXPECT_NEAR(capacity_Nm(force_N, kRadiusLow_m) * traction(slip, kPeakSlipLow), carried_Nm, 0.1)
+    EXPECT_NEAR(capacity_Nm(force_N, kRadiusLow_m) * traction(slip_share, kPeakSlipLow), carried_Nm,
+                0.1)
         << k;
     ++compared;
   }

@@ -17,13 +17,13 @@ constexpr double kStep_s = 0.01, kEnd_s = 26.0, kClosed_s = 20.0;
 struct Rig {
   estimator::VariatorParameters variator;
   double lag_s = 0.0;
-  double mu_max = 0.1, peak_slip = 0.02, omega_p = 100.0, torque_Nm = 50.0;
+  double mu_max = 0.1, peak_slip_share = 0.02, omega_p = 100.0, torque_Nm = 50.0;
 
-  double slip(double belt_Nm, double force_N) const {
+  double slip_share(double belt_Nm, double force_N) const {
     const double capacity_Nm = 2.0 * variator.primary_radius_overdrive_m * mu_max * force_N /
                                std::cos(variator.half_wedge_angle_rad);
     const double y = belt_Nm / capacity_Nm;
-    return peak_slip * (1.0 - std::sqrt(1.0 - y * y)) / y;
+    return peak_slip_share * (1.0 - std::sqrt(1.0 - y * y)) / y;
   }
 
   // Down by one rate, closed again within a fifth of a second.
@@ -48,7 +48,7 @@ struct Rig {
       };
       add(Role::kPrimarySpeed, omega_p * (1.0 + 5e-5 * normal(random)));
       add(Role::kSecondarySpeed,
-          omega_p * ratio * (1.0 - slip(belt_Nm, acting_N)) * (1.0 + 5e-5 * normal(random)));
+          omega_p * ratio * (1.0 - slip_share(belt_Nm, acting_N)) * (1.0 + 5e-5 * normal(random)));
       add(Role::kPrimaryTorque, belt_Nm + loss_Nm + 0.1 * normal(random));
       add(Role::kSecondaryPressure,
           (force_N - variator.secondary_spring_force_N) / variator.secondary_piston_area_m2 +

@@ -34,18 +34,19 @@ TEST(InputCorrection, TakesOutWhatItIsTold) {
   const estimator::VariatorParameters variator;
   estimator::InputCorrection correction(effects, variator, 200.0);
   // Truth: 40 Nm on the belt, 3 kN, slip 1 %.
-  const double force_N = 3000.0, slip = 0.01, belt_Nm = 40.0;
+  const double force_N = 3000.0, slip_share = 0.01, belt_Nm = 40.0;
   estimator::VariatorSample measured;
   measured.usable = true;
   measured.omega_p_rad_s = 105.0;
   const double ratio = variator.ratio_overdrive * (1.0 - 0.003) * (1.0 - 2e-3 * 3.0);
-  measured.omega_s_rad_s = 105.0 * ratio * (1.0 - slip) * 1.004;
+  measured.omega_s_rad_s = 105.0 * ratio * (1.0 - slip_share) * 1.004;
   measured.secondary_pressure_Pa = (force_N - 150.0 - 500.0) / 0.0113 * 1.02 + 20e3;
   measured.torque_Nm = (belt_Nm + 0.4 * 3.0) * 1.05 + 3.0;
   const estimator::VariatorSample& out = correction.correct(measured);
   EXPECT_NEAR(out.torque_Nm, belt_Nm, 1e-9);
   EXPECT_NEAR(out.secondary_pressure_Pa * 0.0113 + 500.0, force_N, 1e-6);
-  EXPECT_NEAR(1.0 - out.omega_s_rad_s / out.omega_p_rad_s / variator.ratio_overdrive, slip, 1e-12);
+  EXPECT_NEAR(1.0 - out.omega_s_rad_s / out.omega_p_rad_s / variator.ratio_overdrive, slip_share,
+              1e-12);
   EXPECT_EQ(correction.latency_s(), 0.0);
 }
 

@@ -57,13 +57,13 @@ TEST(Timing, TheAccelerationOfALateSpeedIsLateToo) {
   ASSERT_NE(late.sum(), 0.0);
   const auto largest = [&](const Eigen::VectorXd& effects) {
     const Quantities q = evaluate(run, 0, variator, machine, {&slots, effects, {}, {}});
-    double balance_Nm = 0.0, slip = 0.0;
+    double balance_Nm = 0.0, slip_share = 0.0;
     for (int k = 20; k + 20 < run.size(); ++k) {  // the ends have neighbours on one side only
       if (!run.valid[static_cast<std::size_t>(k)]) continue;
       balance_Nm = std::max(balance_Nm, std::abs(q.balance[k]));
-      slip = std::max(slip, std::abs(q.slip[k]));
+      slip_share = std::max(slip_share, std::abs(q.slip_share[k]));
     }
-    return std::pair{balance_Nm, slip};
+    return std::pair{balance_Nm, slip_share};
   };
   const auto [on_time_Nm, on_time_slip] = largest(late);
   const auto [late_Nm, late_slip] = largest(Eigen::VectorXd::Zero(late.size()));

@@ -20,7 +20,7 @@ constexpr double kGrid_s = 0.1;
 constexpr double kKernelSigma_s = 0.07;
 constexpr double kSlowSigma_s = 0.25;
 constexpr double kTrim_s = 0.3;            // either end of a gapless stretch
-constexpr double kSlipMax = 0.06;          // beyond: damage, not friction to be explained
+constexpr double kSlipMax_share = 0.06;    // beyond: damage, not friction to be explained
 constexpr double kSlipRateMax_1_s = 0.03;  // the run-away: ratios of derivatives, no statics
 constexpr double kRatioTolerance = 0.085;  // ln; around an end stop
 constexpr double kSoftness_1_N = 5e-6;     // and below it, as pulleys give way to the clamp force
@@ -460,7 +460,7 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
   data.command = on_grid(Role::kSecondaryPressureCommand);
   data.temperature = on_grid(Role::kOilTemperature);
 
-  data.rounding_slip =
+  data.rounding_slip_share =
       std::hypot(held_rounding_share(speed), held_rounding_share(table[Role::kSecondarySpeed]));
   data.rounding_pressure_Pa = held_rounding(table[Role::kSecondaryPressure]);
   data.rounding_torque_Nm =
@@ -493,7 +493,7 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
   }
   data.stop.assign(static_cast<std::size_t>(n), kNoStop);
   data.valid.assign(static_cast<std::size_t>(n), false);
-  data.slip_spread = ArrayXd::Zero(n);
+  data.slip_spread_share2 = ArrayXd::Zero(n);
   std::vector<bool> too_fast(static_cast<std::size_t>(n), false);
   const auto usable = [](const GridSignal& signal, int k) {
     return !signal.present || std::isfinite(signal.value[k]);
@@ -507,16 +507,16 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
     data.stop[i] = stop_of(data.omega_s.value[k] / data.omega_p.value[k], force_N, variator);
     if (data.stop[i] == kNoStop) continue;
     const double ratio = data.stop[i] == kLowStop ? variator.ratio_low : variator.ratio_overdrive;
-    const double slip = 1.0 - data.omega_s.value[k] / (data.omega_p.value[k] * ratio);
-    const double slip_rate = (data.omega_s.value[k] * data.omega_p.slope[k] /
-                                  (data.omega_p.value[k] * data.omega_p.value[k]) -
-                              data.omega_s.slope[k] / data.omega_p.value[k]) /
-                             ratio;
-    data.slip_spread[k] = std::pow(kernel_s(data.dt_s) * slip_rate, 2.0);
+    const double slip_share = 1.0 - data.omega_s.value[k] / (data.omega_p.value[k] * ratio);
+    const double slip_rate_1_s = (data.omega_s.value[k] * data.omega_p.slope[k] /
+                                      (data.omega_p.value[k] * data.omega_p.value[k]) -
+                                  data.omega_s.slope[k] / data.omega_p.value[k]) /
+                                 ratio;
+    data.slip_spread_share2[k] = std::pow(kernel_s(data.dt_s) * slip_rate_1_s, 2.0);
     const double step_N =
         variator.secondary_piston_area_m2 * (data.pressure.value[k] - data.pressure.slow[k]);
-    data.valid[i] = std::abs(slip) < kSlipMax + kSoftness_1_N * force_N &&
-                    std::abs(slip_rate) < kSlipRateMax_1_s && data.pressure.present &&
+    data.valid[i] = std::abs(slip_share) < kSlipMax_share + kSoftness_1_N * force_N &&
+                    std::abs(slip_rate_1_s) < kSlipRateMax_1_s && data.pressure.present &&
                     force_N > kForceMin_N && data.torque.present && usable(data.pressure, k) &&
                     usable(data.torque, k) && usable(data.torque_s, k) && usable(data.command, k) &&
                     usable(data.temperature, k) && usable(data.pressure_p, k) && !saturated[i];

@@ -47,12 +47,13 @@ struct ExperimentData {
   std::vector<int> stop;  // EndStopIndex per sample
   // By how much the slip varies within what one sample is the mean of, squared shares: a curve that
   // is bent has another mean there than at the mean slip.
-  Eigen::ArrayXd slip_spread;
+  Eigen::ArrayXd slip_spread_share2;
   std::vector<bool> valid;         // may carry a conclusion
   std::vector<Stretch> stretches;  // the valid samples
   int valid_count = 0;
   bool saturated_pressure = false;
-  double rounding_slip = 0.0;  // one sigma of what the rounding of the speeds leaves in the slip
+  double rounding_slip_share =
+      0.0;  // one sigma of what the rounding of the speeds leaves in the slip
   double rounding_pressure_Pa = 0.0, rounding_torque_Nm = 0.0, rounding_torque_s_Nm = 0.0;  // same
   std::vector<std::string> notes;
   int size() const { return static_cast<int>(t_s.size()); }

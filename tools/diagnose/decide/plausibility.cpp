@@ -11,15 +11,15 @@
 namespace beltgrip::diagnose {
 namespace {
 
-constexpr double kSameRatio = 1.03;         // of two experiments at one end stop, most
-constexpr double kSoftestPerkN = 0.01;      // deformation of pulleys per clamp force, most
-constexpr double kMuMost = 0.4;             // friction of any belt, and more
-constexpr double kMuLeast = 0.03;           // the same, and less
-constexpr double kPeakSlipMost = 0.1;       // slip at its peak, and more
-constexpr double kPressureMost_Pa = 200e5;  // three times what variators have
-constexpr double kTorqueTold_Nm = 10.0;     // less may be losses and zero errors alone
-constexpr double kPowerLeast = 0.3;         // out over in: no variator loses or gains as much
-constexpr double kCopyNoise = 0.3;          // rms of the difference over that of the noise
+constexpr double kSameRatio = 1.03;          // of two experiments at one end stop, most
+constexpr double kSoftestPerkN = 0.01;       // deformation of pulleys per clamp force, most
+constexpr double kMuMost = 0.4;              // friction of any belt, and more
+constexpr double kMuLeast = 0.03;            // the same, and less
+constexpr double kPeakSlipMost_share = 0.1;  // slip at its peak, and more
+constexpr double kPressureMost_Pa = 200e5;   // three times what variators have
+constexpr double kTorqueTold_Nm = 10.0;      // less may be losses and zero errors alone
+constexpr double kPowerLeast = 0.3;          // out over in: no variator loses or gains as much
+constexpr double kCopyNoise = 0.3;           // rms of the difference over that of the noise
 
 std::string text_of(double value) {
   char buffer[32];
@@ -260,7 +260,7 @@ void check_fitted_friction(const std::map<std::string, Interval>& machine, Doubt
   const Interval& mu_max = machine.at("mu_max");
   const auto slips = [&](const char* name) {
     const auto found = machine.find(name);
-    return found != machine.end() && found->second.low > kPeakSlipMost;
+    return found != machine.end() && found->second.low > kPeakSlipMost_share;
   };
   if (mu_max.high >= kMuLeast && !slips("peak_slip_overdrive") && !slips("peak_slip_low")) return;
   doubts.notes.push_back("friction comes to its peak at " + text_of(mu_max.value) +

@@ -95,7 +95,7 @@ std::vector<UnknownGroup> score_groups(const Engine& engine) {
             continue;
           }
           if (injection == 0) change.ln_capacity = p * kUnit[0];
-          if (injection == 1) change.slip = p * kUnit[1];
+          if (injection == 1) change.slip_share = p * kUnit[1];
           if (injection == 2) {
             change.torque = p * kUnit[2];
             change.balance = p * kUnit[2];

@@ -29,7 +29,7 @@ QuantityChange unit_change(const ModelState& state, const Residuals& at, const I
       out.ln_capacity = by;
       break;
     case Injection::kRatio:
-      out.slip = by * (1.0 - at.there.slip);
+      out.slip_share = by * (1.0 - at.there.slip_share);
       if (at.there.balance.size() > 0) out.balance = -at.clean_Nm * by;
       break;
     case Injection::kTorque:
@@ -43,7 +43,7 @@ QuantityChange unit_change(const ModelState& state, const Residuals& at, const I
     case Injection::kClampForce: {
       const ArrayXd ln_ratio = -1e-3 * state.nuisance[kDeformationPerkN] * by;
       out.ln_capacity = by / at.there.force_N.max(50.0);
-      out.slip = ln_ratio * (1.0 - at.there.slip);
+      out.slip_share = ln_ratio * (1.0 - at.there.slip_share);
       if (at.there.balance.size() > 0) out.balance = -at.clean_Nm * ln_ratio;
       break;
     }

@@ -34,26 +34,27 @@ Drive between(const Drive& a, const Drive& b, double share) {
 // changes slowly while the belt grips, whatever the speeds do.
 struct Shaft {
   const CurveShape& curve;
-  double peak_slip = 0.02;
+  double peak_slip_share = 0.02;
   double inertia_kg_m2 = 1.0;
   bool secondary = true;
 
-  double speed(double slip, const Drive& by) const {
-    return secondary ? by.synchronous_rad_s * (1.0 - slip) : by.synchronous_rad_s / (1.0 - slip);
+  double speed(double slip_share, const Drive& by) const {
+    return secondary ? by.synchronous_rad_s * (1.0 - slip_share)
+                     : by.synchronous_rad_s / (1.0 - slip_share);
   }
-  double belt_torque(double slip, const Drive& by) const {
-    return by.capacity_Nm * curve.evaluate(slip / peak_slip).value;
+  double belt_torque(double slip_share, const Drive& by) const {
+    return by.capacity_Nm * curve.evaluate(slip_share / peak_slip_share).value;
   }
   struct Rate {
     double value = 0.0;  // d(slip)/dt
     double slope = 0.0;  // its change with the slip
   };
   // acceleration: of the synchronous speed.
-  Rate rate(double slip, const Drive& by, double acceleration_rad_s2) const {
-    const CurveShape::Point point = curve.evaluate(slip / peak_slip);
+  Rate rate(double slip_share, const Drive& by, double acceleration_rad_s2) const {
+    const CurveShape::Point point = curve.evaluate(slip_share / peak_slip_share);
     const double torque_Nm = by.capacity_Nm * point.value;
-    const double per_slip_Nm = by.capacity_Nm * point.slope / peak_slip;
-    const double grip = 1.0 - slip;
+    const double per_slip_Nm = by.capacity_Nm * point.slope / peak_slip_share;
+    const double grip = 1.0 - slip_share;
     const double lead = acceleration_rad_s2 / by.synchronous_rad_s;
     const double mass = inertia_kg_m2 * by.synchronous_rad_s;
     if (secondary) {
@@ -68,26 +69,28 @@ struct Shaft {
 
 // One step, linearly implicit of order two, that damps whatever is faster than the step (Rosenbrock
 // method ROS2, gamma = 1 - 1/sqrt(2)): friction below the peak pulls at up to some 1000/s.
-double step(const Shaft& shaft, double slip, const Drive& begin, const Drive& end, double h_s) {
+double step(const Shaft& shaft, double slip_share, const Drive& begin, const Drive& end,
+            double h_s) {
   static const double kGamma = 1.0 - std::sqrt(0.5);
   const double acceleration_rad_s2 = (end.synchronous_rad_s - begin.synchronous_rad_s) / h_s;
-  const Shaft::Rate here = shaft.rate(slip, begin, acceleration_rad_s2);
-  const double drift = kGamma * (shaft.rate(slip, end, acceleration_rad_s2).value - here.value);
+  const Shaft::Rate here = shaft.rate(slip_share, begin, acceleration_rad_s2);
+  const double drift =
+      kGamma * (shaft.rate(slip_share, end, acceleration_rad_s2).value - here.value);
   const double scale = 1.0 / (1.0 - kGamma * h_s * here.slope);
   const double k1 = scale * (here.value + drift);
-  const double there = shaft.rate(slip + h_s * k1, end, acceleration_rad_s2).value;
+  const double there = shaft.rate(slip_share + h_s * k1, end, acceleration_rad_s2).value;
   const double k2 = scale * (there - 2.0 * k1 - drift);
-  return slip + h_s * (1.5 * k1 + 0.5 * k2);
+  return slip_share + h_s * (1.5 * k1 + 0.5 * k2);
 }
 
 // Slip below the peak at which the belt carries this torque.
-double slip_at_rest(const Shaft& shaft, double torque_Nm, double capacity_Nm) {
+double slip_share_at_rest(const Shaft& shaft, double torque_Nm, double capacity_Nm) {
   double low = -1.0, high = 1.0;
   for (int i = 0; i < 50; ++i) {
     const double middle = 0.5 * (low + high);
     (capacity_Nm * shaft.curve.evaluate(middle).value < torque_Nm ? low : high) = middle;
   }
-  return 0.5 * (low + high) * shaft.peak_slip;
+  return 0.5 * (low + high) * shaft.peak_slip_share;
 }
 
 struct Pass {
@@ -101,7 +104,7 @@ ArrayXd grip_of(const ExperimentData& data, const Quantities& q) {
   for (int k = 0; k < data.size(); ++k) {
     if (!data.valid[static_cast<std::size_t>(k)]) continue;
     const auto stop = static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)]);
-    out[k] = std::abs(q.slip[k]) / std::exp(q.ln_peak_slip[stop]);
+    out[k] = std::abs(q.slip_share[k]) / std::exp(q.ln_peak_slip[stop]);
   }
   return out;
 }
@@ -130,7 +133,7 @@ Pass integrate(const ExperimentData& data, const Quantities& q, const ArrayXd& m
     return by;
   };
   bool gripping = false;
-  double slip = 0.0;
+  double slip_share = 0.0;
   Drive before;
   for (int k = 0; k < n; ++k) {
     const auto i = static_cast<std::size_t>(k);
@@ -144,28 +147,29 @@ Pass integrate(const ExperimentData& data, const Quantities& q, const ArrayXd& m
     if (gripping) {
       for (int s = 0; s < kStepsPerSample; ++s) {
         constexpr double kShare = 1.0 / kStepsPerSample;
-        slip = step(shaft, slip, between(before, now, s * kShare),
-                    between(before, now, (s + 1) * kShare), kShare * data.dt_s);
+        slip_share = step(shaft, slip_share, between(before, now, s * kShare),
+                          between(before, now, (s + 1) * kShare), kShare * data.dt_s);
       }
-      gripping = std::abs(slip) < shaft.peak_slip;
+      gripping = std::abs(slip_share) < shaft.peak_slip_share;
     } else {
       const double carried_Nm = secondary
                                     ? now.ratio * (inertia_kg_m2 * following(k) - now.torque_Nm)
                                     : now.torque_Nm - inertia_kg_m2 * following(k);
       gripping =
           std::abs(carried_Nm) < kBelowCapacity * now.capacity_Nm && measured_grip[k] < kBelowPeak;
-      if (gripping) slip = slip_at_rest(shaft, carried_Nm, now.capacity_Nm);
+      if (gripping) slip_share = slip_share_at_rest(shaft, carried_Nm, now.capacity_Nm);
     }
     before = now;
     if (!gripping) continue;
     out.grips[i] = true;
-    out.speed[k] = shaft.speed(slip, now);
-    out.belt_torque[k] = shaft.belt_torque(slip, now);
+    out.speed[k] = shaft.speed(slip_share, now);
+    out.belt_torque[k] = shaft.belt_torque(slip_share, now);
   }
   return out;
 }
 
-ArrayXd configured_slip(const ExperimentData& data, const estimator::VariatorParameters& variator) {
+ArrayXd configured_slip_share(const ExperimentData& data,
+                              const estimator::VariatorParameters& variator) {
   ArrayXd out(data.size());
   for (int k = 0; k < data.size(); ++k) {
     const bool low = data.stop[static_cast<std::size_t>(k)] == kLowStop;
@@ -230,8 +234,8 @@ Forward run_forward(const Campaign& campaign, int run, const ModelState& state) 
     out.signals.push_back({name, measured, std::move(values)});
   };
   add(secondary ? "secondary_speed" : "primary_speed", measured_speed.value, speed.value);
-  add("slip", configured_slip(data, campaign.variator),
-      configured_slip(simulated, campaign.variator));
+  add("slip", configured_slip_share(data, campaign.variator),
+      configured_slip_share(simulated, campaign.variator));
   if (torque_follows) {
     add("primary_torque", data.torque.value, simulated.torque.value);
   } else if (!secondary && data.torque_s.present) {

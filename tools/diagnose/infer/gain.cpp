@@ -276,16 +276,17 @@ SignalErrors signal_errors(const Campaign& campaign, int run, const ModelState& 
   const Residuals at = residuals_of(campaign, run, state);
   auto& speed = out.signal["secondary_speed"];
   auto& torque = out.signal[torque_name(campaign)];
-  const double slip_sigma = campaign.slip_noise(run), torque_sigma = campaign.noise.torque_Nm;
+  const double slip_sigma_share = campaign.slip_noise_share_of(run),
+               torque_sigma = campaign.noise.torque_Nm;
   for (int k = 0; k < data.size(); ++k) {
     if (!data.valid[static_cast<std::size_t>(k)]) continue;
     const double x = std::abs(at.foot[k]);
     // The distance vector runs along (slope s_slip^2, -s_torque^2); its ends on the axes are the
     // errors of one signal given the other.
     const double distance = at.value[kFrictionResidual][k] / at.weight[k];  // Nm, at given slip
-    if (x < kBelow && at.slope[k] > 0.0 && at.slope[k] * slip_sigma > 0.2 * torque_sigma) {
-      const double slip_error = distance / at.slope[k];
-      const double omega_s_error = data.omega_s.value[k] * slip_error;
+    if (x < kBelow && at.slope[k] > 0.0 && at.slope[k] * slip_sigma_share > 0.2 * torque_sigma) {
+      const double slip_error_share = distance / at.slope[k];
+      const double omega_s_error = data.omega_s.value[k] * slip_error_share;
       speed.squares += omega_s_error * omega_s_error;
       speed.count += 1.0;
     }
@@ -335,7 +336,7 @@ std::map<std::string, double> noise_floors(const Campaign& campaign, const Model
     }
   }
   if (count == 0.0) return out;
-  out["secondary_speed"] = omega_s / count * campaign.noise.slip;
+  out["secondary_speed"] = omega_s / count * campaign.noise.slip_share;
   out[torque_name(campaign)] = std::sqrt(leverage / count);
   if (campaign.has_balance) {
     out["secondary_torque"] = std::sqrt(balance / std::max(balance_count, 1.0));

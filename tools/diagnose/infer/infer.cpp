@@ -34,7 +34,8 @@ std::array<ResidualColumns, kRandomEffects> random_columns(const Campaign& campa
   out[0] = propagate(campaign, at, level);
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   // A speed that is held on one step of its rounding is off by the same all along.
-  seat.slip = ArrayXd::Constant(n, std::hypot(1.0, data.rounding_slip / kDefaultScatter[1]));
+  seat.slip_share =
+      ArrayXd::Constant(n, std::hypot(1.0, data.rounding_slip_share / kDefaultScatter[1]));
   out[1] = propagate(campaign, at, seat);
   zero.torque = ArrayXd::Ones(n);
   zero.balance = ArrayXd::Ones(n);

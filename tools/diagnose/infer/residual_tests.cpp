@@ -48,7 +48,7 @@ struct Injection {
   ArrayXd QuantityChange::*into;
 };
 const std::array<Injection, 3> kInjections{{{"friction", 0.05, &QuantityChange::ln_capacity},
-                                            {"ratio", 2e-3, &QuantityChange::slip},
+                                            {"ratio", 2e-3, &QuantityChange::slip_share},
                                             {"torque", 2.0, &QuantityChange::torque}}};
 
 ResidualColumns step_columns(const Campaign& campaign, int run, const Residuals& at,

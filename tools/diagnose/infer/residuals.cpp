@@ -50,25 +50,26 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
   out.slope = ArrayXd::Zero(n);
   out.model_Nm = ArrayXd::Zero(n);
   out.weight = ArrayXd::Zero(n);
-  const double slip_variance = campaign.slip_noise(run) * campaign.slip_noise(run);
+  const double slip_variance =
+      campaign.slip_noise_share_of(run) * campaign.slip_noise_share_of(run);
   const double slip_weight = 1.0 / slip_variance;
   const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
-  const std::array<double, kStops> peak_slip{std::exp(q.ln_peak_slip[0]),
-                                             std::exp(q.ln_peak_slip[1])};
+  const std::array<double, kStops> peak_slip_share{std::exp(q.ln_peak_slip[0]),
+                                                   std::exp(q.ln_peak_slip[1])};
   // What the mean of the curve over a sample is more than the curve at the mean slip, Nm.
   const auto bend_Nm = [&](int k, const CurveShape& shape, double per_peak) {
     constexpr double kStep = 0.05;    // in slips at the peak
     constexpr double kLeast = 1e-10;  // squared shares: less is nothing on the steepest curve
-    const double spread = data.slip_spread[k];
+    const double spread = data.slip_spread_share2[k];
     if (spread < kLeast) return 0.0;
-    const double x = q.slip[k] * per_peak;
+    const double x = q.slip_share[k] * per_peak;
     const double bend =
         (shape.evaluate(x + kStep).slope - shape.evaluate(x - kStep).slope) / (2.0 * kStep);
     return 0.5 * q.capacity[k] * bend * spread * per_peak * per_peak;
   };
   const auto find_foot = [&](int k) {
     const auto stop = static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)]);
-    const double peak = peak_slip[stop], per_peak = 1.0 / peak;
+    const double peak = peak_slip_share[stop], per_peak = 1.0 / peak;
     const double capacity = q.capacity[k];
     const double torque_Nm = q.belt_torque[k] - bend_Nm(k, curve[stop], per_peak);
     const double carried_Nm = q.belt_torque[k] * campaign.noise.force_N / q.force_N[k];
@@ -81,21 +82,21 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
     const auto at = [&](double x) -> Place {
       const CurveShape::Point point = curve[stop].evaluate(x);
       const double model_Nm = capacity * point.value;
-      const double gap_slip = q.slip[k] - x * peak;
+      const double gap_slip_share = q.slip_share[k] - x * peak;
       const double gap_Nm = torque_Nm - model_Nm;
       return {x, model_Nm, capacity * point.slope * per_peak,
-              gap_slip * gap_slip * slip_weight + gap_Nm * gap_Nm * torque_weight};
+              gap_slip_share * gap_slip_share * slip_weight + gap_Nm * gap_Nm * torque_weight};
     };
-    Place foot = at(q.slip[k] * per_peak);
+    Place foot = at(q.slip_share[k] * per_peak);
     // Right of the rising branch the next point of the curve may lie on it, at the same torque:
     // from beyond the peak no small steps lead there.
     if (const double rising = nominal_inverse(torque_Nm / capacity); std::isfinite(rising)) {
       if (const Place there = at(rising); there.distance < foot.distance) foot = there;
     }
     for (int i = 0; i < 12; ++i) {
-      const double gap_slip = q.slip[k] - foot.x * peak;
+      const double gap_slip_share = q.slip_share[k] - foot.x * peak;
       const double gap_Nm = torque_Nm - foot.model_Nm;
-      double step = (gap_slip * slip_weight + foot.slope * gap_Nm * torque_weight) /
+      double step = (gap_slip_share * slip_weight + foot.slope * gap_Nm * torque_weight) /
                     ((slip_weight + foot.slope * foot.slope * torque_weight) * peak);
       step = std::clamp(step, -0.5, 0.5);
       const double before = foot.x;
@@ -112,7 +113,8 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
     out.model_Nm[k] = foot.model_Nm;
     out.weight[k] = 1.0 / std::sqrt(torque_variance + foot.slope * foot.slope * slip_variance);
     out.value[kFrictionResidual][k] =
-        (torque_Nm - foot.model_Nm - foot.slope * (q.slip[k] - foot.x * peak)) * out.weight[k];
+        (torque_Nm - foot.model_Nm - foot.slope * (q.slip_share[k] - foot.x * peak)) *
+        out.weight[k];
   };
   for (const auto& [begin, end] : data.stretches) {
     for (int k = begin; k < end; ++k) find_foot(k);
@@ -169,7 +171,7 @@ void move_to_foot(const Campaign& campaign, int run, Residuals& at) {
 
 void prepare_derivatives(const Campaign& campaign, int run, const ModelState& state,
                          Residuals& at) {
-  if (at.there.slip.size() > 0) return;
+  if (at.there.slip_share.size() > 0) return;
   move_to_foot(campaign, run, at);
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   at.there = quantities(campaign, data, {at.clean_pressure_Pa, at.clean_reading_Nm}, run, state);
@@ -187,10 +189,10 @@ ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
                           const QuantityChange& change) {
   ResidualColumns out;
   const auto n = at.foot.size();
-  if (change.torque.size() + change.slip.size() + change.ln_capacity.size() > 0) {
+  if (change.torque.size() + change.slip_share.size() + change.ln_capacity.size() > 0) {
     ArrayXd friction = ArrayXd::Zero(n);
     if (change.torque.size() > 0) friction += change.torque;
-    if (change.slip.size() > 0) friction -= at.slope * change.slip;
+    if (change.slip_share.size() > 0) friction -= at.slope * change.slip_share;
     if (change.ln_capacity.size() > 0) friction -= at.clean_Nm * change.ln_capacity;
     out[kFrictionResidual] = (at.weight > 0.0).select(friction * at.weight, 0.0);
   }
@@ -266,7 +268,7 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
   }
   // A change of ln(r_g): slip and, through the torque out, balance.
   const auto ratio_change = [&](const ArrayXd& ln_ratio) {
-    change.slip = (1.0 - at.measured.slip) * ln_ratio;
+    change.slip_share = (1.0 - at.measured.slip_share) * ln_ratio;
     if (at.output_torque.size() > 0) {
       change.balance = -at.measured.ratio * at.output_torque * ln_ratio;
     }
@@ -295,7 +297,7 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
     case kDeformationPerkN: {
       const Quantities& q = at.there;
       const ArrayXd ln_ratio = -1e-3 * q.force_N / (1.0 - q.deformation).max(0.05);
-      change.slip = (1.0 - q.slip) * ln_ratio;
+      change.slip_share = (1.0 - q.slip_share) * ln_ratio;
       if (q.balance.size() > 0) {
         change.balance =
             (q.balance - q.belt_torque - data.torque.slow + at.clean_reading_Nm) * ln_ratio;
@@ -336,7 +338,7 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
   value -= 2.0 * step;
   const Quantities below = quantities(campaign, data, clean, run, moved);
   const double scale = 0.5 / step;
-  change.slip = (above.slip - below.slip) * scale;
+  change.slip_share = (above.slip_share - below.slip_share) * scale;
   change.torque = (above.belt_torque - below.belt_torque) * scale;
   change.ln_capacity = (above.capacity / below.capacity).log() * scale;
   if (above.balance.size() > 0) change.balance = (above.balance - below.balance) * scale;
@@ -369,7 +371,7 @@ ResidualColumns secant(const Campaign& campaign, int run, const ModelState& stat
       quantities(campaign, data, {at.clean_pressure_Pa, at.clean_reading_Nm}, run, moved);
   const Quantities& here = at.there;
   QuantityChange change;
-  change.slip = (there.slip - here.slip) / step;
+  change.slip_share = (there.slip_share - here.slip_share) / step;
   change.torque = (there.belt_torque - here.belt_torque) / step;
   change.ln_capacity = (there.capacity / here.capacity).log() / step;
   if (there.balance.size() > 0) change.balance = (there.balance - here.balance) / step;
@@ -396,7 +398,7 @@ constexpr NoiseProbe kSlowProbe{kBalanceStep, 0.37};  // 0.5 s, weights of 0.25 
 }  // namespace
 
 NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& state) {
-  std::vector<double> slip, torque, tracking, force;
+  std::vector<double> slip_share, torque, tracking, force;
   std::array<std::vector<double>, kStops> balance;
   for (int run = 0; run < static_cast<int>(campaign.runs.size()); ++run) {
     const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
@@ -413,7 +415,7 @@ NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& st
         into.push_back(probe.at(y, k));
       }
     };
-    collect(q.slip, slip);
+    collect(q.slip_share, slip_share);
     collect(q.belt_torque, torque);
     for (const int stop : {kOverdriveStop, kLowStop}) {
       collect(q.balance, balance[static_cast<std::size_t>(stop)], stop);
@@ -438,7 +440,7 @@ NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& st
                                          campaign.variator.ratio_low};
   static_assert(kOverdriveStop == 0 && kLowStop == 1);
   NoiseLevels out;
-  out.slip = std::max(robust_sigma(slip), 2e-6);
+  out.slip_share = std::max(robust_sigma(slip_share), 2e-6);
   out.torque_Nm = std::max({robust_sigma(torque), 2e-3, torque_Nm});
   for (std::size_t stop = 0; stop < kStops; ++stop) {
     out.balance_Nm[stop] = std::max(
@@ -457,18 +459,19 @@ std::vector<double> estimate_slip_noise_shares(const Campaign& campaign, const M
   for (int run = 0; run < static_cast<int>(campaign.runs.size()); ++run) {
     const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
     const Quantities q = quantities(campaign, data, run, state);
-    std::vector<double> slip;
+    std::vector<double> slip_share;
     constexpr int kReach = 2 * kFastProbe.lag;
     for (int k = kReach; k + kReach < data.size(); ++k) {
       if (!data.valid[static_cast<std::size_t>(k - kReach)] ||
           !data.valid[static_cast<std::size_t>(k) + kReach]) {
         continue;
       }
-      slip.push_back(kFastProbe.at(q.slip, k));
+      slip_share.push_back(kFastProbe.at(q.slip_share, k));
     }
-    const double here = robust_sigma(slip);
-    const double share = here > 0.0 ? std::clamp(here / campaign.noise.slip, kLeast, kMost) : 1.0;
-    sigma.push_back(std::max(share, data.rounding_slip / campaign.noise.slip));
+    const double here = robust_sigma(slip_share);
+    const double share =
+        here > 0.0 ? std::clamp(here / campaign.noise.slip_share, kLeast, kMost) : 1.0;
+    sigma.push_back(std::max(share, data.rounding_slip_share / campaign.noise.slip_share));
   }
   return sigma;
 }

@@ -25,13 +25,13 @@ inline constexpr int kBalanceStep = 5;  // samples of the slow copies, nearly in
 
 // One sigma of the noise of one grid sample, from differences of neighbours.
 struct NoiseLevels {
-  double slip = 1e-4;
+  double slip_share = 1e-4;
   double torque_Nm = 0.1;
   std::array<double, kStops> balance_Nm{0.1, 0.1};  // the secondary side counts by the ratio
   double tracking_Pa = 1e3;
   double force_N = 1.0;
   NoiseLevels times(double factor) const {
-    return {slip * factor,
+    return {slip_share * factor,
             torque_Nm * factor,
             {balance_Nm[0] * factor, balance_Nm[1] * factor},
             tracking_Pa * factor,
@@ -74,9 +74,9 @@ struct Campaign {
   std::vector<estimator::LearnedTerm> learned;  // of the model file
   NoiseLevels noise;
   std::vector<double> slip_noise_share;  // per experiment: its noise of slip over noise.slip
-  double slip_noise(int run) const {
+  double slip_noise_share_of(int run) const {
     const auto i = static_cast<std::size_t>(run);
-    return noise.slip * (i < slip_noise_share.size() ? slip_noise_share[i] : 1.0);
+    return noise.slip_share * (i < slip_noise_share.size() ? slip_noise_share[i] : 1.0);
   }
   // By more than a ramp itself moves it as the belt begins to slip. What follows the torque cannot
   // be told where it does not.
@@ -135,7 +135,7 @@ ResidualColumns secant(const Campaign& campaign, int run, const ModelState& stat
 
 // Effect of a change of slip, torque, ln(capacity), balance and tracking on the residuals.
 struct QuantityChange {
-  Eigen::ArrayXd slip, torque, ln_capacity, balance, tracking;  // empty: none
+  Eigen::ArrayXd slip_share, torque, ln_capacity, balance, tracking;  // empty: none
 };
 ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
                           const QuantityChange& change);

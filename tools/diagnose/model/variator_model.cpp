@@ -260,11 +260,11 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
   apply(Stage::kRatio);
   ratio *= (1.0 - c.deformation).max(0.05);
   if (!is_zero(c.ln_ratio)) ratio *= c.ln_ratio.exp();  // hardly ever there, and slow
-  c.slip = 1.0 - c.omega_s / (c.omega_p * ratio);
+  c.slip_share = 1.0 - c.omega_s / (c.omega_p * ratio);
   apply(Stage::kFriction);
 
   Quantities q;
-  q.slip = std::move(c.slip);
+  q.slip_share = std::move(c.slip_share);
   q.capacity = lever_m * c.force_N.max(50.0);
   if (!is_zero(c.ln_friction)) q.capacity *= c.ln_friction.exp();
   if (run.torque_s.present) {

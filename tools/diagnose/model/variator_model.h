@@ -81,7 +81,7 @@ struct Context {
   Eigen::ArrayXd loss_Nm;      // between shaft and belt, drag positive
   Eigen::ArrayXd deformation;  // r_g = r_g0 (1 - deformation) exp(ln_ratio)
   Eigen::ArrayXd ln_ratio;
-  Eigen::ArrayXd slip, belt_torque;
+  Eigen::ArrayXd slip_share, belt_torque;
   Eigen::ArrayXd secondary_loss_Nm;  // between belt and secondary torque, drag positive
   Eigen::ArrayXd ln_friction;
   std::array<double, kStops> ln_peak_slip{}, fall{};
@@ -89,7 +89,7 @@ struct Context {
 
 // What the residuals are made of.
 struct Quantities {
-  Eigen::ArrayXd slip, belt_torque, capacity, force_N, deformation, ratio, balance, tracking;
+  Eigen::ArrayXd slip_share, belt_torque, capacity, force_N, deformation, ratio, balance, tracking;
   Eigen::ArrayXd omega_p, omega_s;   // the true ones
   Eigen::ArrayXd slope_s;            // of omega_s
   Eigen::ArrayXd secondary_loss_Nm;  // empty without secondary torque

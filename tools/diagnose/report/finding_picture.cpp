@@ -50,7 +50,7 @@ QuantityChange of_friction(const Residuals& at) {
 }
 QuantityChange of_ratio(const Residuals& at) {
   QuantityChange out;
-  out.slip = 1.0 - at.measured.slip;
+  out.slip_share = 1.0 - at.measured.slip_share;
   if (at.measured.balance.size() > 0) out.balance = -at.clean_Nm;
   return out;
 }

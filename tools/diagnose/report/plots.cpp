@@ -227,7 +227,7 @@ void draw_friction(const std::vector<Fitted>& all, const ModelState& nominal,
       const double torque_Nm = at.model_Nm[k] + (curve ? 0.0 : sigmas(at, k) / at.weight[k]);
       const double peak =
           std::exp(state.nuisance[stop == kLowStop ? kLnPeakSlipLow : kLnPeakSlipOverdrive]);
-      return std::pair{100.0 * std::abs(curve ? at.foot[k] * peak : at.measured.slip[k]),
+      return std::pair{100.0 * std::abs(curve ? at.foot[k] * peak : at.measured.slip_share[k]),
                        mu_max * std::abs(torque_Nm) / at.measured.capacity[k]};
     };
     Chart chart{stop == kLowStop ? "Low" : "Overdrive", "slip, %", "traction coefficient", {}};

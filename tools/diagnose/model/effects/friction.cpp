@@ -51,7 +51,7 @@ void apply_wear_gradual(Context& c, const Slot&, double per_experiment) {
 void apply_warm_up_energy(Context& c, const Slot&, double per_kJ) {
   double energy_kJ = 0.0;
   for (Eigen::Index k = 0; k < c.ln_friction.size(); ++k) {
-    const double power_W = c.belt_torque[k] * c.slip[k] * c.omega_p[k];
+    const double power_W = c.belt_torque[k] * c.slip_share[k] * c.omega_p[k];
     if (std::isfinite(power_W)) energy_kJ += 1e-3 * power_W * c.run.dt_s;
     c.ln_friction[k] += std::log(std::max(1.0 + per_kJ * energy_kJ, 0.05));
   }
