@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 
+#include "can_dbc/text/format.h"
 #include "estimator/physics/clamp_force.h"
 #include "estimator/physics/slip.h"
 #include "estimator/statistics/order.h"
@@ -168,12 +168,6 @@ Observations observations(const std::vector<Cell>& cells, double ln_configured) 
   return data;
 }
 
-std::string text(const char* pattern, auto... values) {
-  std::array<char, 200> line;
-  std::snprintf(line.data(), line.size(), pattern, values...);
-  return line.data();
-}
-
 // Of the residuals, from each cell to the next of the same visit: a ratio at its stop that is read
 // coarsely scatters by as much; one that wanders scatters more.
 double neighbour_noise(const std::vector<Cell>& cells, const std::vector<double>& residual) {
@@ -199,9 +193,9 @@ std::string other_rest(const std::vector<Cell>& all, double ln_configured, const
   for (const Cell& each : there) ratios.push_back(each.ln_ratio);
   const double usual = estimator::median(ratios);
   if (std::abs(usual - ln_configured) < kReach) return {};
-  return text("; it rests at %.3f for %.0f s: if that is the stop, enter ", std::exp(usual),
-              kCell_s * static_cast<double>(there.size())) +
-         key + text(" = %.3f and calibrate again", std::exp(usual));
+  return format("; it rests at %.3f for %.0f s: if that is the stop, enter ", std::exp(usual),
+                kCell_s * static_cast<double>(there.size())) +
+         key + format(" = %.3f and calibrate again", std::exp(usual));
 }
 
 struct StopFindings {
@@ -230,9 +224,9 @@ StopFindings one_stop(std::span<const diagnose::SignalTable> logs, const daemon:
   };
   if (candidates == 0) {
     return refuse(
-        text("no half second within %.0f %% of the configured %.4g in which the ratio "
-             "stands still under little traction",
-             100.0 * kReach, found.ratio.configured));
+        format("no half second within %.0f %% of the configured %.4g in which the ratio "
+               "stands still under little traction",
+               100.0 * kReach, found.ratio.configured));
   }
   std::vector<Cell> cells = densest(near);
   Eigen::VectorXd mean(static_cast<Eigen::Index>(kCoefficients));
@@ -259,49 +253,50 @@ StopFindings one_stop(std::span<const diagnose::SignalTable> logs, const daemon:
     cells = std::move(kept);
   }
   if (!fitted.solved || fitted.clusters < kVisitsMin) {
-    return refuse(text("%d visits to the stop, needs %d", fitted.clusters, kVisitsMin));
+    return refuse(format("%d visits to the stop, needs %d", fitted.clusters, kVisitsMin));
   }
   // Cells that are spread evenly come from a ratio that is controlled.
   if (2 * cells.size() < candidates) {
     return refuse(
-        text("the ratio does not come to rest at one value: %zu of %zu half seconds lie "
-             "together",
-             cells.size(), candidates));
+        format("the ratio does not come to rest at one value: %zu of %zu half seconds lie "
+               "together",
+               cells.size(), candidates));
   }
   const double noise = neighbour_noise(cells, fitted.residual);
   if (fitted.residual_std > kScatterMax && fitted.residual_std > kWhite * noise) {
-    return refuse(text("the ratio wanders by %.2f %%, of which noise is %.2f %%: no stop holds it",
-                       100.0 * fitted.residual_std, 100.0 * noise));
+    return refuse(
+        format("the ratio wanders by %.2f %%, of which noise is %.2f %%: no stop holds it",
+               100.0 * fitted.residual_std, 100.0 * noise));
   }
   const auto [least, most] =
       std::minmax_element(cells.begin(), cells.end(),
                           [](const Cell& a, const Cell& b) { return a.force_kN < b.force_kN; });
   const std::string basis =
-      text("%zu half seconds in %d visits, %.1f to %.1f kN, scatter %.2f %%", cells.size(),
-           fitted.clusters, least->force_kN, most->force_kN, 100.0 * fitted.residual_std);
+      format("%zu half seconds in %d visits, %.1f to %.1f kN, scatter %.2f %%", cells.size(),
+             fitted.clusters, least->force_kN, most->force_kN, 100.0 * fitted.residual_std);
   const double ratio = std::exp(ln_configured + fitted.value[kLevel]);
   // The zero of the pressure shifts every force, and the ratio at none of it.
   const double force_std_kN = config.variator.secondary_piston_area_m2 * pressure.std * kNewton_kN;
   const double level_std =
       std::hypot(fitted.std[kLevel], fitted.value[kForce] * force_std_kN, kModelStd);
   if (most->force_kN < kForcesApart * least->force_kN) {
-    found.ratio.text = text(
+    found.ratio.text = format(
         "under clamping forces of %.1f to %.1f kN only (%zu half seconds in %d "
         "visits), the largest is to be %.0f times the least: drive at the stop "
         "with little and with much torque",
         least->force_kN, most->force_kN, cells.size(), fitted.clusters, kForcesApart);
   } else if (level_std > kStdMax) {
     found.ratio.text =
-        text("known to %.2f %% only, %.2f %% would do (", 100.0 * level_std, 100.0 * kStdMax) +
+        format("known to %.2f %% only, %.2f %% would do (", 100.0 * level_std, 100.0 * kStdMax) +
         basis + "); drive at the stop under more different clamping forces";
   } else {
     found.ratio.value = ratio;
     found.ratio.std = ratio * level_std;
-    found.ratio.text = basis + text(", falls by %.2f %% per kN", 100.0 * fitted.value[kForce]);
+    found.ratio.text = basis + format(", falls by %.2f %% per kN", 100.0 * fitted.value[kForce]);
   }
   found.delay.std = std::hypot(fitted.std[kRate], kDelayFloor_s);
   if (found.delay.std > kDelayStdMax_s) {
-    found.delay.text = text(
+    found.delay.text = format(
         "known to %.1f ms only, %.1f ms would do; accelerate and brake at the "
         "stop",
         1e3 * found.delay.std, 1e3 * kDelayStdMax_s);

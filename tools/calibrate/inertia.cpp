@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
+#include "can_dbc/text/format.h"
 #include "tools/calibrate/calibrate.h"
 #include "tools/calibrate/cluster_fit.h"
 #include "tools/calibrate/series.h"
@@ -27,12 +27,6 @@ constexpr double kDelayFirst_s = -0.05, kDelayLast_s = 0.2;
 constexpr double kDelayStdMax_s = 0.01;
 constexpr double kSpeedMin_rad_s = 60.0;
 constexpr double kLocked_rad_s = 5.0;  // between engine and pulley: the clutch is closed
-
-std::string text(const char* pattern, auto... values) {
-  std::array<char, 240> line;
-  std::snprintf(line.data(), line.size(), pattern, values...);
-  return line.data();
-}
 
 // One step of the torque on a grid: from kBefore_s before it to kAfter_s after, the torque on a
 // finer one that reaches as far as the delays that are tried.
@@ -211,8 +205,9 @@ std::vector<Finding> inertia(std::span<const diagnose::SignalTable> logs,
   }
   const std::vector<Event> all = events(logs);
   if (static_cast<int>(all.size()) < kEventsMin) {
-    return refuse(text("%zu steps of the engine torque by %.0f Nm with the clutch closed, needs %d",
-                       all.size(), kStep_Nm, kEventsMin));
+    return refuse(
+        format("%zu steps of the engine torque by %.0f Nm with the clutch closed, needs %d",
+               all.size(), kStep_Nm, kEventsMin));
   }
   double best_s = 0.0;
   Fitted best;
@@ -231,8 +226,8 @@ std::vector<Finding> inertia(std::span<const diagnose::SignalTable> logs,
   // Between the delays tried: the parabola through the best and its neighbours.
   const auto at = static_cast<std::size_t>(std::lround((best_s - kDelayFirst_s) / kGrid_s));
   if (at == 0 || at + 1 == squares.size()) {
-    return refuse(text("no delay of the torque between %.0f and %.0f ms fits", 1e3 * kDelayFirst_s,
-                       1e3 * kDelayLast_s));
+    return refuse(format("no delay of the torque between %.0f and %.0f ms fits",
+                         1e3 * kDelayFirst_s, 1e3 * kDelayLast_s));
   }
   const double curvature = squares[at - 1] - 2.0 * squares[at] + squares[at + 1];
   const double shift =
@@ -243,9 +238,9 @@ std::vector<Finding> inertia(std::span<const diagnose::SignalTable> logs,
   const bool brake_known = std::any_of(
       logs.begin(), logs.end(), [](const auto& log) { return !log[Role::kBrakePressed].empty(); });
   const std::string basis =
-      text("%d steps of the torque at ratios %.2f to %.2f, scatter %.1f Nm, vehicle %.2f kg m2",
-           best.fit.clusters, best.ratio_low, best.ratio_high, best.fit.residual_std,
-           best.fit.value[1]) +
+      format("%d steps of the torque at ratios %.2f to %.2f, scatter %.1f Nm, vehicle %.2f kg m2",
+             best.fit.clusters, best.ratio_low, best.ratio_high, best.fit.residual_std,
+             best.fit.value[1]) +
       (brake_known ? "" : ", brakes unknown: the role brake_pressed leaves their steps out");
   // The events one half against the other: what the delay is worth.
   std::array<double, 2> halves{};
@@ -267,14 +262,14 @@ std::vector<Finding> inertia(std::span<const diagnose::SignalTable> logs,
   if (delay.std > kDelayStdMax_s) {
     delay.value.reset();
     delay.text =
-        text("known to %.0f ms only, %.0f ms would do (", 1e3 * delay.std, 1e3 * kDelayStdMax_s) +
+        format("known to %.0f ms only, %.0f ms would do (", 1e3 * delay.std, 1e3 * kDelayStdMax_s) +
         basis + ")";
   }
   const double value = best.fit.value[0];
   const double std = best.fit.std[0];
   if (!(value > 0.0) || std > kRelativeStdMax * value) {
-    found.text = text("%.3f +- %.3f kg m2, known to %.0f %% would do (", value, std,
-                      100.0 * kRelativeStdMax) +
+    found.text = format("%.3f +- %.3f kg m2, known to %.0f %% would do (", value, std,
+                        100.0 * kRelativeStdMax) +
                  basis + "); lift and press the pedal at low ratios too, and while the ratio moves";
     return {found, delay};
   }

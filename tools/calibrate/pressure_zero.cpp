@@ -1,11 +1,10 @@
 // The pressure while nothing turns: its offset.
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numbers>
 
+#include "can_dbc/text/format.h"
 #include "estimator/statistics/distributions.h"
 #include "estimator/statistics/interval.h"
 #include "tools/calibrate/calibrate.h"
@@ -33,12 +32,6 @@ bool still(const Series& engine, const Series& primary, double from_s, double to
     }
   }
   return true;
-}
-
-std::string text(const char* pattern, auto... values) {
-  std::array<char, 200> line;
-  std::snprintf(line.data(), line.size(), pattern, values...);
-  return line.data();
 }
 
 }  // namespace
@@ -87,7 +80,7 @@ Finding pressure_zero(std::span<const diagnose::SignalTable> logs) {
     return found;
   }
   if (means.size() < 3) {
-    found.text = text(
+    found.text = format(
         "%zu seconds with engine and pulleys at rest, needs 3: record from key-on, "
         "before the engine starts",
         means.size());
@@ -96,11 +89,12 @@ Finding pressure_zero(std::span<const diagnose::SignalTable> logs) {
   double mean = 0.0;
   for (const double each : means) mean += each / static_cast<double>(means.size());
   if (std::abs(mean) > kOffsetMax_Pa) {
-    found.text = text("reads %.0f kPa at rest: no offset of a sensor", 1e-3 * mean);
+    found.text = format("reads %.0f kPa at rest: no offset of a sensor", 1e-3 * mean);
     return found;
   }
   if (drift_Pa_s > kDriftMax_Pa_s + resolution_Pa) {
-    found.text = text("moves by %.1f kPa a second at rest: it has not drained", 1e-3 * drift_Pa_s);
+    found.text =
+        format("moves by %.1f kPa a second at rest: it has not drained", 1e-3 * drift_Pa_s);
     return found;
   }
   const bool clipped = mean <= lowest_Pa && std::all_of(means.begin(), means.end(),
@@ -126,8 +120,8 @@ Finding pressure_zero(std::span<const diagnose::SignalTable> logs) {
   const double rounding = resolution_Pa / std::sqrt(12.0) * averaged;
   found.value = mean;
   found.std = std::hypot(scatter, rounding);
-  found.text = text("%zu seconds with engine and pulleys at rest, steps of %.2g kPa", means.size(),
-                    1e-3 * resolution_Pa);
+  found.text = format("%zu seconds with engine and pulleys at rest, steps of %.2g kPa",
+                      means.size(), 1e-3 * resolution_Pa);
   return found;
 }
 

@@ -1,18 +1,12 @@
 // Numbers as a person reads them. Tools only.
 #pragma once
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <string>
 
-namespace beltgrip::check {
+#include "can_dbc/text/format.h"
 
-inline std::string format(const char* pattern, auto... values) {
-  std::array<char, 400> line;
-  std::snprintf(line.data(), line.size(), pattern, values...);
-  return line.data();
-}
+namespace beltgrip::check {
 
 // "7,280"; what has more digits than a person counts as 1.2e+15.
 inline std::string grouped(double value) {

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "can_dbc/text/format.h"
 #include "estimator/statistics/interval.h"
 #include "tools/calibrate/calibrate.h"
 #include "tools/cli/command.h"
@@ -38,12 +39,6 @@ struct Options {
   bool force = false;
   bool quiet = false;
 };
-
-std::string format(const char* pattern, auto... values) {
-  std::array<char, 400> line;
-  std::snprintf(line.data(), line.size(), pattern, values...);
-  return line.data();
-}
 
 // To a digit beyond its standard deviation.
 std::string rounded(double value, double std) {

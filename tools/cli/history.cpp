@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "can_dbc/text/format.h"
 #include "daemon/core/publish/names.h"
 #include "daemon/io/carried_keeper.h"
 #include "daemon/io/history_db.h"
@@ -166,12 +167,6 @@ std::string csv(const History& history) {
     out += '\n';
   }
   return out;
-}
-
-std::string format(const char* pattern, auto... values) {
-  std::array<char, 256> line;
-  std::snprintf(line.data(), line.size(), pattern, values...);
-  return line.data();
 }
 
 std::string or_dash(double value, bool given, const char* pattern) {

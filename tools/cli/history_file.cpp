@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <ctime>
 #include <filesystem>
 #include <variant>
 
+#include "can_dbc/text/format.h"
 #include "daemon/core/publish/names.h"
 #include "daemon/io/carried_keeper.h"
 #include "tools/cli/configuration.h"
@@ -29,12 +29,6 @@ using text::snake_case;
 constexpr std::array<const char*, estimator::kNoteCount> kNoteNames{
     "outlier",       "trend",  "wear", "directions_disagree", "end_stops_disagree",
     "contradictory", "slipped"};
-
-std::string format(const char* pattern, auto... values) {
-  std::array<char, 256> line;
-  std::snprintf(line.data(), line.size(), pattern, values...);
-  return line.data();
-}
 
 // history.db in the folder, or in the only one of its folders that has one: the service gives each
 // interface its own.

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "can_dbc/log/can_log.h"
+#include "can_dbc/text/format.h"
 #include "daemon/core/loop/loop.h"
 #include "daemon/core/observe/reasons_now.h"
 #include "daemon/core/publish/names.h"
@@ -206,12 +207,6 @@ Failure no_frames(const ReplayResult& result, const can::LogStats& stats,
                            std::to_string(stats.frames)};
   }
   return {kBadInput, no_frame_text(result.log, stats)};
-}
-
-std::string format(const char* pattern, auto... arguments) {
-  char buffer[256];
-  std::snprintf(buffer, sizeof buffer, pattern, arguments...);
-  return buffer;
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <memory>
 #include <optional>
 #include <set>
@@ -10,6 +9,7 @@
 #include "can_dbc/dbc/message_index.h"
 #include "can_dbc/dbc/signal_codec.h"
 #include "can_dbc/log/can_log.h"
+#include "can_dbc/text/format.h"
 #include "can_dbc/text/unit_text.h"
 #include "tools/cli/failure.h"
 
@@ -30,12 +30,6 @@ constexpr std::array kPlausible{
     Plausible{can::Dimension::kSpeed, -20.0, 110.0},          // chosen: 400 km/h
     Plausible{can::Dimension::kShare, -0.05, 1.3},            // chosen: pedals read beyond 100 %
 };
-
-std::string format(const char* pattern, auto... arguments) {
-  std::array<char, 160> text;
-  std::snprintf(text.data(), text.size(), pattern, arguments...);
-  return text.data();
-}
 
 // One candidate among the frames of its message.
 struct Watched {

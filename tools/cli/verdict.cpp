@@ -1,4 +1,5 @@
 #include "tools/cli/verdict.h"
+#include "can_dbc/text/format.h"
 #include "can_dbc/text/printable.h"
 
 #include <cmath>
@@ -14,12 +15,6 @@
 namespace beltgrip::cli {
 
 namespace {
-
-std::string format(const char* pattern, auto... arguments) {
-  char buffer[160];
-  std::snprintf(buffer, sizeof buffer, pattern, arguments...);
-  return buffer;
-}
 
 void line(std::FILE* out, const char* what, const std::string& measured, const std::string& truth) {
   std::fprintf(out, "  %-12s %-22s %s\n", what, can::printable(measured).c_str(),

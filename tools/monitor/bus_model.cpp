@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "can_dbc/text/format.h"
 #include "daemon/core/publish/names.h"
 #include "daemon/core/publish/own_frames.h"
 #include "tools/text/snake_case.h"
@@ -23,12 +23,6 @@ constexpr std::size_t kExperimentsKept = 50;
 constexpr daemon::Duration kBeginsAnew = 500 * daemon::kMillisecond;
 // Frames that say one result together come within this.
 constexpr daemon::Duration kTogether = 50 * daemon::kMillisecond;
-
-std::string format(const char* pattern, auto... arguments) {
-  char buffer[160];
-  std::snprintf(buffer, sizeof buffer, pattern, arguments...);
-  return buffer;
-}
 
 std::optional<double> available(const OwnFrameView& frame, const char* signal) {
   if (frame.label(signal) == "NotAvailable") return std::nullopt;

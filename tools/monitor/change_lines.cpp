@@ -1,8 +1,8 @@
 #include "tools/monitor/change_lines.h"
 
 #include <algorithm>
-#include <cstdio>
 
+#include "can_dbc/text/format.h"
 #include "can_dbc/text/printable.h"
 #include "tools/monitor/layout.h"
 
@@ -11,12 +11,6 @@ namespace beltgrip::monitor {
 namespace {
 
 constexpr std::int64_t kDistrustPause_ns = 1'000'000'000;
-
-std::string format(const char* pattern, auto... arguments) {
-  char buffer[200];
-  std::snprintf(buffer, sizeof buffer, pattern, arguments...);
-  return buffer;
-}
 
 bool has(const std::vector<Reason>& reasons, const std::string& name) {
   return std::any_of(reasons.begin(), reasons.end(),

@@ -1,10 +1,10 @@
 #include "tools/monitor/layout.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <ctime>
 #include <string_view>
 
+#include "can_dbc/text/format.h"
 #include "can_dbc/text/printable.h"
 #include "estimator/physics/units.h"
 #include "tools/monitor/plot.h"
@@ -23,12 +23,6 @@ constexpr std::size_t kWhyRows = 2;  // for inhibits and for faults together on 
 constexpr int kTall = 40;            // rows from which there is room for more
 constexpr std::size_t kWhyRowsTall = 6;
 constexpr int kExperimentRows = 3, kExperimentRowsTall = 12;
-
-std::string format(const char* pattern, auto... arguments) {
-  char buffer[200];
-  std::snprintf(buffer, sizeof buffer, pattern, arguments...);
-  return buffer;
-}
 
 std::string padded(std::string text, int columns) {
   text.resize(std::max(text.size(), static_cast<std::size_t>(columns)), ' ');

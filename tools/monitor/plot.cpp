@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "can_dbc/text/format.h"
 
 namespace beltgrip::monitor {
 
@@ -13,12 +14,6 @@ constexpr int kLeastColumns = 20, kLeastRows = 5;
 constexpr double kHeadroom = 1.05;
 constexpr double kLeastSigma_percent = 0.5;  // so that noise at rest is no curve
 constexpr double kLeastMu = 0.02;
-
-std::string format(const char* pattern, auto... arguments) {
-  char buffer[64];
-  std::snprintf(buffer, sizeof buffer, pattern, arguments...);
-  return buffer;
-}
 
 // The part of the plot between the axes.
 struct Field {

@@ -1,10 +1,9 @@
 #include "daemon/core/observe/carried_record.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 
+#include "can_dbc/text/format.h"
 #include "daemon/core/loop/pipeline_setup.h"
 #include "estimator/method/possible_friction.h"
 #include "estimator/physics/sensor_error.h"
@@ -17,12 +16,6 @@ namespace beltgrip::daemon {
 namespace {
 
 constexpr double kWindow_s = seconds(CarriedWatch::kWindow);
-
-std::string format(const char* pattern, auto... values) {
-  std::array<char, 256> text;
-  std::snprintf(text.data(), text.size(), pattern, values...);
-  return text.data();
-}
 
 }  // namespace
 

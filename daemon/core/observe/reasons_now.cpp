@@ -1,8 +1,8 @@
 #include "daemon/core/observe/reasons_now.h"
 
 #include <cmath>
-#include <cstdio>
 
+#include "can_dbc/text/format.h"
 #include "daemon/core/input/stop_cause.h"
 #include "estimator/physics/units.h"
 
@@ -12,12 +12,6 @@ namespace {
 
 constexpr std::array<std::string_view, 6> kQualities{"valid", "learning", "frozen",
                                                      "stale", "missing",  "unbound"};
-
-std::string format(const char* pattern, auto... arguments) {
-  std::array<char, 160> text;
-  std::snprintf(text.data(), text.size(), pattern, arguments...);
-  return text.data();
-}
 
 // Roles that a test of their quality takes, each followed by that quality where it is asked for.
 std::string roles_with(const Signals& signals, auto&& takes, bool says_quality) {

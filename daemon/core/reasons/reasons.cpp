@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <utility>
 
+#include "can_dbc/text/format.h"
 #include "estimator/method/possible_friction.h"
 #include "estimator/physics/units.h"
 
@@ -186,12 +186,6 @@ constexpr bool in_order(const auto& rows) {
   return true;
 }
 static_assert(in_order(kInhibitWords) && in_order(kFaultWords) && in_order(kStopRemedies));
-
-std::string format(const char* pattern, auto... arguments) {
-  std::array<char, 256> text;
-  std::snprintf(text.data(), text.size(), pattern, arguments...);
-  return text.data();
-}
 
 // What reads the friction too high or too low, the likeliest first.
 std::string why_impossible(double mu) {
