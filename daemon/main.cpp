@@ -240,6 +240,117 @@ void say_what_was(LogSink& log, const PipelineCounters& counters, const LoopCoun
            latency_text("frame age", meters.frame_age));
 }
 
+// Opens the bus and takes it for this process. A status: it cannot be used, or a signal came before
+// the first frame.
+std::optional<int> take_bus(const Arguments& arguments, const Config& config, int stop_fd, Bus& bus,
+                            std::optional<BusClaim>& claim) {
+  const auto refuse = [&arguments](const std::string& why) {
+    complain(arguments.config + ": " + why);
+    return kUnavailable;
+  };
+  bus = open_bus(config, stop_fd);
+  if (bus.port == nullptr) return refuse(bus.error);
+  if (bus.inproc != nullptr) return std::nullopt;  // nobody but this process is on it
+  claim.emplace(config.interface, config.identifiers);
+  if (!claim->refused().empty()) return refuse(claim->refused());
+  const Listened listened = listen_before_talk(*bus.port, config.identifiers);
+  if (listened.closed) return kDone;
+  if (listened.heard) {
+    return refuse("another node sends " + identifier_text(*listened.heard) + " on " +
+                  config.interface +
+                  ": a second beltgripd? Stop it, or give one of them other [bus] identifiers");
+  }
+  return std::nullopt;
+}
+
+// What is known before the first line of work.
+void say_what_is(LogSink& log, const Arguments& arguments, const Config& config, bool inproc) {
+  log.info("version " BELTGRIP_VERSION ", " + arguments.config + ", bus " + config.interface);
+  if (const std::string assumed = assumed_text(config); !assumed.empty()) log.info(assumed);
+  if (!inproc) log.info(link_health(config.interface));
+  if (config.further_bus) log.info(link_health(config.further_bus->interface));
+}
+
+std::unique_ptr<FlightRecorder> start_recorder(const Arguments& arguments, const Config& config,
+                                               RecordRings& rings) {
+  const auto wall_ns = static_cast<std::int64_t>(unix_time_s() * 1e9);
+  std::vector<std::string> interfaces{config.interface};
+  if (config.further_bus) interfaces.push_back(config.further_bus->interface);
+  return std::make_unique<FlightRecorder>(arguments.record, std::move(interfaces), rings,
+                                          wall_ns - steady_now().ns());
+}
+
+// What the helper thread does at each of its turns.
+class Turns {
+ public:
+  struct Parts {
+    LogSink& log;
+    Requests& requests;
+    Reloader& reloader;
+    LatestSlot<Observation>& slot;
+    CarriedRing& carried_ring;
+    CarriedKeeper& carried;
+    HistoryRings& rings;
+    HistoryKeeper* history;    // none: results are not kept
+    FlightRecorder* recorder;  // none: not asked for
+    ServiceNotify& service;
+    StatusServer& status;
+  };
+  explicit Turns(const Parts& parts) : parts_(parts) {}
+
+  std::string figure(const Event& event) {
+    const Observation* seen = newest();
+    if (seen == nullptr) return {};
+    return figure_of(event, parts_.reloader.running(), seen->report, seen->signals);
+  }
+  void turn() {
+    const MonoTime now = steady_now();
+    take_carried();
+    if (parts_.requests.turn(now)) take_configuration();
+    say_of_recorder();
+    const Observation* seen = newest();
+    parts_.service.turn(now, seen);
+    parts_.status.turn(parts_.reloader.running(), now, seen, parts_.carried.bounds());
+    if (seen == nullptr || now < pulse_at_) return;
+    parts_.log.debug(pulse(*seen));
+    pulse_at_ = now + kSecond;
+  }
+  // After the last sample.
+  void end() {
+    take_carried();
+    if (parts_.recorder != nullptr) parts_.recorder->stop();
+    say_of_recorder();
+    parts_.service.stopping();
+  }
+
+ private:
+  const Observation* newest() {
+    observed_ = parts_.slot.take() || observed_;
+    return observed_ ? &parts_.slot.latest() : nullptr;
+  }
+  void take_carried() {
+    CarriedWindow window;
+    while (parts_.carried_ring.pop(window)) parts_.carried.take(window, unix_time_s());
+    parts_.carried.turn(unix_time_s());
+  }
+  void take_configuration() {
+    const Config& running = parts_.reloader.running();
+    parts_.carried.change(running);
+    if (parts_.history == nullptr) return;
+    parts_.rings.learned.push(parts_.history->change_fingerprint(config_fingerprint(running)));
+  }
+  void say_of_recorder() {
+    if (parts_.recorder == nullptr) return;
+    for (const auto& [warning, line] : parts_.recorder->take_messages()) {
+      warning ? parts_.log.warning(line) : parts_.log.info(line);
+    }
+  }
+
+  Parts parts_;
+  bool observed_ = false;
+  MonoTime pulse_at_;
+};
+
 int run(const Arguments& arguments) {
   const ConfigResult loaded = load_config(arguments.config);
   for (const std::string& warning : loaded.warnings) complain(warning);
@@ -253,26 +364,10 @@ int run(const Arguments& arguments) {
   const int stop_fd = signal_descriptor({SIGTERM, SIGINT});
   const int request_fd = signal_descriptor({SIGHUP, SIGUSR1, SIGUSR2});
   signal(SIGPIPE, SIG_IGN);
-  Bus bus = open_bus(config, stop_fd);
-  if (bus.port == nullptr) {
-    complain(arguments.config + ": " + bus.error);
-    return kUnavailable;
-  }
-
-  // The embedded bus has nobody but this process on it.
+  Bus bus;
   std::optional<BusClaim> claim;
-  if (bus.inproc == nullptr) claim.emplace(config.interface, config.identifiers);
-  if (claim && !claim->refused().empty()) {
-    complain(arguments.config + ": " + claim->refused());
-    return kUnavailable;
-  }
-  const Listened listened = claim ? listen_before_talk(*bus.port, config.identifiers) : Listened{};
-  if (listened.closed) return kDone;  // before its first frame
-  if (listened.heard) {
-    complain(arguments.config + ": another node sends " + identifier_text(*listened.heard) +
-             " on " + config.interface +
-             ": a second beltgripd? Stop it, or give one of them other [bus] identifiers");
-    return kUnavailable;
+  if (const std::optional<int> status = take_bus(arguments, config, stop_fd, bus, claim)) {
+    return *status;
   }
 
   Pipeline pipeline(config);
@@ -290,12 +385,7 @@ int run(const Arguments& arguments) {
     tap = std::make_unique<RecordTap>(*record_rings);
   }
   LogSink log(arguments.log_level);
-  log.info("version " BELTGRIP_VERSION ", " + arguments.config + ", bus " + config.interface);
-  if (const std::string assumed = assumed_text(config); !assumed.empty()) log.info(assumed);
-  if (bus.inproc == nullptr) log.info(link_health(config.interface));
-  if (config.further_bus) log.info(link_health(config.further_bus->interface));
-  std::function<void()> on_stop;
-  if (bus.inproc != nullptr) on_stop = [&] { bus.inproc->close(); };
+  say_what_is(log, arguments, config, bus.inproc != nullptr);
   const auto say = [&log](bool warning, const std::string& line) {
     warning ? log.warning(line) : log.info(line);
   };
@@ -317,62 +407,24 @@ int run(const Arguments& arguments) {
   std::string no_status;
   StatusServer status(runtime_folder(), no_status);
   if (!no_status.empty()) log.warning(no_status);
-  std::unique_ptr<FlightRecorder> recorder;
-  const auto recorder_messages = [&] {
-    if (recorder == nullptr) return;
-    for (const auto& [warning, line] : recorder->take_messages()) say(warning, line);
-  };
   Reloader reloader(arguments.config, config, reload_slot, claim ? &*claim : nullptr, say);
   Requests requests(request_fd, reloader, log, service);
-  bool observed = false;
-  MonoTime pulse_at{};
-  const auto figure = [&](const Event& event) {
-    observed = slot.take() || observed;
-    if (!observed) return std::string();
-    const Observation& seen = slot.latest();
-    return figure_of(event, reloader.running(), seen.report, seen.signals);
-  };
-  const auto take_carried = [&] {
-    CarriedWindow window;
-    while (carried_ring.pop(window)) carried.take(window, unix_time_s());
-    carried.turn(unix_time_s());
-  };
-  const auto on_turn = [&] {
-    const MonoTime now = steady_now();
-    take_carried();
-    if (requests.turn(now)) {
-      carried.change(reloader.running());
-      if (history != nullptr) {
-        rings.learned.push(history->change_fingerprint(config_fingerprint(reloader.running())));
-      }
-    }
-    recorder_messages();
-    observed = slot.take() || observed;
-    const Observation* newest = observed ? &slot.latest() : nullptr;
-    service.turn(now, newest);
-    status.turn(reloader.running(), now, newest, carried.bounds());
-    if (newest == nullptr || now < pulse_at) return;
-    log.debug(pulse(*newest));
-    pulse_at = now + kSecond;
-  };
-  if (record_rings != nullptr) {
-    const auto wall_ns = static_cast<std::int64_t>(unix_time_s() * 1e9);
-    std::vector<std::string> interfaces{config.interface};
-    if (config.further_bus) interfaces.push_back(config.further_bus->interface);
-    recorder = std::make_unique<FlightRecorder>(arguments.record, std::move(interfaces),
-                                                *record_rings, wall_ns - steady_now().ns());
-  }
-  Housekeeper housekeeper(events, rings, history.get(), log, figure, stop_fd, on_stop, on_turn);
+  std::unique_ptr<FlightRecorder> recorder;
+  if (record_rings != nullptr) recorder = start_recorder(arguments, config, *record_rings);
+  Turns turns({log, requests, reloader, slot, carried_ring, carried, rings, history.get(),
+               recorder.get(), service, status});
+  std::function<void()> on_stop;
+  if (bus.inproc != nullptr) on_stop = [&] { bus.inproc->close(); };
+  Housekeeper housekeeper(
+      events, rings, history.get(), log, [&](const Event& event) { return turns.figure(event); },
+      stop_fd, on_stop, [&] { turns.turn(); });
 
   const LoopCounters loop = run_loop(*bus.port, pipeline, config.estimator.sample_rate_hz,
                                      estimator::StopReason::kShutdown, &sinks, &meters, tap.get(),
                                      {.history = &rings, .reload = &reload_slot});
 
   housekeeper.stop();
-  take_carried();
-  if (recorder != nullptr) recorder->stop();
-  recorder_messages();
-  service.stopping();
+  turns.end();
   say_what_was(log, pipeline.counters(), loop, meters);
   close(stop_fd);
   return kDone;

@@ -202,6 +202,111 @@ struct StopFindings {
   Finding ratio, delay;
 };
 
+struct StopFit {
+  std::vector<Cell> cells;
+  ClusterFit fitted;
+  double least_kN = 0.0, most_kN = 0.0;  // clamping forces
+
+  std::string basis() const {
+    return format("%zu half seconds in %d visits, %.1f to %.1f kN, scatter %.2f %%", cells.size(),
+                  fitted.clusters, least_kN, most_kN, 100.0 * fitted.residual_std);
+  }
+};
+
+// A cell on its way to the stop or from it lies far off all others.
+std::vector<Cell> without_far(const std::vector<Cell>& cells, const std::vector<double>& residual) {
+  std::vector<double> sizes;
+  sizes.reserve(residual.size());
+  for (const double each : residual) sizes.push_back(std::abs(each));
+  const double limit = std::max(4.0 * estimator::kSigmaPerMedian * estimator::median(sizes), 2e-4);
+  std::vector<Cell> kept;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (std::abs(residual[i]) <= limit) kept.push_back(cells[i]);
+  }
+  return kept;
+}
+
+StopFit fit_stop(std::vector<Cell> cells, double ln_configured) {
+  Eigen::VectorXd mean(static_cast<Eigen::Index>(kCoefficients));
+  Eigen::VectorXd spread(static_cast<Eigen::Index>(kCoefficients));
+  mean << 0.0, kDeformation_1_kN, kCreep, kCreepGrows, 0.0;
+  spread << 0.1, kDeformationStd_1_kN, kCreepStd, kCreepGrowsStd, 0.1;
+  StopFit out{.cells = std::move(cells), .fitted = {}};
+  constexpr int kTrims = 4;
+  for (int trim = 0; trim < kTrims; ++trim) {
+    out.fitted = fit(observations(out.cells, ln_configured), mean, spread);
+    if (!out.fitted.solved || trim + 1 == kTrims) break;
+    out.cells = without_far(out.cells, out.fitted.residual);
+  }
+  if (out.cells.empty()) return out;
+  const auto [least, most] =
+      std::minmax_element(out.cells.begin(), out.cells.end(),
+                          [](const Cell& a, const Cell& b) { return a.force_kN < b.force_kN; });
+  out.least_kN = least->force_kN;
+  out.most_kN = most->force_kN;
+  return out;
+}
+
+// Why these cells are no stop; empty: they are.
+std::string refusal(const StopFit& stop, std::size_t candidates) {
+  const ClusterFit& fitted = stop.fitted;
+  if (!fitted.solved || fitted.clusters < kVisitsMin) {
+    return format("%d visits to the stop, needs %d", fitted.clusters, kVisitsMin);
+  }
+  // Cells that are spread evenly come from a ratio that is controlled.
+  if (2 * stop.cells.size() < candidates) {
+    return format(
+        "the ratio does not come to rest at one value: %zu of %zu half seconds lie "
+        "together",
+        stop.cells.size(), candidates);
+  }
+  const double noise = neighbour_noise(stop.cells, fitted.residual);
+  if (fitted.residual_std > kScatterMax && fitted.residual_std > kWhite * noise) {
+    return format("the ratio wanders by %.2f %%, of which noise is %.2f %%: no stop holds it",
+                  100.0 * fitted.residual_std, 100.0 * noise);
+  }
+  return {};
+}
+
+// force_std_kN: the zero of the pressure shifts every force, and the ratio at none of it.
+void find_ratio(const StopFit& stop, double ln_configured, double force_std_kN, Finding& ratio) {
+  const ClusterFit& fitted = stop.fitted;
+  const double level_std =
+      std::hypot(fitted.std[kLevel], fitted.value[kForce] * force_std_kN, kModelStd);
+  if (stop.most_kN < kForcesApart * stop.least_kN) {
+    ratio.text = format(
+        "under clamping forces of %.1f to %.1f kN only (%zu half seconds in %d "
+        "visits), the largest is to be %.0f times the least: drive at the stop "
+        "with little and with much torque",
+        stop.least_kN, stop.most_kN, stop.cells.size(), fitted.clusters, kForcesApart);
+    return;
+  }
+  if (level_std > kStdMax) {
+    ratio.text =
+        format("known to %.2f %% only, %.2f %% would do (", 100.0 * level_std, 100.0 * kStdMax) +
+        stop.basis() + "); drive at the stop under more different clamping forces";
+    return;
+  }
+  const double value = std::exp(ln_configured + fitted.value[kLevel]);
+  ratio.value = value;
+  ratio.std = value * level_std;
+  ratio.text = stop.basis() + format(", falls by %.2f %% per kN", 100.0 * fitted.value[kForce]);
+}
+
+void find_delay(const StopFit& stop, bool low, Finding& delay) {
+  delay.std = std::hypot(stop.fitted.std[kRate], kDelayFloor_s);
+  if (delay.std > kDelayStdMax_s) {
+    delay.text = format(
+        "known to %.1f ms only, %.1f ms would do; accelerate and brake at the "
+        "stop",
+        1e3 * delay.std, 1e3 * kDelayStdMax_s);
+    return;
+  }
+  delay.value = stop.fitted.value[kRate];
+  delay.text = std::string("after primary_speed; at the ") + (low ? "low" : "overdrive") +
+               " stop, " + stop.basis();
+}
+
 StopFindings one_stop(std::span<const diagnose::SignalTable> logs, const daemon::Config& config,
                       EndStop stop, PressureError pressure) {
   const bool low = stop == EndStop::kLow;
@@ -228,83 +333,11 @@ StopFindings one_stop(std::span<const diagnose::SignalTable> logs, const daemon:
                "stands still under little traction",
                100.0 * kReach, found.ratio.configured));
   }
-  std::vector<Cell> cells = densest(near);
-  Eigen::VectorXd mean(static_cast<Eigen::Index>(kCoefficients));
-  Eigen::VectorXd spread(static_cast<Eigen::Index>(kCoefficients));
-  mean << 0.0, kDeformation_1_kN, kCreep, kCreepGrows, 0.0;
-  spread << 0.1, kDeformationStd_1_kN, kCreepStd, kCreepGrowsStd, 0.1;
-  ClusterFit fitted;
-  Observations data;
-  constexpr int kTrims = 4;
-  for (int trim = 0; trim < kTrims; ++trim) {
-    data = observations(cells, ln_configured);
-    fitted = fit(data, mean, spread);
-    if (!fitted.solved || trim + 1 == kTrims) break;
-    // A cell on its way to the stop or from it lies far off all others.
-    std::vector<double> sizes;
-    sizes.reserve(fitted.residual.size());
-    for (const double each : fitted.residual) sizes.push_back(std::abs(each));
-    const double limit =
-        std::max(4.0 * estimator::kSigmaPerMedian * estimator::median(sizes), 2e-4);
-    std::vector<Cell> kept;
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (std::abs(fitted.residual[i]) <= limit) kept.push_back(cells[i]);
-    }
-    cells = std::move(kept);
-  }
-  if (!fitted.solved || fitted.clusters < kVisitsMin) {
-    return refuse(format("%d visits to the stop, needs %d", fitted.clusters, kVisitsMin));
-  }
-  // Cells that are spread evenly come from a ratio that is controlled.
-  if (2 * cells.size() < candidates) {
-    return refuse(
-        format("the ratio does not come to rest at one value: %zu of %zu half seconds lie "
-               "together",
-               cells.size(), candidates));
-  }
-  const double noise = neighbour_noise(cells, fitted.residual);
-  if (fitted.residual_std > kScatterMax && fitted.residual_std > kWhite * noise) {
-    return refuse(
-        format("the ratio wanders by %.2f %%, of which noise is %.2f %%: no stop holds it",
-               100.0 * fitted.residual_std, 100.0 * noise));
-  }
-  const auto [least, most] =
-      std::minmax_element(cells.begin(), cells.end(),
-                          [](const Cell& a, const Cell& b) { return a.force_kN < b.force_kN; });
-  const std::string basis =
-      format("%zu half seconds in %d visits, %.1f to %.1f kN, scatter %.2f %%", cells.size(),
-             fitted.clusters, least->force_kN, most->force_kN, 100.0 * fitted.residual_std);
-  const double ratio = std::exp(ln_configured + fitted.value[kLevel]);
-  // The zero of the pressure shifts every force, and the ratio at none of it.
+  const StopFit fitted = fit_stop(densest(near), ln_configured);
+  if (const std::string why = refusal(fitted, candidates); !why.empty()) return refuse(why);
   const double force_std_kN = config.variator.secondary_piston_area_m2 * pressure.std * kNewton_kN;
-  const double level_std =
-      std::hypot(fitted.std[kLevel], fitted.value[kForce] * force_std_kN, kModelStd);
-  if (most->force_kN < kForcesApart * least->force_kN) {
-    found.ratio.text = format(
-        "under clamping forces of %.1f to %.1f kN only (%zu half seconds in %d "
-        "visits), the largest is to be %.0f times the least: drive at the stop "
-        "with little and with much torque",
-        least->force_kN, most->force_kN, cells.size(), fitted.clusters, kForcesApart);
-  } else if (level_std > kStdMax) {
-    found.ratio.text =
-        format("known to %.2f %% only, %.2f %% would do (", 100.0 * level_std, 100.0 * kStdMax) +
-        basis + "); drive at the stop under more different clamping forces";
-  } else {
-    found.ratio.value = ratio;
-    found.ratio.std = ratio * level_std;
-    found.ratio.text = basis + format(", falls by %.2f %% per kN", 100.0 * fitted.value[kForce]);
-  }
-  found.delay.std = std::hypot(fitted.std[kRate], kDelayFloor_s);
-  if (found.delay.std > kDelayStdMax_s) {
-    found.delay.text = format(
-        "known to %.1f ms only, %.1f ms would do; accelerate and brake at the "
-        "stop",
-        1e3 * found.delay.std, 1e3 * kDelayStdMax_s);
-  } else {
-    found.delay.value = fitted.value[kRate];
-    found.delay.text = std::string("after primary_speed; at the ") + (low ? "low" : "overdrive") +
-                       " stop, " + basis;
-  }
+  find_ratio(fitted, ln_configured, force_std_kN, found.ratio);
+  find_delay(fitted, low, found.delay);
   return found;
 }
 

@@ -3,6 +3,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "can_dbc/text/format.h"
 #include "tools/calibrate/calibrate.h"
@@ -186,6 +188,49 @@ Fitted fit_all(const std::vector<Event>& all, double delay_s) {
   return result;
 }
 
+struct BestDelay {
+  double delay_s = 0.0;
+  Fitted fitted;
+  std::vector<double> squares;  // of each delay tried
+};
+
+BestDelay best_delay(const std::vector<Event>& all, double step_s) {
+  BestDelay best;
+  const int steps = static_cast<int>(std::lround((kDelayLast_s - kDelayFirst_s) / step_s));
+  for (int i = 0; i <= steps; ++i) {
+    const double delay_s = kDelayFirst_s + i * step_s;
+    Fitted here = fit_all(all, delay_s);
+    best.squares.push_back(here.squares);
+    if (here.squares < best.fitted.squares) {
+      best.fitted = std::move(here);
+      best.delay_s = delay_s;
+    }
+  }
+  return best;
+}
+
+// Between the delays tried: the parabola through the best and its neighbours. None: the best is
+// the first or the last.
+std::optional<double> between_delays_s(const BestDelay& best) {
+  const auto at = static_cast<std::size_t>(std::lround((best.delay_s - kDelayFirst_s) / kGrid_s));
+  if (at == 0 || at + 1 == best.squares.size()) return std::nullopt;
+  const double before = best.squares[at - 1], after = best.squares[at + 1];
+  const double curvature = before - 2.0 * best.squares[at] + after;
+  const double shift = curvature > 0.0 ? 0.5 * (before - after) / curvature : 0.0;
+  return best.delay_s + std::clamp(shift, -0.5, 0.5) * kGrid_s;
+}
+
+// The events one half against the other: what the delay is worth.
+double delay_std_s(const std::vector<Event>& all) {
+  std::array<double, 2> halves_s{};
+  for (std::size_t half = 0; half < 2; ++half) {
+    std::vector<Event> some;
+    for (std::size_t i = half; i < all.size(); i += 2) some.push_back(all[i]);
+    halves_s[half] = best_delay(some, 0.5 * kGrid_s).delay_s;
+  }
+  return std::hypot(0.5 * (halves_s[0] - halves_s[1]), 0.5 * kGrid_s);
+}
+
 }  // namespace
 
 std::vector<Finding> inertia(std::span<const diagnose::SignalTable> logs,
@@ -209,31 +254,14 @@ std::vector<Finding> inertia(std::span<const diagnose::SignalTable> logs,
         format("%zu steps of the engine torque by %.0f Nm with the clutch closed, needs %d",
                all.size(), kStep_Nm, kEventsMin));
   }
-  double best_s = 0.0;
-  Fitted best;
-  const int steps = static_cast<int>(std::lround((kDelayLast_s - kDelayFirst_s) / kGrid_s));
-  std::vector<double> squares;
-  for (int i = 0; i <= steps; ++i) {
-    const double delay_s = kDelayFirst_s + i * kGrid_s;
-    const Fitted here = fit_all(all, delay_s);
-    squares.push_back(here.squares);
-    if (here.squares < best.squares) {
-      best = here;
-      best_s = delay_s;
-    }
-  }
-  if (!best.fit.solved) return refuse("the steps do not determine an inertia");
-  // Between the delays tried: the parabola through the best and its neighbours.
-  const auto at = static_cast<std::size_t>(std::lround((best_s - kDelayFirst_s) / kGrid_s));
-  if (at == 0 || at + 1 == squares.size()) {
+  const BestDelay tried = best_delay(all, kGrid_s);
+  if (!tried.fitted.fit.solved) return refuse("the steps do not determine an inertia");
+  delay.value = between_delays_s(tried);
+  if (!delay.value) {
     return refuse(format("no delay of the torque between %.0f and %.0f ms fits",
                          1e3 * kDelayFirst_s, 1e3 * kDelayLast_s));
   }
-  const double curvature = squares[at - 1] - 2.0 * squares[at] + squares[at + 1];
-  const double shift =
-      curvature > 0.0 ? 0.5 * (squares[at - 1] - squares[at + 1]) / curvature : 0.0;
-  delay.value = best_s + std::clamp(shift, -0.5, 0.5) * kGrid_s;
-  best = fit_all(all, *delay.value);
+  const Fitted best = fit_all(all, *delay.value);
   if (!best.fit.solved) return refuse("the steps do not determine an inertia");
   const bool brake_known = std::any_of(
       logs.begin(), logs.end(), [](const auto& log) { return !log[Role::kBrakePressed].empty(); });
@@ -242,22 +270,7 @@ std::vector<Finding> inertia(std::span<const diagnose::SignalTable> logs,
              best.fit.clusters, best.ratio_low, best.ratio_high, best.fit.residual_std,
              best.fit.value[1]) +
       (brake_known ? "" : ", brakes unknown: the role brake_pressed leaves their steps out");
-  // The events one half against the other: what the delay is worth.
-  std::array<double, 2> halves{};
-  for (std::size_t half = 0; half < 2; ++half) {
-    std::vector<Event> some;
-    for (std::size_t i = half; i < all.size(); i += 2) some.push_back(all[i]);
-    double least = std::numeric_limits<double>::infinity();
-    for (int i = 0; i <= 2 * steps; ++i) {
-      const double delay_s = kDelayFirst_s + 0.5 * i * kGrid_s;
-      const double here = fit_all(some, delay_s).squares;
-      if (here < least) {
-        least = here;
-        halves[half] = delay_s;
-      }
-    }
-  }
-  delay.std = std::hypot(0.5 * (halves[0] - halves[1]), 0.5 * kGrid_s);
+  delay.std = delay_std_s(all);
   delay.text = "after the speeds; " + basis;
   if (delay.std > kDelayStdMax_s) {
     delay.value.reset();

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <string>
 
 #include "estimator/method/possible_friction.h"
@@ -30,6 +31,11 @@ double spread_of(const std::vector<double>& values) {
 bool turns_with(const std::vector<double>& engine_this, const std::vector<double>& engine_other) {
   return engine_this.size() >= kWindowsLeast && engine_other.size() >= kWindowsLeast &&
          kSteadier * spread_of(engine_this) < spread_of(engine_other);
+}
+
+bool is_one(const std::vector<double>& values) {
+  return values.size() >= kWindowsLeast && std::abs(quantile(values, 0.5) - 1.0) < kSameSpeed &&
+         share_of(values, [](double r) { return std::abs(r - 1.0) < 4.0 * kSameSpeed; }) > 0.8;
 }
 
 double correlation(const std::vector<double>& x, const std::vector<double>& y) {
@@ -96,7 +102,15 @@ class Across {
   }
   std::string swapped_too() const { return either_way_ ? ", or the two speeds are swapped" : ""; }
   void one_signal_twice();
+  struct Speeds;
+  Speeds speeds_read() const;
   bool speeds();
+  bool speeds_swapped(const Speeds& s);
+  static std::string causes_of_ratio(const Speeds& s);
+  std::optional<bool> ratio_beyond_stops(const Speeds& s);
+  bool ratio_at_other_stop(const Speeds& s);
+  bool level_by_wheels(const Speeds& s);
+  void level_by_engine(const Speeds& s);
   void lockup();
   void torque_sign();
   void pedal();
@@ -176,136 +190,163 @@ double Across::slipped_beyond_share() const {
   return static_cast<double>(count) / static_cast<double>(std::max<std::size_t>(turning, 1));
 }
 
-// True: something is wrong with them, and what rests on them would accuse others.
-bool Across::speeds() {
-  const std::vector<double> ratio = ratio_of(Role::kSecondarySpeed, Role::kPrimarySpeed, false);
-  if (ratio.size() < kWindowsLeast) return false;
-  const double low = config_.variator.ratio_low, overdrive = config_.variator.ratio_overdrive;
-  const auto inside = [&](double factor, bool inverted) {
+// What the speeds say of each other.
+struct Across::Speeds {
+  double low = 0.0, overdrive = 0.0;  // as configured
+  std::string stops;
+  std::vector<double> ratio;
+  std::vector<double> by_secondary, by_primary;          // the vehicle's, over the pulley's
+  std::vector<double> engine_primary, engine_secondary;  // the engine's, over the pulley's
+  bool closed_only = false;                              // with the lock-up closed
+
+  double inside_share(double factor, bool inverted) const {
     return share_of(ratio, [&](double r) {
       const double as_meant = factor * (inverted ? 1.0 / r : r);
       return as_meant > low * (1.0 - kSlipBand) && as_meant < overdrive * (1.0 + kSlipBand);
     });
-  };
-  const double least = quantile(ratio, 0.01), most = quantile(ratio, 0.99);
-  const std::string stops =
-      format("%.3g to %.3g", low, overdrive) +
-      (is_assumed("variator.ratio_low") || is_assumed("variator.ratio_overdrive") ? " (assumed)"
-                                                                                  : "");
-
-  // Which pulley turns with the wheels, and which with the engine.
-  const std::vector<double> by_secondary =
-      ratio_of(Role::kVehicleSpeed, Role::kSecondarySpeed, false);
-  const std::vector<double> by_primary = ratio_of(Role::kVehicleSpeed, Role::kPrimarySpeed, false);
-  const bool closed_only = is_bound(Role::kLockupClosed);
-  const std::vector<double> engine_primary =
-      ratio_of(Role::kEngineSpeed, Role::kPrimarySpeed, closed_only);
-  const std::vector<double> engine_secondary =
-      ratio_of(Role::kEngineSpeed, Role::kSecondarySpeed, closed_only);
-  const auto is_one = [](const std::vector<double>& values) {
-    return values.size() >= kWindowsLeast && std::abs(quantile(values, 0.5) - 1.0) < kSameSpeed &&
-           share_of(values, [](double r) { return std::abs(r - 1.0) < 4.0 * kSameSpeed; }) > 0.8;
-  };
-  const bool wheels_by_primary = by_primary.size() >= kWindowsLeast &&
-                                 spread_of(by_primary) < kFinalDriveSpread &&
-                                 spread_of(by_secondary) > kOtherSpread;
-  const bool engine_by_secondary = is_one(engine_secondary) && !is_one(engine_primary);
-  if (wheels_by_primary || engine_by_secondary) {
-    wrong(std::string("primary_speed and secondary_speed are swapped: ") +
-          (wheels_by_primary
-               ? format("the vehicle's speed keeps to the primary within %.1f %%, to the "
-                        "secondary within %.0f %%",
-                        100.0 * spread_of(by_primary), 100.0 * spread_of(by_secondary))
-               : format("the engine turns %.3f times as fast as the secondary, %.3f times as "
-                        "fast as the primary",
-                        quantile(engine_secondary, 0.5), quantile(engine_primary, 0.5))));
-    return true;
   }
-
-  const double inside_share = inside(1.0, false), usual = quantile(ratio, 0.5);
-  const bool mostly_beyond =
-      usual < low * (1.0 - kSlipBand) || usual > overdrive * (1.0 + kStopBand);
-  if (inside_share < kInStopsLeast || mostly_beyond) {
-    struct Reading {
-      const char* text;
-      double factor;
-      bool inverted;
-    };
-    constexpr std::array kReadings{
-        Reading{"primary and secondary swapped", 1.0, true},
-        Reading{"primary 1/min read as rad/s (or secondary rad/s as 1/min)", kPerMinute, false},
-        Reading{"primary rad/s read as 1/min (or secondary 1/min as rad/s)", 1.0 / kPerMinute,
-                false}};
-    std::string causes;
-    const bool engine_on_primary = turns_with(engine_primary, engine_secondary);
-    for (const Reading& reading : kReadings) {
-      if (reading.inverted && engine_on_primary) continue;
-      if (inside(reading.factor, reading.inverted) < kExplains) continue;
-      causes += (causes.empty() ? "" : ", or ") + std::string(reading.text);
-    }
-    const std::string text =
-        format("speed ratio %.3g to %.3g, end stops %s: ", least, most, stops.c_str());
-    if (!causes.empty()) {
-      wrong(text + causes + "?");
-    } else if (mostly_beyond) {
-      wrong(text + "a scale of one speed, or the end stops are another variator's");
-    } else {
-      const double beyond_share = 1.0 - inside_share;
-      if (beyond_share - slipped_beyond_share() < 1.0 - kInStopsLeast) return false;
-      doubt(text + format("%.0f %% of the time beyond them; a scale, or another variator's stops",
-                          100.0 * beyond_share));
-      return false;
-    }
-    return true;
-  }
-  either_way_ = inside(1.0, true) > kExplains && by_secondary.empty() && engine_primary.empty();
-
-  // A ratio that stays where a stop would be if the shafts were swapped.
-  const auto near = [](double a, double b) { return std::abs(a / b - 1.0) < kStopBand; };
-  const auto share_at = [&](double a, double b, double band) {
+  double share_at(double a, double b, double band) const {
     const auto at = [band](double r, double stop) { return std::abs(r / stop - 1.0) < band; };
     return share_of(ratio, [&](double r) { return at(r, a) || at(r, b); });
-  };
-  const auto stays_there = [&](double band) {
+  }
+  // Where a stop would be if the shafts were swapped.
+  bool stays_at_other_stop(double band) const {
     return share_at(1.0 / low, 1.0 / overdrive, band) > kStaysLeast &&
            share_at(low, overdrive, band) < kPasses;
+  }
+};
+
+Across::Speeds Across::speeds_read() const {
+  Speeds s;
+  s.low = config_.variator.ratio_low;
+  s.overdrive = config_.variator.ratio_overdrive;
+  s.stops =
+      format("%.3g to %.3g", s.low, s.overdrive) +
+      (is_assumed("variator.ratio_low") || is_assumed("variator.ratio_overdrive") ? " (assumed)"
+                                                                                  : "");
+  s.ratio = ratio_of(Role::kSecondarySpeed, Role::kPrimarySpeed, false);
+  s.by_secondary = ratio_of(Role::kVehicleSpeed, Role::kSecondarySpeed, false);
+  s.by_primary = ratio_of(Role::kVehicleSpeed, Role::kPrimarySpeed, false);
+  s.closed_only = is_bound(Role::kLockupClosed);
+  s.engine_primary = ratio_of(Role::kEngineSpeed, Role::kPrimarySpeed, s.closed_only);
+  s.engine_secondary = ratio_of(Role::kEngineSpeed, Role::kSecondarySpeed, s.closed_only);
+  return s;
+}
+
+// True: something is wrong with them, and what rests on them would accuse others.
+bool Across::speeds() {
+  const Speeds s = speeds_read();
+  if (s.ratio.size() < kWindowsLeast) return false;
+  if (speeds_swapped(s)) return true;
+  if (const std::optional<bool> beyond = ratio_beyond_stops(s)) return *beyond;
+  either_way_ =
+      s.inside_share(1.0, true) > kExplains && s.by_secondary.empty() && s.engine_primary.empty();
+  if (ratio_at_other_stop(s) || level_by_wheels(s)) return true;
+  level_by_engine(s);
+  return false;
+}
+
+// Which pulley turns with the wheels, and which with the engine.
+bool Across::speeds_swapped(const Speeds& s) {
+  const bool wheels_by_primary = s.by_primary.size() >= kWindowsLeast &&
+                                 spread_of(s.by_primary) < kFinalDriveSpread &&
+                                 spread_of(s.by_secondary) > kOtherSpread;
+  const bool engine_by_secondary = is_one(s.engine_secondary) && !is_one(s.engine_primary);
+  if (!wheels_by_primary && !engine_by_secondary) return false;
+  wrong(std::string("primary_speed and secondary_speed are swapped: ") +
+        (wheels_by_primary
+             ? format("the vehicle's speed keeps to the primary within %.1f %%, to the "
+                      "secondary within %.0f %%",
+                      100.0 * spread_of(s.by_primary), 100.0 * spread_of(s.by_secondary))
+             : format("the engine turns %.3f times as fast as the secondary, %.3f times as "
+                      "fast as the primary",
+                      quantile(s.engine_secondary, 0.5), quantile(s.engine_primary, 0.5))));
+  return true;
+}
+
+// Which mistakes in the two speeds would bring the ratio between the end stops.
+std::string Across::causes_of_ratio(const Speeds& s) {
+  struct Reading {
+    const char* text;
+    double factor;
+    bool inverted;
   };
-  if ((stays_there(kStopBand) || stays_there(kSlipBand)) && !is_one(engine_primary)) {
-    doubt(
-        format("speed ratio stays at %.3f: at no end stop (%s), but 1 / %.3f is at one; primary "
-               "and secondary swapped?",
-               quantile(ratio, 0.5), stops.c_str(), quantile(ratio, 0.5)));
+  constexpr std::array kReadings{
+      Reading{"primary and secondary swapped", 1.0, true},
+      Reading{"primary 1/min read as rad/s (or secondary rad/s as 1/min)", kPerMinute, false},
+      Reading{"primary rad/s read as 1/min (or secondary 1/min as rad/s)", 1.0 / kPerMinute,
+              false}};
+  std::string causes;
+  const bool engine_on_primary = turns_with(s.engine_primary, s.engine_secondary);
+  for (const Reading& reading : kReadings) {
+    if (reading.inverted && engine_on_primary) continue;
+    if (s.inside_share(reading.factor, reading.inverted) < kExplains) continue;
+    causes += (causes.empty() ? "" : ", or ") + std::string(reading.text);
+  }
+  return causes;
+}
+
+// A ratio that lies beyond the end stops, as speeds() has it; none: it lies between them.
+std::optional<bool> Across::ratio_beyond_stops(const Speeds& s) {
+  const double inside_share = s.inside_share(1.0, false), usual = quantile(s.ratio, 0.5);
+  const bool mostly_beyond =
+      usual < s.low * (1.0 - kSlipBand) || usual > s.overdrive * (1.0 + kStopBand);
+  if (inside_share >= kInStopsLeast && !mostly_beyond) return std::nullopt;
+  const std::string text =
+      format("speed ratio %.3g to %.3g, end stops %s: ", quantile(s.ratio, 0.01),
+             quantile(s.ratio, 0.99), s.stops.c_str());
+  if (const std::string causes = causes_of_ratio(s); !causes.empty()) {
+    wrong(text + causes + "?");
     return true;
   }
-
-  // Level by the wheels.
-  if (by_secondary.size() >= kWindowsLeast) {
-    const double radius_m = quantile(by_secondary, 0.5);
-    if (radius_m < kFinalDriveLeast_m || radius_m > kFinalDriveMost_m) {
-      const double per_minute = radius_m < kFinalDriveLeast_m ? kPerMinute : 1.0 / kPerMinute;
-      const double with = radius_m * per_minute;
-      const bool by_unit = with > kFinalDriveLeast_m && with < kFinalDriveMost_m;
-      wrong(format("the car goes %.3g m a radian of the secondary, cars go 0.04 to 0.08 m: ",
-                   radius_m) +
-            (by_unit ? radius_m < kFinalDriveLeast_m ? "speeds in 1/min read as rad/s?"
-                                                     : "speeds in rad/s read as 1/min?"
-                     : "unit or scale of vehicle_speed or secondary_speed?"));
-      return true;
-    }
+  if (mostly_beyond) {
+    wrong(text + "a scale of one speed, or the end stops are another variator's");
+    return true;
   }
-  // The engine against the primary.
-  if (engine_primary.size() >= kWindowsLeast && closed_only && !is_one(engine_primary)) {
-    const double usual_engine = quantile(engine_primary, 0.5);
-    const bool steady =
-        share_of(engine_primary, [&](double r) { return near(r, usual_engine); }) > kMostly;
-    if (steady && (near(usual_engine, kPerMinute) || near(usual_engine, 1.0 / kPerMinute))) {
-      wrong(
-          format("the engine turns %.3f times as fast as the primary with the lock-up closed: "
-                 "1/min and rad/s mixed up?",
-                 usual_engine));
-    }
+  const double beyond_share = 1.0 - inside_share;
+  if (beyond_share - slipped_beyond_share() >= 1.0 - kInStopsLeast) {
+    doubt(text + format("%.0f %% of the time beyond them; a scale, or another variator's stops",
+                        100.0 * beyond_share));
   }
   return false;
+}
+
+bool Across::ratio_at_other_stop(const Speeds& s) {
+  if (is_one(s.engine_primary)) return false;
+  if (!s.stays_at_other_stop(kStopBand) && !s.stays_at_other_stop(kSlipBand)) return false;
+  doubt(
+      format("speed ratio stays at %.3f: at no end stop (%s), but 1 / %.3f is at one; primary "
+             "and secondary swapped?",
+             quantile(s.ratio, 0.5), s.stops.c_str(), quantile(s.ratio, 0.5)));
+  return true;
+}
+
+bool Across::level_by_wheels(const Speeds& s) {
+  if (s.by_secondary.size() < kWindowsLeast) return false;
+  const double radius_m = quantile(s.by_secondary, 0.5);
+  if (radius_m >= kFinalDriveLeast_m && radius_m <= kFinalDriveMost_m) return false;
+  const double per_minute = radius_m < kFinalDriveLeast_m ? kPerMinute : 1.0 / kPerMinute;
+  const double with = radius_m * per_minute;
+  const bool by_unit = with > kFinalDriveLeast_m && with < kFinalDriveMost_m;
+  wrong(
+      format("the car goes %.3g m a radian of the secondary, cars go 0.04 to 0.08 m: ", radius_m) +
+      (by_unit ? radius_m < kFinalDriveLeast_m ? "speeds in 1/min read as rad/s?"
+                                               : "speeds in rad/s read as 1/min?"
+               : "unit or scale of vehicle_speed or secondary_speed?"));
+  return true;
+}
+
+void Across::level_by_engine(const Speeds& s) {
+  if (s.engine_primary.size() < kWindowsLeast || !s.closed_only || is_one(s.engine_primary)) return;
+  const double usual = quantile(s.engine_primary, 0.5);
+  const auto near = [](double a, double b) { return std::abs(a / b - 1.0) < kStopBand; };
+  const bool steady =
+      share_of(s.engine_primary, [&](double r) { return near(r, usual); }) > kMostly;
+  if (!steady || !(near(usual, kPerMinute) || near(usual, 1.0 / kPerMinute))) return;
+  wrong(
+      format("the engine turns %.3f times as fast as the primary with the lock-up closed: "
+             "1/min and rad/s mixed up?",
+             usual));
 }
 
 // A lock-up clutch that is closed while the car stands would stall the engine; one that is closed

@@ -215,21 +215,23 @@ std::unique_ptr<signals::SignalWriter> signal_writer(const std::string& path, Ou
   return signals::make_mf4_writer(file.get(), signal_columns(config));
 }
 
-void run(const Options& options) {
-  if (!options.bus.empty()) return play_logs(options);
-  end_logs_when_stopped(options.logs);
+bool goes_log_by_log(const Options& options) { return options.logs.size() > 1 && !options.join; }
+
+int outputs_on_stdout(const Options& options) {
+  return (options.json == "-") + (options.trace == "-") + (options.signals == "-") +
+         (options.log_out == "-");
+}
+
+void check_together(const Options& options) {
   if (options.speed) throw Failure{kUsage, "replay: --speed needs --bus"};
   if (options.config.empty()) throw Failure{kUsage, "replay: --config is required"};
-  const bool separate = options.logs.size() > 1 && !options.join;
-  if (separate &&
+  if (goes_log_by_log(options) &&
       (!options.trace.empty() || !options.signals.empty() || !options.log_out.empty())) {
     throw Failure{kUsage,
                   "replay: --trace, --signals-out and --log-out take one log, or several with "
                   "--join"};
   }
-  const int on_stdout = (options.json == "-") + (options.trace == "-") + (options.signals == "-") +
-                        (options.log_out == "-");
-  if (on_stdout > 1) {
+  if (outputs_on_stdout(options) > 1) {
     throw Failure{kUsage,
                   "replay: only one of --json, --trace, --signals-out, --log-out can be standard "
                   "output"};
@@ -237,48 +239,138 @@ void run(const Options& options) {
   if (options.resume && (options.json.empty() || options.join)) {
     throw Failure{kUsage, "replay: --resume goes log by log, expected --json FILE and no --join"};
   }
+}
+
+// All logs in one, or each that an earlier run has not done.
+std::vector<Task> tasks_of(const Options& options, const ResumedLines* resumed) {
+  std::vector<Task> tasks;
+  if (!goes_log_by_log(options) && resumed == nullptr) {
+    tasks.push_back({options.logs, {}, {}});
+    return tasks;
+  }
+  for (const std::string& log : options.logs) {
+    if (resumed == nullptr || !resumed->has(log)) tasks.push_back({{log}, {}, {}});
+  }
+  if (resumed != nullptr && resumed->count() > 0) {
+    std::fprintf(stderr, "beltgrip: %zu of %zu logs are done\n", options.logs.size() - tasks.size(),
+                 options.logs.size());
+  }
+  return tasks;
+}
+
+// The files asked for beside the results.
+class Files {
+ public:
+  Files(const Options& options, const Inputs& inputs, const daemon::Config& config) {
+    if (!options.trace.empty()) trace_.emplace(options.trace, inputs);
+    if (!options.signals.empty()) {
+      signals_.emplace(options.signals, inputs);
+      signal_writer_ = signal_writer(options.signals, *signals_, config);
+    }
+    if (!options.log_out.empty()) log_out_.emplace(options.log_out, inputs);
+  }
+  ReplayOutputs outputs() {
+    ReplayOutputs out;
+    if (trace_) out.trace = trace_->get();
+    out.signals = signal_writer_.get();
+    if (log_out_) out.log_out = log_out_->get();
+    return out;
+  }
+  void close() {
+    if (trace_) trace_->close();
+    if (signal_writer_) signal_writer_->finish();
+    if (signals_) signals_->close();
+    if (log_out_) log_out_->close();
+  }
+
+ private:
+  std::optional<OutputFile> trace_, signals_, log_out_;
+  std::unique_ptr<signals::SignalWriter> signal_writer_;
+};
+
+// Takes the tasks as they end, in the order of their logs.
+class Ends {
+ public:
+  Ends(const Options& options, std::size_t tasks, Progress& progress, Teller& teller,
+       ResumedLines* resumed)
+      : options_(options), tasks_(tasks), progress_(progress), teller_(teller), resumed_(resumed) {}
+
+  void take(const Task& task) {
+    progress_.clear();
+    if (++done_ < tasks_) {
+      progress_.tell(static_cast<double>(done_), "of " + std::to_string(tasks_) + " logs", "logs/s",
+                     static_cast<double>(done_) / static_cast<double>(tasks_));
+    }
+    if (task.failure) {
+      text::complain(task.failure->text);
+      if (exit_code_ == kDone) exit_code_ = task.failure->exit_code;
+    }
+    if (task.result) take(*task.result);
+  }
+  // Nothing was read: what earlier runs left stays.
+  void finish() {
+    progress_.clear();
+    if (done_ < tasks_) {
+      text::complain("stopped: " + std::to_string(done_) + " of " + std::to_string(tasks_) +
+                     " logs are done");
+    }
+    if (!any_ && tasks_ > 0) throw Failure{exit_code_, ""};
+  }
+  std::uint64_t frames() const { return frames_; }
+  int exit_code() const { return exit_code_; }
+
+ private:
+  void take(const ReplayResult& result) {
+    if (!options_.quiet) {
+      for (const std::string& note : result.notes) text::complain(note);
+    }
+    for (const std::string& warning : result.warnings) text::warn(warning);
+    any_ = true;
+    frames_ += result.frames;
+    if (resumed_ != nullptr && !result.stopped &&
+        !resumed_->append(experiment_lines(result) + summary_line(result))) {
+      text::complain(options_.json + ": cannot write");
+      exit_code_ = kCannotWrite;
+    }
+    teller_.end(result);
+  }
+
+  const Options& options_;
+  std::size_t tasks_, done_ = 0;
+  Progress& progress_;
+  Teller& teller_;
+  ResumedLines* resumed_;
+  std::uint64_t frames_ = 0;
+  int exit_code_ = kDone;
+  bool any_ = false;
+};
+
+void run(const Options& options) {
+  if (!options.bus.empty()) return play_logs(options);
+  end_logs_when_stopped(options.logs);
+  check_together(options);
   const daemon::Config config =
       load_configuration_for(options.logs, options.rate_Hz, options.config, options.method);
   require_columns(config, options.logs.front());
   check_as_recorded(options, config);
-  std::optional<OutputFile> json, trace, signals_file, log_out;
-  std::optional<ResumedLines> resumed;
   Inputs inputs(options.logs);
   inputs.add(config.files);
+  std::optional<OutputFile> json;
+  std::optional<ResumedLines> resumed;
   if (options.resume) {
     resumed.emplace(options.json, inputs);
   } else if (!options.json.empty()) {
     json.emplace(options.json, inputs);
   }
-  std::vector<Task> tasks;
-  if (separate || resumed) {
-    for (const std::string& log : options.logs) {
-      if (!resumed || !resumed->has(log)) tasks.push_back({{log}, {}, {}});
-    }
-  } else {
-    tasks.push_back({options.logs, {}, {}});
-  }
-  if (resumed && resumed->count() > 0) {
-    std::fprintf(stderr, "beltgrip: %zu of %zu logs are done\n", options.logs.size() - tasks.size(),
-                 options.logs.size());
-  }
-  if (!options.trace.empty()) trace.emplace(options.trace, inputs);
-  std::unique_ptr<signals::SignalWriter> signals;
-  if (!options.signals.empty()) {
-    signals_file.emplace(options.signals, inputs);
-    signals = signal_writer(options.signals, *signals_file, config);
-  }
-  if (!options.log_out.empty()) log_out.emplace(options.log_out, inputs);
-  const bool text_to_stdout = on_stdout == 0;
+  ResumedLines* const earlier = resumed ? &*resumed : nullptr;
+  std::vector<Task> tasks = tasks_of(options, earlier);
+  Files files(options, inputs, config);
 
-  Teller teller(json ? json->get() : nullptr, text_to_stdout);
+  Teller teller(json ? json->get() : nullptr, outputs_on_stdout(options) == 0);
   Progress progress(!options.quiet);
   RunProgress run_progress(progress);
   ProgressSink progress_sink(run_progress);
-  ReplayOutputs outputs;
-  if (trace) outputs.trace = trace->get();
-  outputs.signals = signals.get();
-  if (log_out) outputs.log_out = log_out->get();
+  ReplayOutputs outputs = files.outputs();
   if (tasks.size() == 1) {
     outputs.also = &progress_sink;
     outputs.on_log = [&](const ports::LogTimeline& timeline) { run_progress.reads(timeline); };
@@ -288,54 +380,16 @@ void run(const Options& options) {
     };
   }
   const auto begin = std::chrono::steady_clock::now();
-  std::size_t done = 0;
-  std::uint64_t frames = 0;
-  int exit_code = kDone;
-  bool any = false;
   const unsigned jobs = options.jobs > 0 ? options.jobs : std::thread::hardware_concurrency();
+  Ends ends(options, tasks.size(), progress, teller, earlier);
   run_all(
       tasks, std::max(jobs, 1u), [&](Task& task) { run_task(task, options, config, outputs); },
-      [&](Task& task) {
-        progress.clear();
-        if (++done < tasks.size()) {
-          progress.tell(static_cast<double>(done), "of " + std::to_string(tasks.size()) + " logs",
-                        "logs/s", static_cast<double>(done) / static_cast<double>(tasks.size()));
-        }
-        if (task.failure) {
-          text::complain(task.failure->text);
-          if (exit_code == kDone) exit_code = task.failure->exit_code;
-          return;
-        }
-        if (!options.quiet) {
-          for (const std::string& note : task.result->notes) text::complain(note);
-        }
-        for (const std::string& warning : task.result->warnings) {
-          text::warn(warning);
-        }
-        any = true;
-        frames += task.result->frames;
-        if (resumed && !task.result->stopped &&
-            !resumed->append(experiment_lines(*task.result) + summary_line(*task.result))) {
-          text::complain(options.json + ": cannot write");
-          exit_code = kCannotWrite;
-        }
-        teller.end(*task.result);
-      });
-  progress.clear();
-  if (done < tasks.size()) {
-    text::complain("stopped: " + std::to_string(done) + " of " + std::to_string(tasks.size()) +
-                   " logs are done");
-  }
-  if (!any && !tasks.empty()) throw Failure{exit_code, ""};  // what earlier runs left stays
+      [&](Task& task) { ends.take(task); });
+  ends.finish();
   if (json) json->close();
-  if (trace) trace->close();
-  if (signals && signals_file) {
-    signals->finish();
-    signals_file->close();
-  }
-  if (log_out) log_out->close();
-  if (frames > 0 && !options.quiet) print_speed(frames, begin);
-  if (exit_code != kDone) throw Failure{exit_code, ""};
+  files.close();
+  if (ends.frames() > 0 && !options.quiet) print_speed(ends.frames(), begin);
+  if (ends.exit_code() != kDone) throw Failure{ends.exit_code(), ""};
 }
 
 }  // namespace
