@@ -13,7 +13,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <variant>
 
 #include "can_dbc/text/printable.h"
 #include "daemon/command_line/command_line.h"
@@ -101,10 +100,9 @@ int check(const Arguments& arguments) {
 struct Bus {
   std::unique_ptr<Port> port;
   std::shared_ptr<InprocBus> inproc;
-  std::string error;
 };
 
-Bus open_bus(const Config& config, int stop_fd) {
+Result<Bus> open_bus(const Config& config, int stop_fd) {
   Bus bus;
   if (config.interface.starts_with(kInproc)) {
     bus.inproc = InprocBus::named(config.interface.substr(kInproc.size()));
@@ -117,11 +115,8 @@ Bus open_bus(const Config& config, int stop_fd) {
     buses.push_back({further.interface, "bus." + further.name + ".interface"});
   }
   auto opened = SocketPort::open(buses, wanted_frames(config), stop_fd);
-  if (const auto* error = std::get_if<BusError>(&opened)) {
-    bus.error = error->text;
-  } else {
-    bus.port = std::move(std::get<std::unique_ptr<SocketPort>>(opened));
-  }
+  if (!opened) return opened.error();
+  bus.port = *std::move(opened);
   return bus;
 }
 
@@ -248,8 +243,9 @@ std::optional<int> take_bus(const Arguments& arguments, const Config& config, in
     complain(arguments.config + ": " + why);
     return kUnavailable;
   };
-  bus = open_bus(config, stop_fd);
-  if (bus.port == nullptr) return refuse(bus.error);
+  Result<Bus> opened = open_bus(config, stop_fd);
+  if (!opened) return refuse(opened.error());
+  bus = *std::move(opened);
   if (bus.inproc != nullptr) return std::nullopt;  // nobody but this process is on it
   claim.emplace(config.interface, config.identifiers);
   if (!claim->refused().empty()) return refuse(claim->refused());

@@ -116,16 +116,14 @@ std::string refused(const CanLink& link, const std::string& what) {
 
 }  // namespace
 
-std::optional<CanLink> read_can_link(const std::string& interface, std::string& why) {
+Result<CanLink> read_can_link(const std::string& interface) {
   InterfaceRequest ask(interface);
   if (interface.size() >= IFNAMSIZ || !ask.call(SIOCGIFHWADDR)) {
-    why = "found no interface \"" + interface + "\", expected one that `ip link show` lists";
-    return {};
+    return "found no interface \"" + interface + "\", expected one that `ip link show` lists";
   }
   if (ask.request.ifr_hwaddr.sa_family != ARPHRD_CAN) {
-    why = "found \"" + interface +
-          "\", which is no CAN interface, expected one of `ip link show` " + "with link/can";
-    return {};
+    return "found \"" + interface +
+           "\", which is no CAN interface, expected one of `ip link show` with link/can";
   }
   CanLink link;
   link.interface = interface;

@@ -8,6 +8,8 @@
 #include <string>
 #include <string_view>
 
+#include "daemon/core/base/result.h"
+
 namespace beltgrip::daemon {
 
 struct CanLink {
@@ -38,8 +40,8 @@ struct CanLink {
   std::optional<FrameCounters> frame_counters;
 };
 
-// Absent: there is no such CAN interface; `why` is then one line that says what is there.
-std::optional<CanLink> read_can_link(const std::string& interface, std::string& why);
+// Where there is no such CAN interface: one line that says what is there.
+Result<CanLink> read_can_link(const std::string& interface);
 
 // What is to be set; what is absent stays as it is.
 struct CanLinkSetting {

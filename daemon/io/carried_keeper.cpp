@@ -147,8 +147,7 @@ Json carried_json(const CarriedBounds& bounds) {
   return all;
 }
 
-std::variant<CarriedBounds, std::string> read_carried(const std::string& folder,
-                                                      const std::string& fingerprint) {
+Result<CarriedBounds> read_carried(const std::string& folder, const std::string& fingerprint) {
   try {
     const Json all = read_file(path_in(folder));
     if (all.is_null()) return CarriedBounds{};
@@ -175,16 +174,16 @@ CarriedKeeper::~CarriedKeeper() { write(); }
 void CarriedKeeper::open() {
   said_ = {};
   if (folder_.empty()) return;
-  auto found = read_carried(folder_, fingerprint_);
-  if (const auto* bounds = std::get_if<CarriedBounds>(&found)) {
-    record_.restore(*bounds);
-    said_ = *bounds;
+  const Result<CarriedBounds> found = read_carried(folder_, fingerprint_);
+  if (found) {
+    record_.restore(*found);
+    said_ = *found;
     return;
   }
   const std::string path = path_in(folder_);
   std::error_code error;
   fs::rename(path, path + ".bad", error);
-  say_(true, path + ": found no record of what was carried (" + std::get<std::string>(found) + ")" +
+  say_(true, path + ": found no record of what was carried (" + found.error() + ")" +
                  (error ? "" : "; it is kept as " + path + ".bad, and a new one begun"));
 }
 

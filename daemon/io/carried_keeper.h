@@ -7,8 +7,8 @@
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
-#include <variant>
 
+#include "daemon/core/base/result.h"
 #include "daemon/core/config/options/config.h"
 #include "daemon/core/observe/carried_record.h"
 
@@ -21,8 +21,7 @@ nlohmann::ordered_json carried_json(const CarriedBounds& bounds);
 
 // What the file in this folder has of a configuration, or with an empty fingerprint of the one that
 // was written last; nothing known where there is no file. Text: what is wrong with it.
-std::variant<CarriedBounds, std::string> read_carried(const std::string& folder,
-                                                      const std::string& fingerprint);
+Result<CarriedBounds> read_carried(const std::string& folder, const std::string& fingerprint);
 
 class CarriedKeeper {
  public:

@@ -6,9 +6,8 @@ namespace beltgrip::daemon {
 
 std::string link_health(const std::string& interface) {
   const std::string line = "controller of " + interface + ": ";
-  std::string why;
-  const std::optional<CanLink> link = read_can_link(interface, why);
-  if (!link) return line + "unknown (" + why + ")";
+  const Result<CanLink> link = read_can_link(interface);
+  if (!link) return line + "unknown (" + link.error() + ")";
   if (!link->has_controller) return line + "unknown (a virtual interface has none)";
   if (!link->state) return line + "unknown (it does not say)";
   std::string said = line + std::string(*link->state);

@@ -8,13 +8,15 @@
 
 namespace beltgrip::daemon {
 
-std::variant<std::unique_ptr<SocketPort>, BusError> SocketPort::open(
-    const std::string& interface, const std::vector<WantedFrames>& wanted, int stop_fd) {
+Result<std::unique_ptr<SocketPort>> SocketPort::open(const std::string& interface,
+                                                     const std::vector<WantedFrames>& wanted,
+                                                     int stop_fd) {
   return open({{interface, "bus.interface"}}, wanted, stop_fd);
 }
 
-std::variant<std::unique_ptr<SocketPort>, BusError> SocketPort::open(
-    const std::vector<BusToOpen>& buses, const std::vector<WantedFrames>& wanted, int stop_fd) {
+Result<std::unique_ptr<SocketPort>> SocketPort::open(const std::vector<BusToOpen>& buses,
+                                                     const std::vector<WantedFrames>& wanted,
+                                                     int stop_fd) {
   std::unique_ptr<SocketPort> port(new SocketPort(stop_fd));
   for (const BusToOpen& bus : buses) {
     port->sockets_[port->count_] =
@@ -25,11 +27,11 @@ std::variant<std::unique_ptr<SocketPort>, BusError> SocketPort::open(
     if (error == 0) continue;
     const std::string reason = std::string(where) + ": " + std::strerror(error);
     if (error == EAFNOSUPPORT || error == EPROTONOSUPPORT) {
-      return BusError{bus.key + ": found no SocketCAN in this kernel (" + reason +
-                      "), expected one with CAN_RAW, or inproc:NAME"};
+      return bus.key + ": found no SocketCAN in this kernel (" + reason +
+             "), expected one with CAN_RAW, or inproc:NAME";
     }
-    return BusError{bus.key + ": found no CAN interface \"" + bus.interface + "\" (" + reason +
-                    "), expected one that `ip link show` lists"};
+    return bus.key + ": found no CAN interface \"" + bus.interface + "\" (" + reason +
+           "), expected one that `ip link show` lists";
   }
   return port;
 }

@@ -4,17 +4,13 @@
 
 #include <memory>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "daemon/core/base/port.h"
+#include "daemon/core/base/result.h"
 #include "daemon/io/can_socket.h"
 
 namespace beltgrip::daemon {
-
-struct BusError {
-  std::string text;  // one line
-};
 
 // An interface to open, and the key that names it in the configuration.
 struct BusToOpen {
@@ -26,10 +22,12 @@ class SocketPort final : public Port {
  public:
   // Receives `wanted` and the controller's error frames of one bus, or of up to kBusMax.
   // wait_until returns kClosed once stop_fd is readable (a signalfd or eventfd; -1: never).
-  static std::variant<std::unique_ptr<SocketPort>, BusError> open(
-      const std::string& interface, const std::vector<WantedFrames>& wanted, int stop_fd);
-  static std::variant<std::unique_ptr<SocketPort>, BusError> open(
-      const std::vector<BusToOpen>& buses, const std::vector<WantedFrames>& wanted, int stop_fd);
+  static Result<std::unique_ptr<SocketPort>> open(const std::string& interface,
+                                                  const std::vector<WantedFrames>& wanted,
+                                                  int stop_fd);
+  static Result<std::unique_ptr<SocketPort>> open(const std::vector<BusToOpen>& buses,
+                                                  const std::vector<WantedFrames>& wanted,
+                                                  int stop_fd);
 
   MonoTime now() noexcept override;
   Wake wait_until(MonoTime deadline) noexcept override;

@@ -54,10 +54,8 @@ std::unique_ptr<daemon::Port> open_bus(const std::string& name,
   wanted.reserve(identifiers.size());
   for (const can::CanId id : identifiers) wanted.push_back({id, false});
   auto opened = daemon::SocketPort::open(name, wanted, stop_fd);
-  if (const auto* error = std::get_if<daemon::BusError>(&opened)) {
-    throw Failure{kUnavailable, error->text};
-  }
-  return std::move(std::get<std::unique_ptr<daemon::SocketPort>>(opened));
+  if (!opened) throw Failure{kUnavailable, opened.error()};
+  return std::move(*opened);
 }
 
 std::unique_ptr<daemon::Port> open_buses_whole(const daemon::Config& config, int stop_fd) {
@@ -70,10 +68,8 @@ std::unique_ptr<daemon::Port> open_buses_whole(const daemon::Config& config, int
     wanted.push_back({.id = {}, .bus = 1, .every = true});
   }
   auto opened = daemon::SocketPort::open(buses, wanted, stop_fd);
-  if (const auto* error = std::get_if<daemon::BusError>(&opened)) {
-    throw Failure{kUnavailable, error->text};
-  }
-  return std::move(std::get<std::unique_ptr<daemon::SocketPort>>(opened));
+  if (!opened) throw Failure{kUnavailable, opened.error()};
+  return std::move(*opened);
 }
 
 bool play(daemon::Port& port, const std::string& name, double speed,

@@ -24,9 +24,8 @@ struct Options {
 };
 
 CanLink link_of(const std::string& interface) {
-  std::string why;
-  std::optional<CanLink> link = daemon::read_can_link(interface, why);
-  if (!link) throw Failure{kUnavailable, why};
+  daemon::Result<CanLink> link = daemon::read_can_link(interface);
+  if (!link) throw Failure{kUnavailable, link.error()};
   return *std::move(link);
 }
 

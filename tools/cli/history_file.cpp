@@ -5,7 +5,6 @@
 #include <cmath>
 #include <ctime>
 #include <filesystem>
-#include <variant>
 
 #include "can_dbc/text/format.h"
 #include "daemon/core/publish/names.h"
@@ -70,9 +69,9 @@ daemon::CarriedBounds carried_beside(const History& history) {
   const std::string folder = beside.empty() ? "." : beside;
   const std::string fingerprint = history.rows.empty() ? "" : history.rows.back().fingerprint;
   const auto found = daemon::read_carried(folder, fingerprint);
-  if (const auto* bounds = std::get_if<daemon::CarriedBounds>(&found)) return *bounds;
+  if (found) return *found;
   text::warn(folder + "/" + daemon::kCarriedFile + ": found no record of what was carried (" +
-             std::get<std::string>(found) + ")");
+             found.error() + ")");
   return {};
 }
 

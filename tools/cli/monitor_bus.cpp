@@ -77,8 +77,7 @@ class BusSession {
       : listener_(listener),
         session_(monitor::Session::Source::kBus, request.identifiers(), request.config) {
     view_.source = request.source;
-    std::string why;
-    if (const auto link = daemon::read_can_link(request.source, why)) {
+    if (const auto link = daemon::read_can_link(request.source)) {
       view_.traffic.bitrate = link->bitrate;
     }
   }

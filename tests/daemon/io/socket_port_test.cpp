@@ -29,11 +29,9 @@ class SocketPortTest : public test::Vcan {
   std::unique_ptr<SocketPort> open_wanted(const std::vector<WantedFrames>& wanted,
                                           int stop_fd = -1) {
     auto opened = SocketPort::open("vcan0", wanted, stop_fd);
-    if (const auto* error = std::get_if<BusError>(&opened)) {
-      ADD_FAILURE() << error->text;
-      return nullptr;
-    }
-    return std::move(std::get<std::unique_ptr<SocketPort>>(opened));
+    if (opened) return *std::move(opened);
+    ADD_FAILURE() << opened.error();
+    return nullptr;
   }
   // Frames until `count` have come or the limit is over.
   static std::vector<RxFrame> take(SocketPort& port, std::size_t count) {
@@ -216,12 +214,12 @@ TEST_F(SocketPortTest, ADeletedLinkIsOpenedAgainWhenItIsBack) {
 TEST_F(SocketPortTest, AMissingInterfaceIsOneLine) {
   for (const std::string name : {"can9", "lo"}) {
     auto opened = SocketPort::open(name, {}, -1);
-    const auto* error = std::get_if<BusError>(&opened);
-    ASSERT_NE(error, nullptr);
-    EXPECT_TRUE(error->text.starts_with("bus.interface: found no CAN interface \"" + name + "\""))
-        << error->text;
-    EXPECT_NE(error->text.find(", expected "), std::string::npos);
-    EXPECT_EQ(error->text.find('\n'), std::string::npos);
+    ASSERT_FALSE(opened);
+    const std::string& error = opened.error();
+    EXPECT_TRUE(error.starts_with("bus.interface: found no CAN interface \"" + name + "\""))
+        << error;
+    EXPECT_NE(error.find(", expected "), std::string::npos);
+    EXPECT_EQ(error.find('\n'), std::string::npos);
   }
 }
 
@@ -330,8 +328,8 @@ class TwoBuses : public SocketPortTest {
     auto opened = SocketPort::open(
         {{"vcan0", "bus.interface"}, {"vcan1", "bus.diag.interface"}},
         {{{0x123, false}, false, 0}, {{0x123, false}, false, 1}, {{0x124, false}, false, 1}}, -1);
-    ASSERT_TRUE(std::holds_alternative<std::unique_ptr<SocketPort>>(opened));
-    port_ = std::move(std::get<std::unique_ptr<SocketPort>>(opened));
+    ASSERT_TRUE(opened) << opened.error();
+    port_ = *std::move(opened);
   }
   std::unique_ptr<SocketPort> port_;
 };

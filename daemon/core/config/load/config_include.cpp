@@ -95,11 +95,12 @@ bool DocumentReader::read_file(const std::string& path, const std::string& shown
   }
   size_ += text.size();
   auto parsed = parse_toml(text);
-  if (const auto* error = std::get_if<TomlSyntaxError>(&parsed)) {
-    errors_.add(first_line + error->line, "syntax", in_quotes(error->text), "TOML");
+  if (!parsed) {
+    const TomlSyntaxError& error = parsed.error();
+    errors_.add(first_line + error.line, "syntax", in_quotes(error.text), "TOML");
     return false;
   }
-  TomlNode own = std::move(std::get<TomlNode>(parsed));
+  TomlNode own = *std::move(parsed);
   count_lines_from(first_line, own);
   if (included_at != 0) see_from(folder, own);
   files_.push_back(path);

@@ -4,7 +4,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <variant>
 
 #include "daemon/core/config/options/config_options.h"
 #include "daemon/core/config/options/option_reader.h"
@@ -92,11 +91,11 @@ class Reader {
   Reader(const std::string& name, const ModelFile& base) : errors_(name, found_), model_(base) {}
 
   ModelFile read(const std::string& text) {
-    auto parsed = parse_toml(text);
-    if (const auto* error = std::get_if<TomlSyntaxError>(&parsed)) {
-      errors_.add(error->line, "syntax", in_quotes(error->text), "TOML");
+    const auto parsed = parse_toml(text);
+    if (parsed) {
+      for (const TomlNode& section : parsed->children) read_section(section);
     } else {
-      for (const TomlNode& section : std::get<TomlNode>(parsed).children) read_section(section);
+      errors_.add(parsed.error().line, "syntax", in_quotes(parsed.error().text), "TOML");
     }
     if (!found_.empty()) throw ModelError{false, found_.front().text};
     return model_;

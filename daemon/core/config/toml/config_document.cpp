@@ -103,7 +103,7 @@ std::uint32_t line_of(const TomlNode& root, std::string_view section, std::strin
   return at == nullptr ? in->line : at->line;
 }
 
-std::variant<TomlNode, TomlSyntaxError> parse_toml(std::string_view text) {
+Result<TomlNode, TomlSyntaxError> parse_toml(std::string_view text) {
   if (const auto beyond = beyond_bounds(text)) return *beyond;
   try {
     return convert(toml::parse(text));

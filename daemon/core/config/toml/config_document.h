@@ -5,8 +5,9 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-#include <variant>
 #include <vector>
+
+#include "daemon/core/base/result.h"
 
 namespace beltgrip::daemon {
 
@@ -40,6 +41,6 @@ struct TomlSyntaxError {
   std::string text;  // one line
 };
 
-std::variant<TomlNode, TomlSyntaxError> parse_toml(std::string_view text);
+Result<TomlNode, TomlSyntaxError> parse_toml(std::string_view text);
 
 }  // namespace beltgrip::daemon
