@@ -30,7 +30,7 @@ constexpr double kHold = 4.0;     // deviations: wait for a second one
 constexpr double kConfirm = 2.0;  // the second one
 constexpr std::size_t kRunMin = 8;
 
-struct Seen {
+struct Observation {
   double time_s = 0.0;
   double y = 0.0;         // ln mu_max
   double variance = 0.0;  // stated, of y
@@ -40,9 +40,9 @@ struct Seen {
 };
 
 struct Window {
-  std::array<Seen, kWindow> seen{};
+  std::array<Observation, kWindow> seen{};
   std::size_t count = 0;
-  std::span<const Seen> span() const { return {seen.data(), count}; }
+  std::span<const Observation> span() const { return {seen.data(), count}; }
 };
 
 bool counts(const BeltExperiment& each, Direction direction, EndStop end_stop) {
@@ -51,8 +51,8 @@ bool counts(const BeltExperiment& each, Direction direction, EndStop end_stop) {
          std::isfinite(each.mu_max_std) && each.mu_max_std > 0.0;
 }
 
-Seen seen_of(const BeltExperiment& each) {
-  Seen seen;
+Observation observation_of(const BeltExperiment& each) {
+  Observation seen;
   seen.time_s = each.time_s;
   seen.y = std::log(each.mu_max);
   const double width = (each.ci95_high - each.ci95_low) / (2.0 * kNormal95 * each.mu_max);
@@ -71,7 +71,7 @@ Window window_of(std::span<const BeltExperiment> experiments, Direction directio
   Window window;
   for (std::size_t i = experiments.size(); i-- > 0 && window.count < kWindow;) {
     if (!counts(experiments[i], direction, end_stop)) continue;
-    window.seen[window.count++] = seen_of(experiments[i]);
+    window.seen[window.count++] = observation_of(experiments[i]);
   }
   std::reverse(window.seen.begin(),
                window.seen.begin() + static_cast<std::ptrdiff_t>(window.count));
@@ -87,7 +87,7 @@ struct Filter {
   double foreseen = 0.0, foreseen_variance = 0.0;  // of the next y
 
   void widen(double variance) { p00 = std::min(p00 + variance, kPriorStd * kPriorStd); }
-  void foresee(const Seen& seen) {
+  void foresee(const Observation& seen) {
     foreseen = level + coefficient * seen.warmth_K;
     foreseen_variance = p00 + 2.0 * p01 * seen.warmth_K + p11 * seen.warmth_K * seen.warmth_K +
                         seen.variance + scatter * scatter;
@@ -96,7 +96,7 @@ struct Filter {
     const double z2 = (y - foreseen) * (y - foreseen) / foreseen_variance;
     return std::exp(-0.5 * z2) / std::sqrt(foreseen_variance);
   }
-  void take(const Seen& seen) {
+  void take(const Observation& seen) {
     const double g0 = (p00 + p01 * seen.warmth_K) / foreseen_variance;
     const double g1 = (p01 + p11 * seen.warmth_K) / foreseen_variance;
     const double error = seen.y - foreseen;
@@ -135,14 +135,14 @@ class Bank {
     for (Filter& each : filters_) each.widen(kPriorStd * kPriorStd);
   }
   // Deviations of seen from what was to be expected.
-  double foresee(const Seen& seen) {
+  double foresee(const Observation& seen) {
     for (Filter& each : filters_) each.foresee(seen);
     const Mean mean = mixture([](const Filter& each) {
       return Mean{each.foreseen, each.foreseen_variance};
     });
     return (seen.y - mean.value) / std::sqrt(mean.variance);
   }
-  void take(const Seen& seen, bool weigh) {
+  void take(const Observation& seen, bool weigh) {
     double sum = 0.0;
     for (Filter& each : filters_) {
       if (weigh) each.weight *= each.likelihood(seen.y);
@@ -176,12 +176,12 @@ class Bank {
 };
 
 // Slope of y over the number of the experiment, in percent.
-void fit_drift(std::span<const Seen> seen, FusedFriction& fused) {
+void fit_drift(std::span<const Observation> seen, FusedFriction& fused) {
   constexpr std::size_t kDriftMin = 5;
   if (seen.size() < kDriftMin) return;
   const auto n = static_cast<double>(seen.size());
   double mean_y = 0.0;
-  for (const Seen& each : seen) mean_y += each.y / n;
+  for (const Observation& each : seen) mean_y += each.y / n;
   const double mean_x = 0.5 * (n - 1.0);
   double xx = 0.0, xy = 0.0, yy = 0.0;
   for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -252,7 +252,7 @@ bool one_sided_run(std::span<const double> innovations) {
 void remember(const BeltExperiment& each, BeltMemory& memory) {
   const std::size_t group = belt_group(each.direction, each.end_stop);
   if (counts(each, each.direction, each.end_stop)) {
-    const double noise = std::sqrt(seen_of(each).variance);
+    const double noise = std::sqrt(observation_of(each).variance);
     // mu_max is kept as it was weighed.
     memory.take_value(group, each.mu_max, each.ci95_low, noise, 0.0, each.carried_Nm_per_N);
   } else if (each.slipped && each.carried_Nm_per_N > 0.0) {
@@ -267,11 +267,11 @@ FusedFriction fuse(std::span<const BeltExperiment> experiments, Direction direct
   if (innovations != nullptr) innovations->count = 0;
   if (window.count == 0) return fused;
   Bank bank;
-  const Seen* held = nullptr;
+  const Observation* held = nullptr;
   double held_z = 0.0;
   double constant = 0.0;
   for (std::size_t i = 0; i < window.count; ++i) {
-    const Seen& seen = window.seen[i];
+    const Observation& seen = window.seen[i];
     if (i > 0) bank.age(seen.time_s - window.seen[i - 1].time_s, true);
     const double z = bank.foresee(seen);
     if (innovations != nullptr) innovations->value[innovations->count++] = z;

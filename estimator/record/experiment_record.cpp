@@ -24,7 +24,7 @@ ExperimentRecord::ExperimentRecord(double sample_rate_hz)
       torque_(sample_rate_hz, kTrendCells),
       omega_p_(sample_rate_hz, kTrendCells),
       slip_speed_(sample_rate_hz, kTrendCells),
-      held_(kTrendCells),
+      torque_estimates_(kTrendCells),
       torque_watch_(sample_rate_hz) {}
 
 void ExperimentRecord::reset() noexcept {
@@ -36,7 +36,7 @@ void ExperimentRecord::reset() noexcept {
   force_line_ = torque_line_ = {};
   torque_slow_variance_ = 0.0;
   torque_watch_.reset();
-  held_count_ = 0;
+  torque_estimate_count_ = 0;
   last_held_s_ = 0.0;
   first_force_N_ = 0.0;
   slips_ = lowered_ = false;
@@ -69,9 +69,9 @@ bool ExperimentRecord::step(const Cell& sample) noexcept {
   if (force_.step(sample.t_s, sample.clamp_force_N, 0.0)) force_line_ = force_.line();
   if (torque_.step(sample.t_s, sample.torque_Nm, slip_percent)) {
     torque_line_ = torque_.line();
-    if (held_count_ % kSlowEvery == 0) torque_slow_variance_ = torque_.slow_variance();
+    if (torque_estimate_count_ % kSlowEvery == 0) torque_slow_variance_ = torque_.slow_variance();
     last_held_s_ = sample.t_s;
-    held_[held_count_++ % held_.size()] = {
+    torque_estimates_[torque_estimate_count_++ % torque_estimates_.size()] = {
         torque_line_.at(last_held_s_), torque_line_.variance_at(last_held_s_), torque_line_.valid};
   }
   // Before the force falls, the load is being taken up. From then on no sample is left out, also
@@ -93,11 +93,11 @@ bool ExperimentRecord::step(const Cell& sample) noexcept {
   return history_.step(sample);
 }
 
-ExperimentRecord::Held ExperimentRecord::torque_held_at(double t_s) const noexcept {
+ExperimentRecord::TorqueEstimate ExperimentRecord::torque_estimate_at(double t_s) const noexcept {
   const double ago = std::ceil((last_held_s_ - t_s) / torque_.cell_s());
   const auto cells = static_cast<std::size_t>(std::max(0.0, ago));
-  if (cells >= std::min(held_count_, held_.size())) return {};
-  return held_[(held_count_ - 1 - cells) % held_.size()];
+  if (cells >= std::min(torque_estimate_count_, torque_estimates_.size())) return {};
+  return torque_estimates_[(torque_estimate_count_ - 1 - cells) % torque_estimates_.size()];
 }
 
 }  // namespace beltgrip::estimator

@@ -29,11 +29,11 @@ class ExperimentRecord {
   const Line& force_line() const noexcept { return force_line_; }
   const Line& torque_line() const noexcept { return torque_line_; }
   // Where the torque's line stood at t when it ended there: what was known of the torque then.
-  struct Held {
+  struct TorqueEstimate {
     double torque_Nm = 0.0, variance = 0.0;
     bool valid = false;
   };
-  Held torque_held_at(double t_s) const noexcept;
+  TorqueEstimate torque_estimate_at(double t_s) const noexcept;
   // Noise of the channels, as densities (variance of the mean over one second), without what is
   // true variation.
   double torque_noise_Nm2_s() const noexcept { return torque_.density(kNoiseScale_s); }
@@ -72,8 +72,8 @@ class ExperimentRecord {
   Trend slip_speed_;  // slip times speed
   Line force_line_, torque_line_;
   double torque_slow_variance_ = 0.0;
-  std::vector<Held> held_;  // at the end of each cell of the torque's trend
-  std::size_t held_count_ = 0;
+  std::vector<TorqueEstimate> torque_estimates_;  // at the end of each cell of the torque's trend
+  std::size_t torque_estimate_count_ = 0;
   double last_held_s_ = 0.0;
   StepWatch torque_watch_;
   double first_force_N_ = 0.0;

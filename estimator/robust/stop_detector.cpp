@@ -27,7 +27,7 @@ struct Known {
 // uncertainty: a line that has begun to bend shows in the readings first.
 Known torque_at_begin(const ExperimentRecord& record, double begin_s, const Known& readings,
                       double variation) {
-  const ExperimentRecord::Held line = record.torque_held_at(begin_s);
+  const ExperimentRecord::TorqueEstimate line = record.torque_estimate_at(begin_s);
   if (!line.valid) return readings;
   const double line_variance = line.variance + variation;
   const double share = readings.variance / (readings.variance + line_variance + kTiny);

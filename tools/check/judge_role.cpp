@@ -473,7 +473,7 @@ void Judge::course() {
 
 // A live value that is noisier than its step does not come again and again.
 bool Judge::repeats_itself() const {
-  const bool usual = course_.live_bends.seen() >= course_.stood_values;
+  const bool usual = course_.live_bends.count() >= course_.stood_values;
   return course_.stood_s >= kStuck_s && course_.stood_values >= kRepeats && course_.step > 0.0 &&
          course_.live_noise() > (usual ? kNoisySteps : kNoisyStepsSeldom) * course_.step;
 }

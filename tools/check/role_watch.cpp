@@ -275,9 +275,9 @@ void RoleWatch::take_time(RoleCourse& course, State& state, MonoTime t) {
     course.longest_gap_s = std::max(course.longest_gap_s, interval_s);
     const double usual_s = course.binding->period_ms
                                ? 1e-3 * *course.binding->period_ms
-                               : course.span_s / static_cast<double>(course.intervals_s.seen());
+                               : course.span_s / static_cast<double>(course.intervals_s.count());
     state.behind_gap =
-        interval_s > std::max(kGapLeast_s, kGapPeriods * usual_s) && course.intervals_s.seen() > 8;
+        interval_s > std::max(kGapLeast_s, kGapPeriods * usual_s) && course.intervals_s.count() > 8;
     if (state.behind_gap) {
       ++course.gap_count;
       if (course.gaps.size() < kGapsKept) course.gaps.push_back({t_s - interval_s, interval_s});
@@ -342,7 +342,7 @@ void RoleWatch::take_move(RoleCourse& course, const State& state, double value, 
 }
 
 void RoleWatch::take_value(RoleCourse& course, State& state, double value, double t_s) {
-  const bool first = course.spread.seen() == 0;
+  const bool first = course.spread.count() == 0;
   course.least = first ? value : std::min(course.least, value);
   course.largest = first ? value : std::max(course.largest, value);
   course.value = value;

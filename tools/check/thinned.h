@@ -18,7 +18,7 @@ class Thinned {
   static constexpr std::size_t kMost = 8192;
 
   void add(const Value& value) {
-    if (seen_++ % stride_ != 0) return;
+    if (count_++ % stride_ != 0) return;
     kept_.push_back(value);
     if (kept_.size() < kMost) return;
     for (std::size_t i = 0; 2 * i < kept_.size(); ++i) kept_[i] = kept_[2 * i];
@@ -26,12 +26,12 @@ class Thinned {
     stride_ *= 2;
   }
   const std::vector<Value>& values() const { return kept_; }
-  std::uint64_t seen() const { return seen_; }
+  std::uint64_t count() const { return count_; }
   bool empty() const { return kept_.empty(); }
 
  private:
   std::vector<Value> kept_;
-  std::uint64_t seen_ = 0;
+  std::uint64_t count_ = 0;
   std::uint64_t stride_ = 1;
 };
 

@@ -185,7 +185,7 @@ Verdict judge(const RoleWatch& watch, const std::vector<Window>& windows,
   return verdict;
 }
 
-void tell_doubts(Verdict& verdict) {
+void summarize_doubts(Verdict& verdict) {
   std::size_t doubts = 0;
   const auto add = [&doubts](const Findings& findings) {
     doubts += static_cast<std::size_t>(

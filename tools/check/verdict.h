@@ -31,7 +31,7 @@ Verdict judge(const RoleWatch& watch, const std::vector<Window>& windows,
               bool seen);
 
 // When all findings are there: the sentence says how many of them are doubts.
-void tell_doubts(Verdict& verdict);
+void summarize_doubts(Verdict& verdict);
 
 // What kept experiments away, with its figure, in the words of every program.
 daemon::Reason reason_of(daemon::Inhibit inhibit, const Prospects& prospects);

@@ -124,15 +124,16 @@ daemon::Config listening(daemon::Config config) {
   return config;
 }
 
-struct Seen {
+struct DriveView {
   check::Thinned<check::Window> windows;
   check::Prospects prospects;
 };
 
 // The view, and how far it has come.
-class ToldView final : public daemon::SampleSink {
+class ProgressView final : public daemon::SampleSink {
  public:
-  ToldView(daemon::SampleSink& view, RunProgress* progress) : view_(view), progress_(progress) {}
+  ProgressView(daemon::SampleSink& view, RunProgress* progress)
+      : view_(view), progress_(progress) {}
   void on_report(const daemon::SampleReport& report) noexcept override {
     view_.on_report(report);
     if (progress_ != nullptr) progress_->at(report.t);
@@ -143,28 +144,28 @@ class ToldView final : public daemon::SampleSink {
   RunProgress* progress_;
 };
 
-void look(daemon::Port& port, const daemon::Config& config, check::RoleWatch& watch,
-          std::optional<daemon::Duration> length, RunProgress* progress, Seen& seen) {
+void observe(daemon::Port& port, const daemon::Config& config, check::RoleWatch& watch,
+             std::optional<daemon::Duration> length, RunProgress* progress, DriveView& seen) {
   watch.begin_log();
   check::ListeningPort listening_port(port, watch, length);
   const daemon::Config quiet = listening(config);
   daemon::Pipeline pipeline(quiet);
   check::BusView view(config, watch, pipeline, seen.windows, seen.prospects);
-  ToldView told(view, progress);
+  ProgressView progress_view(view, progress);
   daemon::run_loop(listening_port, pipeline, quiet.estimator.sample_rate_hz,
-                   estimator::StopReason::kTraceEnd, &told);
+                   estimator::StopReason::kTraceEnd, &progress_view);
   watch.end_log();
 }
 
-void look_at_log(const std::string& path, const daemon::Config& config, check::RoleWatch& watch,
-                 Progress& progress, RunProgress& run_progress, Seen& seen) {
+void observe_log(const std::string& path, const daemon::Config& config, check::RoleWatch& watch,
+                 Progress& progress, RunProgress& run_progress, DriveView& seen) {
   const auto timeline = open_timeline({path}, "", config);
   ports::ReplayPort port(*timeline, {});
   if (port.empty()) {
     throw Failure{kBadInput, no_frame_text(path, timeline->stats())};
   }
   run_progress.reads(*timeline);
-  look(port, config, watch, {}, &run_progress, seen);
+  observe(port, config, watch, {}, &run_progress, seen);
   const can::LogStats stats = timeline->stats();
   if (stats.lines_bad > 0) {
     progress.clear();
@@ -210,11 +211,11 @@ void run(const Options& options) {
   if (!options.json.empty()) json.emplace(options.json, inputs);
 
   check::RoleWatch watch(config);
-  Seen seen;
+  DriveView seen;
   std::string what;
   if (live) {
     const auto port = open_buses_whole(config, stop_descriptor());
-    look(*port, config, watch, daemon::Duration::of_s(options.live_s), nullptr, seen);
+    observe(*port, config, watch, daemon::Duration::of_s(options.live_s), nullptr, seen);
     char seconds[32];
     std::snprintf(seconds, sizeof seconds, "%.4g", options.live_s);
     what = config.interface + " for " + seconds + " s";
@@ -223,7 +224,7 @@ void run(const Options& options) {
   RunProgress run_progress(progress, options.logs.size());
   for (const std::string& log : options.logs) {
     if (!what.empty() && stop_asked()) break;
-    look_at_log(log, config, watch, progress, run_progress, seen);
+    observe_log(log, config, watch, progress, run_progress, seen);
     what += (what.empty() ? "" : ", ") + log;
   }
   progress.clear();
@@ -234,7 +235,7 @@ void run(const Options& options) {
   for (check::Finding& each : constants(options.logs, config, watch, verdict)) {
     verdict.across.push_back(std::move(each));
   }
-  check::tell_doubts(verdict);
+  check::summarize_doubts(verdict);
   const check::Checked checked{config, watch, seen.prospects, verdict, what};
   if (json) {
     json->write(check::json(checked));

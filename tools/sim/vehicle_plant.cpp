@@ -108,7 +108,7 @@ void VehiclePlant::settle(double speed_m_s, double ratio, double idle_rad_s) {
   observe({});
 }
 
-const VehiclePlant::Place& VehiclePlant::place() {
+const VehiclePlant::RatioGeometry& VehiclePlant::ratio_geometry() {
   if (place_.ratio != state_.ratio) {
     place_ = {state_.ratio,
               std::clamp(std::log(variator_.ratio_overdrive / state_.ratio) / ln_span_, 0.0, 1.0),
@@ -117,9 +117,9 @@ const VehiclePlant::Place& VehiclePlant::place() {
   return place_;
 }
 
-VehiclePlant::Held VehiclePlant::hold(const DrivelineInput& input) {
-  Held held;
-  const double low_share = place().low_share;
+VehiclePlant::StepConstants VehiclePlant::step_constants(const DrivelineInput& input) {
+  StepConstants held;
+  const double low_share = ratio_geometry().low_share;
   held.curve = belt_.overdrive;
   held.curve.peak_slip_percent +=
       low_share * (belt_.low_peak_slip_percent - belt_.overdrive.peak_slip_percent);
@@ -143,7 +143,7 @@ VehiclePlant::Held VehiclePlant::hold(const DrivelineInput& input) {
                (1.0 - variator_.deformation_per_N * input.secondary_force_N -
                 effects_.deformation_per_kN * kN - effects_.deformation_per_kN2 * kN * kN -
                 (variator_.deformation_per_Nm + effects_.tilt_per_Nm) * output_.belt_torque_Nm);
-  held.radius_m = place().radius_m;
+  held.radius_m = ratio_geometry().radius_m;
   held.torque_per_mu = 2.0 * input.secondary_force_N * held.radius_m / cos_wedge_;
   return held;
 }
@@ -164,7 +164,8 @@ VehiclePlant::Slip VehiclePlant::slip_of(double ratio, double omega_p_rad_s, dou
 }
 
 VehiclePlant::Rates VehiclePlant::rates(const std::array<double, 3>& omega,
-                                        const DrivelineInput& input, const Held& held) const {
+                                        const DrivelineInput& input,
+                                        const StepConstants& held) const {
   const Slip slip = slip_of(held.ratio, omega[1], omega[2]);
   const FrictionPoint friction = friction_at(held.curve, slip.value);
   const double belt = held.torque_per_mu * friction.mu;
@@ -244,7 +245,7 @@ void VehiclePlant::creep(double ln_force_ratio, double step_s) {
 }
 
 void VehiclePlant::observe(const DrivelineInput& input) {
-  const Held held = hold(input);
+  const StepConstants held = step_constants(input);
   const Slip slip = slip_of(held.ratio, state_.omega_p_rad_s, state_.omega_s_rad_s);
   output_.slip_share = slip.value;
   output_.mu = friction_at(held.curve, slip.value).mu;
@@ -262,7 +263,7 @@ void VehiclePlant::observe(const DrivelineInput& input) {
 
 void VehiclePlant::step(const DrivelineInput& input, double step_s) {
   // W = I - gamma h J;  W k1 = f(x);  W k2 = f(x + h k1) - 2 k1;  x += h (3 k1 + k2) / 2.
-  const Held held = hold(input);
+  const StepConstants held = step_constants(input);
   const double gamma_h = (1.0 - std::sqrt(0.5)) * step_s;
   const std::array<double, 3> x{state_.omega_e_rad_s, state_.omega_p_rad_s, state_.omega_s_rad_s};
   const Rates first = rates(x, input, held);

@@ -79,7 +79,7 @@ class VehiclePlant {
     double value, per_p, per_s;
   };
   // What stays fixed during one step.
-  struct Held {
+  struct StepConstants {
     FrictionCurve curve;
     double ratio = 0.0;  // deformed
     double radius_m = 0.0;
@@ -87,16 +87,17 @@ class VehiclePlant {
   };
 
   // What follows from the ratio alone.
-  struct Place {
+  struct RatioGeometry {
     double ratio = std::numeric_limits<double>::quiet_NaN();  // at which
     double low_share = 0.0;                                   // of the way to the low end stop
     double radius_m = 0.0;                                    // of the primary pulley
   };
-  const Place& place();  // at the present ratio; kept, since it stands for most steps
-  Held hold(const DrivelineInput& input);
+  const RatioGeometry&
+  ratio_geometry();  // at the present ratio; kept, since it stands for most steps
+  StepConstants step_constants(const DrivelineInput& input);
   static Slip slip_of(double ratio, double omega_p_rad_s, double omega_s_rad_s);
   Rates rates(const std::array<double, 3>& omega, const DrivelineInput& input,
-              const Held& held) const;
+              const StepConstants& held) const;
   void shift(const DrivelineInput& input, double step_s);
   void creep(double ln_force_ratio, double step_s);
   void observe(const DrivelineInput& input);
@@ -112,7 +113,7 @@ class VehiclePlant {
   double secondary_inertia_kg_m2_;  // with the vehicle
   double cos_wedge_;
   double wedge_factor_;
-  Place place_;
+  RatioGeometry place_;
   double ln_span_;                       // of the ratios
   std::array<double, kRadii> radius_m_;  // over ln(ratio) between the end stops
   DrivelineState state_;

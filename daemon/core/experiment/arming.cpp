@@ -279,10 +279,10 @@ std::uint32_t Arming::clearance(const Now& now) noexcept {
   const double needed_s = ramp_s(point, planned_1_s, rate_max_N_per_s_) + kBeyondPeak_s;
   const double patience_s = seconds(kPatience);
   const bool slows = slowing * patience_s > (1.0 - kFurther) * now.omega_p_rad_s;
-  const bool waits =
-      slows && needed_s + kSpare_s < left_s &&
-      (later_.crossing().peak_slip_told_share > crossing.peak_slip_told_share + kRoomGained ||
-       reachable_mu(point) < point.mu_expected);
+  const bool waits = slows && needed_s + kSpare_s < left_s &&
+                     (later_.crossing().peak_slip_detectable_share >
+                          crossing.peak_slip_detectable_share + kRoomGained ||
+                      reachable_mu(point) < point.mu_expected);
   if (waits) return inhibit_bit(Inhibit::kWait);
   if (crossing.slip_rate_1_s <= 0.0) {
     const CrossingDenied& denied = search_.denied();
@@ -293,7 +293,7 @@ std::uint32_t Arming::clearance(const Now& now) noexcept {
     if (denied.wall == CrossingWall::kFall) {
       obstacle_.figure = known;
       obstacle_.needed = point.own_force_N / peak_force_N(point, point.mu_least);
-      if (refused_.told()) refused_ = search_;
+      if (refused_.fall_known()) refused_ = search_;
     }
     return inhibit_bit(Inhibit::kRamp);
   }
@@ -395,9 +395,9 @@ void Arming::step(const Now& now) noexcept {
   } else if (now.t >= next_look_) {
     next_look_ = now.t + kClearancePeriod;
     look(now);
-  } else if (!refused_.told()) {
-    refused_.tell();
-    if (refused_.told() && obstacle_.wall == CrossingWall::kFall) {
+  } else if (!refused_.fall_known()) {
+    refused_.step_fall();
+    if (refused_.fall_known() && obstacle_.wall == CrossingWall::kFall) {
       obstacle_.figure = refused_.denied().figure;
     }
   }

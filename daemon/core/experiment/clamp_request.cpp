@@ -31,7 +31,7 @@ constexpr Duration kReleaseMinimum = 300 * kMillisecond;
 constexpr Duration kSlipAfter =
     200 * kMillisecond;  // averages noise, forgets macro slip before kReleaseTime
 // Slip at the end of a request that shows whether it goes back; and of it, then the force is back.
-constexpr double kSlipTold_share = 0.003;
+constexpr double kSlipShown_share = 0.003;
 constexpr double kSlipGone = 0.5;
 constexpr double kUntrueShare = 0.5;    // of the ratio's drift that another node's speed tells too
 constexpr double kStuckForce = 1.1;     // of the last request
@@ -399,8 +399,8 @@ void ClampRequest::follow_release(const Now& now) noexcept {
   last_ = now.t;
 }
 
-std::optional<bool> ClampRequest::held_again() const noexcept {
-  if (slip_.slip_share() < kSlipTold_share) return std::nullopt;
+std::optional<bool> ClampRequest::grips_again() const noexcept {
+  if (slip_.slip_share() < kSlipShown_share) return std::nullopt;
   return slip_after_share_ < kSlipGone * slip_.slip_share();
 }
 

@@ -102,7 +102,7 @@ class ClampRequest {
   void follow_release(const Now& now) noexcept;  // every sample
   MonoTime ended() const noexcept { return ended_; }
   // From the speeds alone: has the slip of the request gone back? Nothing: it was too small to say.
-  std::optional<bool> held_again() const noexcept;
+  std::optional<bool> grips_again() const noexcept;
 
   // Time and distance since the last request, or since the start of the daemon.
   void travel(MonoTime t, double speed_m_s) noexcept;

@@ -354,7 +354,7 @@ void ExperimentStage::judge_release(const Now& now, RoleSet& still) noexcept {
   request_.follow_release(request);
   if (!request_.stuck(request)) return;
   const MonoTime since = now.input.channels().course(Role::kSecondaryPressure).since();
-  misread_ = request_.held_again().value_or(since <= request_.ended());
+  misread_ = request_.grips_again().value_or(since <= request_.ended());
   if (misread_) still.set(static_cast<std::size_t>(Role::kSecondaryPressure));
 }
 
@@ -394,7 +394,7 @@ Guards ExperimentStage::guards(const Now& now) const noexcept {
   guards.settled = !by_conditions() || arming_.settled();
   if (asks() && arming_.cleared()) {
     guards.settled = guards.settled && announced_ && now.t - *announced_ >= limits::kAnnounced &&
-                     now.inactive_told;
+                     now.inactive_sent;
   }
   guards.cleared = !commands() || arming_.cleared();
   const bool releasing = state_ == State::kReleasing;

@@ -38,7 +38,7 @@ class ExperimentStage {
     const EstimateStage& estimate;  // before begin() of the sample before, after it of this one
     FaultSet& faults;
     bool unconfirmed = false;    // clamp frames that were asked for are not on the bus
-    bool inactive_told = false;  // no inactive clamp frame is left to be sent
+    bool inactive_sent = false;  // no inactive clamp frame is left to be sent
   };
 
   // --- the steps of a sample, in this order ---

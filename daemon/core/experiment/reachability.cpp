@@ -14,11 +14,11 @@ namespace {
 // reach; with 3 %/s beside them from 109, and one break of G1.
 constexpr std::array kSlipRates_1_s{0.025, 0.02};
 // A steep fall is seen early, a flat top late.
-constexpr double kSlipToSeeSteep_share = 0.003;
-constexpr double kSlipToSeeFlat_share = 0.008;
+constexpr double kSlipDetectableSteep_share = 0.003;
+constexpr double kSlipDetectableFlat_share = 0.008;
 // Measured: of the noise of the slip rate. With 4 %/s a fall of 4e-3 to 8e-3 per percent was told
 // 0.8 points behind the peak, and decided on 0.3 later (campaign seeds 920085, 922504).
-constexpr double kSlipToSee_s = 0.2;
+constexpr double kSlipDetectable_s = 0.2;
 constexpr double kFlatFall = 0.05;  // of mu per unit of slip
 // Measured: of slip beyond the peak. A crossing that is reckoned to run further is so near to not
 // being caught at all that a little less force, friction or inertia than reckoned with decides:
@@ -96,12 +96,12 @@ double ramp_at_the_top_N_per_s(const RampPoint& point, double answer_s,
 }
 
 Excursion excursion(const RampPoint& point, const Reaction& reaction, double slip_rate_1_s,
-                    double fall, double slip_to_see_share, double reaction_s) noexcept {
+                    double fall, double slip_detectable_share, double reaction_s) noexcept {
   const double w = runaway_1_s(point);
   const double a = w * fall / point.mu_least;
   const double lag_s = std::max(reaction.lag_s, 1e-3);
   const double y1 = slip_rate_1_s / w;
-  const double seen_s = std::log1p(a * slip_to_see_share / slip_rate_1_s) / a;
+  const double seen_s = std::log1p(a * slip_detectable_share / slip_rate_1_s) / a;
   const double told_s = seen_s + reaction.detection_s + reaction_s + reaction.dead_time_s;
   const double x1 = slip_rate_1_s / a * std::expm1(a * told_s);
   const double force_N = peak_force_N(point, point.mu_least);
@@ -143,10 +143,10 @@ Excursion CrossingSearch::excursion_at(double slip_rate_1_s, Corner corner,
   const double silence_s = corner.fault ? std::max(reaction_.stale_s, reaction_.timeout_s) : 0.0;
   const double steepest = corner.fault ? point_.fall_at_fault : point_.fall;
   const double to_see_steep =
-      std::max(kSlipToSeeSteep_share, kSlipToSee_s * point_.slip_rate_noise_1_s);
+      std::max(kSlipDetectableSteep_share, kSlipDetectable_s * point_.slip_rate_noise_1_s);
   return excursion(
       point_, reaction_, slip_rate_1_s, corner.steep ? fall_share * steepest : kFlatFall,
-      corner.steep ? to_see_steep : kSlipToSeeFlat_share, silence_s + reaction_.cycle_s);
+      corner.steep ? to_see_steep : kSlipDetectableFlat_share, silence_s + reaction_.cycle_s);
 }
 
 bool CrossingSearch::step() noexcept {
@@ -157,7 +157,7 @@ bool CrossingSearch::step() noexcept {
   return done_;
 }
 
-bool CrossingSearch::told() const noexcept {
+bool CrossingSearch::fall_known() const noexcept {
   return denied_.wall != CrossingWall::kFall || halvings_ == kHalvings;
 }
 
@@ -177,14 +177,14 @@ void CrossingSearch::try_corner() noexcept {
                                                    point_.omega_p_rad_s, point_.primary_radius_m);
   tries_.ramp_top_N_per_s =
       ramp_at_the_top_N_per_s(point_, reaction_.dead_time_s + reaction_.lag_s, rate_1_s);
-  const double told_s = kSlipToSeeFlat_share / rate_1_s + reaction_.detection_s +
+  const double told_s = kSlipDetectableFlat_share / rate_1_s + reaction_.detection_s +
                         reaction_.dead_time_s + reaction_.lag_s;
-  tries_.peak_slip_told_share = std::min(
+  tries_.peak_slip_detectable_share = std::min(
       tries_.peak_slip_max_share,
       limits_.energy_stop_J / (std::max(1.0, point_.torque_Nm * point_.omega_p_rad_s) * told_s));
   if (tries_.dearest.slip_share < kExcursionMost &&
       tries_.peak_slip_max_share > point_.peak_slip_share &&
-      tries_.peak_slip_told_share > crossing_.peak_slip_told_share) {
+      tries_.peak_slip_detectable_share > crossing_.peak_slip_detectable_share) {
     crossing_ = tries_;
   }
 }
@@ -211,8 +211,8 @@ void CrossingSearch::deny() noexcept {
 }
 
 // Is half of the way between survived and lost survived, first with nothing wrong?
-void CrossingSearch::tell() noexcept {
-  if (told()) return;
+void CrossingSearch::step_fall() noexcept {
+  if (fall_known()) return;
   const double share = 0.5 * (survived_ + lost_);
   const Excursion all = excursion_at(kSlipRates_1_s.back(), {.fault = fault_next_}, share);
   const bool survives = all.slip_share < kExcursionMost;

@@ -75,10 +75,10 @@ struct Excursion {
   double late_s = 0.0;      // of that time, after the decision and the actuator's own answer
 };
 // What becomes of the slip when the belt passes its peak at this slip rate, friction falls by
-// `fall` behind it, the estimator needs detection_s after slip_to_see_share beyond the peak, and
-// reaction_s passes before the actuator is told. Not caught: all 1e9.
+// `fall` behind it, the estimator needs detection_s after slip_detectable_share beyond the peak,
+// and reaction_s passes before the actuator is told. Not caught: all 1e9.
 Excursion excursion(const RampPoint& point, const Reaction& reaction, double slip_rate_1_s,
-                    double fall, double slip_to_see_share, double reaction_s) noexcept;
+                    double fall, double slip_detectable_share, double reaction_s) noexcept;
 
 // How the belt is to be brought over its peak.
 struct Crossing {
@@ -91,7 +91,7 @@ struct Crossing {
   Excursion dearest;
   double peak_slip_max_share = 0.0;  // the latest peak with room, at its point
   // And the latest whose flat top can be told before the request ends itself for its energy.
-  double peak_slip_told_share = 0.0;
+  double peak_slip_detectable_share = 0.0;
 };
 // The latest peak that this crossing has room for, where the shaft has this speed.
 double peak_slip_max_share(const Crossing& crossing, const SlipLimits& limits, double torque_Nm,
@@ -122,11 +122,11 @@ class CrossingSearch {
   bool done() const noexcept { return done_; }
   const RampPoint& point() const noexcept { return point_; }
   const Crossing& crossing() const noexcept { return crossing_; }
-  // Once done: what stands in the way. The fall that is survived is known once told(), by as many
-  // calls of tell(), of one excursion each.
+  // Once done: what stands in the way. The fall that is survived is known once fall_known(), by as
+  // many calls of step_fall(), of one excursion each.
   const CrossingDenied& denied() const noexcept { return denied_; }
-  bool told() const noexcept;
-  void tell() noexcept;
+  bool fall_known() const noexcept;
+  void step_fall() noexcept;
 
  private:
   // Of what a crossing has to hold for.

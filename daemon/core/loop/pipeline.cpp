@@ -58,7 +58,7 @@ void Pipeline::on_send_failed(const can::CanFrame& frame, MonoTime t, std::uint8
 // --- one sample -----------------------------------------------------------------------------
 
 ExperimentStage::Now Pipeline::Parts::now(MonoTime at) noexcept {
-  return {at, input, estimate, faults, output.unconfirmed(at), output.inactive_told()};
+  return {at, input, estimate, faults, output.unconfirmed(at), output.inactive_sent()};
 }
 
 // What a change of the experiment's state asks of the stages beside it.

@@ -41,7 +41,7 @@ class OutputStage {
 
   // Nobody has confirmed what was asked: it may not be on the bus at all.
   bool unconfirmed(MonoTime t) const noexcept;
-  bool inactive_told() const noexcept { return publisher_.inactive_told(); }
+  bool inactive_sent() const noexcept { return publisher_.inactive_sent(); }
   std::uint32_t foreign_identifier() const noexcept { return foreign_identifier_; }
   std::uint64_t refused() const noexcept { return refused_before_ + gate_.refused(); }
   bool is_clamp(const can::CanFrame& frame, std::uint8_t bus) const noexcept {

@@ -46,7 +46,7 @@ class Publisher {
   void go_on_from(const Publisher& before) noexcept;
   // Before a request; and where the inactive frames of the last may not have come through.
   void repeat_inactive() noexcept { inactive_left_ = limits::kInactiveFrames; }
-  bool inactive_told() const noexcept { return inactive_left_ == 0; }
+  bool inactive_sent() const noexcept { return inactive_left_ == 0; }
 
  private:
   struct Schedule {

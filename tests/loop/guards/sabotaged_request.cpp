@@ -62,7 +62,7 @@ bool ClampRequest::released(const Now& now) const noexcept {
 }
 bool ClampRequest::stuck(const Now&) const noexcept { return false; }
 void ClampRequest::follow_release(const Now& now) noexcept { last_ = now.t; }
-std::optional<bool> ClampRequest::held_again() const noexcept { return std::nullopt; }
+std::optional<bool> ClampRequest::grips_again() const noexcept { return std::nullopt; }
 void ClampRequest::travel(MonoTime, double) noexcept {}
 bool ClampRequest::cooled() const noexcept { return true; }
 

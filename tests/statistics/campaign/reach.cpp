@@ -12,12 +12,12 @@ namespace {
 
 // Chosen: the slip rate of the crossing. Slower costs energy, faster runs past.
 constexpr double kSlipRate_1_s = 0.03;
-constexpr double kSlipToSee_share = 0.008;       // chosen: to tell a flat top
-constexpr double kSlipToSeeSteep_share = 0.003;  // and a steep fall
-constexpr double kDecision_s = 0.05;             // chosen: of a detector, after that slip
-constexpr double kFrame_s = 0.01;                // a clamp frame every 10 ms
-constexpr double kSlipSpeed_m_s = 0.8;           // promise G1
-constexpr double kEnergy_J = 100.0;              // promise G1
+constexpr double kSlipDetectable_share = 0.008;       // chosen: to tell a flat top
+constexpr double kSlipDetectableSteep_share = 0.003;  // and a steep fall
+constexpr double kDecision_s = 0.05;                  // chosen: of a detector, after that slip
+constexpr double kFrame_s = 0.01;                     // a clamp frame every 10 ms
+constexpr double kSlipSpeed_m_s = 0.8;                // promise G1
+constexpr double kEnergy_J = 100.0;                   // promise G1
 // Measured on a simulation of other make: the steepest fall that ends inside G1, of the steepest
 // that is caught at all.
 constexpr double kInsideG1 = 0.8;
@@ -133,13 +133,14 @@ bool caught(const ReachPoint& point) {
   const double y = kSlipRate_1_s / w;
   const double told_s = kDecision_s + kFrame_s + point.dead_time_s;
   const double g = point.own_force_N / reach_peak_force_N(point) - 1.0 + y;
-  const double slip_share = (kSlipToSeeSteep_share + w * y / a) * std::exp(a * told_s) - w * y / a;
+  const double slip_share =
+      (kSlipDetectableSteep_share + w * y / a) * std::exp(a * told_s) - w * y / a;
   return slip_share < point.mu_max / fall * (g / (1.0 + a * point.lag_s) - y);
 }
 
 double crossing_energy_J(const ReachPoint& point) {
-  const double lasts_s =
-      kSlipToSee_share / kSlipRate_1_s + kDecision_s + kFrame_s + point.dead_time_s + point.lag_s;
+  const double lasts_s = kSlipDetectable_share / kSlipRate_1_s + kDecision_s + kFrame_s +
+                         point.dead_time_s + point.lag_s;
   return point.torque_Nm * point.omega_p_rad_s * point.peak_slip_share * lasts_s;
 }
 
@@ -153,7 +154,7 @@ double slip_noise_percent2_s(const SpeedNoise& primary, const SpeedNoise& second
 Wall wall_at(const ReachPoint& point) {
   if (point.floor_N >= reach_peak_force_N(point)) return Wall::kFloor;
   const double slip_most_share = kSlipSpeed_m_s / (point.omega_p_rad_s * point.primary_radius_m);
-  if (point.peak_slip_share + kSlipToSee_share >= slip_most_share) return Wall::kSlipSpeed;
+  if (point.peak_slip_share + kSlipDetectable_share >= slip_most_share) return Wall::kSlipSpeed;
   if (crossing_energy_J(point) >= kEnergy_J) return Wall::kEnergy;
   return caught(point) ? Wall::kNone : Wall::kFall;
 }

@@ -18,7 +18,7 @@ TEST(Thinned, KeepsAnEvenShareHoweverLongItIs) {
   Thinned<double> thinned;
   constexpr int kMany = 100'000;
   for (int i = 0; i < kMany; ++i) thinned.add(i);
-  EXPECT_EQ(thinned.seen(), 100'000U);
+  EXPECT_EQ(thinned.count(), 100'000U);
   EXPECT_LE(thinned.values().size(), Thinned<double>::kMost);
   EXPECT_GE(thinned.values().size(), Thinned<double>::kMost / 2);
   const double stride = thinned.values()[1];

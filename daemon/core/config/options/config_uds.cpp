@@ -32,13 +32,13 @@ std::string example() {
 }
 
 // Where the role stands in the file.
-struct RolePlace {
+struct RoleLocation {
   std::string key;
   std::uint32_t line;
 };
 
 // No other frame has the identifiers of a request and its answer.
-void check_alone(const Config& config, const RoleBinding& role, const RolePlace& place,
+void check_alone(const Config& config, const RoleBinding& role, const RoleLocation& place,
                  ConfigErrors& errors) {
   if (!role.uds) return;
   const UdsSource& source = *role.uds;
@@ -60,7 +60,7 @@ void check_alone(const Config& config, const RoleBinding& role, const RolePlace&
 }
 
 // An ECU has one identifier for requests and one for answers.
-void check_pairs(const Config& config, const RoleBinding& role, const RolePlace& place,
+void check_pairs(const Config& config, const RoleBinding& role, const RoleLocation& place,
                  ConfigErrors& errors) {
   if (!role.uds) return;
   const UdsSource& source = *role.uds;
@@ -79,7 +79,7 @@ void check_pairs(const Config& config, const RoleBinding& role, const RolePlace&
   }
 }
 
-void check_poll(const RoleBinding& role, const RolePlace& place, ConfigErrors& errors) {
+void check_poll(const RoleBinding& role, const RoleLocation& place, ConfigErrors& errors) {
   if (role.uds && is_functional(role.uds->request)) {
     errors.add(place.line, place.key + ".uds.request", "the address of all ECUs at once",
                "that of one ECU, as bus.diagnostics is \"poll\"");
@@ -132,8 +132,8 @@ void check_uds(const Config& config, const TomlNode& signals, ConfigErrors& erro
   for (const RoleBinding& role : config.roles) {
     if (!role.uds) continue;
     const TomlNode* node = signals.find(role_name(role.role));
-    const RolePlace place{key_of("signals", role_name(role.role)),
-                          node == nullptr ? 1 : node->line};
+    const RoleLocation place{key_of("signals", role_name(role.role)),
+                             node == nullptr ? 1 : node->line};
     if (role.uds->request == role.uds->response) {
       errors.add(place.line, place.key + ".uds.response", "the identifier of the request",
                  "that of the answer: often the request's + 8");

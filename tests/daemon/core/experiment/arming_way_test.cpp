@@ -163,9 +163,9 @@ Account account(const Drive& drive) {
   const double needed_s = drive.ramp_s(soon, safe ? here.crossing.slip_rate_1_s : 0.025) + 1.0;
   // Waiting is worth a tenth of a point of slip, or reach; with three seconds to spare, and where
   // the car slows by 5 % within 8 s.
-  const bool gains =
-      later.crossing.peak_slip_told_share > here.crossing.peak_slip_told_share + 0.001 ||
-      drive.peak_N(soon) < soon.floor_N;
+  const bool gains = later.crossing.peak_slip_detectable_share >
+                         here.crossing.peak_slip_detectable_share + 0.001 ||
+                     drive.peak_N(soon) < soon.floor_N;
   if (a * 8.0 > 0.05 * now_rad_s && needed_s + 3.0 < left_s && gains) {
     out.found.inhibits = inhibit_bit(Inhibit::kWait);
   } else if (!safe) {

@@ -163,7 +163,7 @@ class Released : public Followed {
   int samples_until_held(double slip_share) {
     now_.omega_s_rad_s = 315.0 * (1.0 + slip_share);
     for (int i = 0; i < 400; ++i) {
-      if (request_.held_again() != false) return i;
+      if (request_.grips_again() != false) return i;
       now_.t += kSample;
       request_.follow_release(now_);
     }
@@ -173,7 +173,7 @@ class Released : public Followed {
 
 TEST_F(Released, TheBeltHoldsAgainWhenHalfOfItsSlipHasGone) {
   end_with(0.02);
-  EXPECT_EQ(request_.held_again(), false);
+  EXPECT_EQ(request_.grips_again(), false);
   EXPECT_EQ(samples_until_held(0.0), 28);
   SetUp();
   end_with(0.02);
@@ -182,15 +182,15 @@ TEST_F(Released, TheBeltHoldsAgainWhenHalfOfItsSlipHasGone) {
   end_with(0.02);
   EXPECT_NE(samples_until_held(0.0099), -1);
   request_.end(now_.t);  // again: of a request that no longer stands it takes nothing
-  EXPECT_EQ(request_.held_again(), true);
+  EXPECT_EQ(request_.grips_again(), true);
 }
 
 TEST_F(Released, SlipThatWasTooSmallSaysNothing) {
   end_with(0.0029);
-  EXPECT_EQ(request_.held_again(), std::nullopt);
+  EXPECT_EQ(request_.grips_again(), std::nullopt);
   SetUp();
   end_with(0.0031);
-  EXPECT_EQ(request_.held_again(), false);
+  EXPECT_EQ(request_.grips_again(), false);
 }
 
 TEST_F(Released, WhatComesAfterTheEndIsNotJudged) {

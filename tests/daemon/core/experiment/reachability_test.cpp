@@ -34,13 +34,13 @@ CrossingSearch searched(const RampPoint& p, const Reaction& r) {
   CrossingSearch search(p, r, SlipLimits{});
   while (!search.step()) {
   }
-  while (!search.told()) search.tell();
+  while (!search.fall_known()) search.step_fall();
   return search;
 }
 
 // Explicit Euler with a microsecond-fine step, states and events written out.
 Excursion integrated(const RampPoint& p, const Reaction& r, double slip_rate, double fall,
-                     double slip_to_see_share, double reaction_s) {
+                     double slip_detectable_share, double reaction_s) {
   const double dt = 2e-6;
   const double peak_N = p.torque_Nm * p.wedge_cosine / (2.0 * p.primary_radius_m * p.mu_least);
   const double gain = p.torque_Nm * 1.05 / (p.inertia_kg_m2 * p.omega_p_rad_s);
@@ -49,7 +49,7 @@ Excursion integrated(const RampPoint& p, const Reaction& r, double slip_rate, do
   double force_N = low_N, t = 0.0, seen_s = -1.0, told_s = -1.0, x = 0.0;
   Excursion out;
   while (t < 5.0) {
-    if (seen_s < 0.0 && x >= slip_to_see_share) seen_s = t;
+    if (seen_s < 0.0 && x >= slip_detectable_share) seen_s = t;
     if (seen_s >= 0.0 && told_s < 0.0 && t >= seen_s + r.detection_s + reaction_s + r.dead_time_s) {
       told_s = t;
     }
@@ -285,10 +285,10 @@ Crossing chosen(const RampPoint& p, const Reaction& r) {
     tried.peak_slip_max_share =
         peak_slip_max_share(tried, {}, p.torque_Nm, p.omega_p_rad_s, p.primary_radius_m);
     const double lasts_s = 0.008 / rate + r.detection_s + r.dead_time_s + r.lag_s;
-    tried.peak_slip_told_share =
+    tried.peak_slip_detectable_share =
         std::min(tried.peak_slip_max_share, 60.0 / (p.torque_Nm * p.omega_p_rad_s * lasts_s));
     if (tried.dearest.slip_share < 0.018 && tried.peak_slip_max_share > p.peak_slip_share &&
-        tried.peak_slip_told_share > best.peak_slip_told_share) {
+        tried.peak_slip_detectable_share > best.peak_slip_detectable_share) {
       best = tried;
     }
   }
@@ -313,9 +313,9 @@ TEST(Reachability, TheSearchTakesTheRateThatTellsTheLatestPeak) {
           EXPECT_EQ(steps, 8);
           // Where a fall stands in the way, the one that is survived takes six halvings.
           const bool runs_on = search.denied().wall == CrossingWall::kFall;
-          EXPECT_EQ(search.told(), !runs_on);
+          EXPECT_EQ(search.fall_known(), !runs_on);
           int tells = 0;
-          for (; !search.told() && tells < 20; ++tells) search.tell();
+          for (; !search.fall_known() && tells < 20; ++tells) search.step_fall();
           EXPECT_LE(tells, runs_on ? 12 : 0);
           EXPECT_GE(tells, runs_on ? 6 : 0);
           EXPECT_EQ(search.denied().wall == CrossingWall::kNone, wanted.slip_rate_1_s > 0.0);
@@ -325,7 +325,8 @@ TEST(Reachability, TheSearchTakesTheRateThatTellsTheLatestPeak) {
             EXPECT_NEAR(crossing.ramp_top_N_per_s, wanted.ramp_top_N_per_s,
                         1e-9 * wanted.ramp_top_N_per_s);
             EXPECT_DOUBLE_EQ(crossing.peak_slip_max_share, wanted.peak_slip_max_share);
-            EXPECT_DOUBLE_EQ(crossing.peak_slip_told_share, wanted.peak_slip_told_share);
+            EXPECT_DOUBLE_EQ(crossing.peak_slip_detectable_share,
+                             wanted.peak_slip_detectable_share);
             EXPECT_DOUBLE_EQ(crossing.dearest.area_s, wanted.dearest.area_s);
             EXPECT_DOUBLE_EQ(crossing.dearest.late_s, wanted.dearest.late_s);
             EXPECT_TRUE(search.step());
@@ -419,7 +420,7 @@ TEST(Reachability, TheWallIsTheFirstThatAnotherAccountMeets) {
             if (search.denied().wall == CrossingWall::kNone) continue;
             // What is told stays as it is.
             const CrossingDenied told = search.denied();
-            for (int i = 0; i < 5; ++i) search.tell();
+            for (int i = 0; i < 5; ++i) search.step_fall();
             EXPECT_EQ(search.denied().figure, told.figure);
 
             const double silence_s = std::max(r.stale_s, r.timeout_s) + r.cycle_s;

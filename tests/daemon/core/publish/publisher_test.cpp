@@ -219,11 +219,11 @@ TEST(Publisher, WhileARequestStandsTheInactiveFramesAreNotTold) {
   Bench bench;
   bench.now.command = true;
   for (MonoTime t{}; t < MonoTime{kSecond}; t += kFive) bench.at(t);
-  EXPECT_TRUE(bench.publisher.inactive_told());
+  EXPECT_TRUE(bench.publisher.inactive_sent());
   bench.now.clamp = {true, 3000.0};
   for (MonoTime t{kSecond}; t < MonoTime{2 * kSecond}; t += kFive) {
     bench.at(t);
-    ASSERT_FALSE(bench.publisher.inactive_told()) << t;
+    ASSERT_FALSE(bench.publisher.inactive_sent()) << t;
   }
 }
 
