@@ -39,7 +39,7 @@ ExperimentData run_with(double acceleration_rad_s2, double behind_there_Nm) {
 }
 
 std::string doubt_of(const ExperimentData& run) {
-  Doubts doubts;
+  Implausible doubts;
   check_torques({run}, doubts);
   EXPECT_EQ(doubts.impossible.has_value(), !doubts.notes.empty());
   return doubts.notes.empty() ? "" : doubts.notes.front();

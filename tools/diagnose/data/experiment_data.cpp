@@ -86,7 +86,7 @@ GridSignal to_grid(const Channel& channel, double start_s, int n, double dt_s) {
 
 // How a channel's samples repeat the one before: on its bounds and elsewhere.
 struct Repeats {
-  struct Place {
+  struct Share {
     double samples = 0.0, repeats = 0.0;
     double share() const { return samples > 0.0 ? repeats / samples : 0.0; }
   } on_low, on_high, elsewhere;
@@ -96,7 +96,7 @@ Repeats repeats_of(const Channel& channel) {
   const auto [low, high] = std::minmax_element(channel.value.begin(), channel.value.end());
   for (std::size_t i = 1; i < channel.value.size(); ++i) {
     const double here = channel.value[i];
-    Repeats::Place& place = here == *low ? out.on_low : here == *high ? out.on_high : out.elsewhere;
+    Repeats::Share& place = here == *low ? out.on_low : here == *high ? out.on_high : out.elsewhere;
     place.samples += 1.0;
     if (here == channel.value[i - 1]) place.repeats += 1.0;
   }
@@ -157,7 +157,7 @@ bool clipped(const Channel& channel) {
   constexpr double kOften = 0.7, kHardly = 0.1, kFew = 10.0;
   if (channel.value.size() < 10) return false;
   const Repeats all = repeats_of(channel);
-  const auto is_held = [](const Repeats::Place& place) {
+  const auto is_held = [](const Repeats::Share& place) {
     return place.samples > kFew && place.share() > kOften;
   };
   return is_held(all.on_low) != is_held(all.on_high) && all.elsewhere.samples > kFew &&
@@ -369,11 +369,11 @@ void widen_slow(GridSignal& signal, double dt_s) {
 
 namespace {
 // Where a grid is read that is shifted by so many samples.
-struct Place {
+struct FractionalIndex {
   Eigen::Index before = 0;
   double share = 0.0;  // on the way to the next
 };
-Place shifted_place(Eigen::Index k, double by, Eigen::Index n) {
+FractionalIndex shifted_index(Eigen::Index k, double by, Eigen::Index n) {
   const double at = std::clamp(static_cast<double>(k) + by, 0.0, static_cast<double>(n - 1));
   const auto before = std::min(static_cast<Eigen::Index>(at), n - 2);
   return {before, at - static_cast<double>(before)};
@@ -385,7 +385,7 @@ ArrayXd shifted(const GridSignal& signal, double dt_s, double shift_s) {
   const auto n = x.size();
   ArrayXd out(n);
   for (Eigen::Index k = 0; k < n; ++k) {
-    const auto [i, u] = shifted_place(k, shift_s / dt_s, n);
+    const auto [i, u] = shifted_index(k, shift_s / dt_s, n);
     // Hermite: values and slopes of the fit at both ends.
     const double a = x[i], b = x[i + 1];
     const double da = signal.sharp_slope[i] * dt_s, db = signal.sharp_slope[i + 1] * dt_s;
@@ -402,7 +402,7 @@ ArrayXd shifted_slope(const GridSignal& signal, double dt_s, double shift_s) {
   const auto n = x.size();
   ArrayXd out(n);
   for (Eigen::Index k = 0; k < n; ++k) {
-    const auto [i, u] = shifted_place(k, shift_s / dt_s, n);
+    const auto [i, u] = shifted_index(k, shift_s / dt_s, n);
     const double y = (1.0 - u) * x[i] + u * x[i + 1];
     out[k] = std::isfinite(y) ? y : x[k];
   }

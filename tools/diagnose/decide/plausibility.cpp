@@ -119,15 +119,15 @@ std::string contradiction(const TorquePair& pair) {
 // one way or the other by a percent even there.
 void check_same_ratio(const std::vector<ExperimentData>& runs,
                       const estimator::VariatorParameters& variator, int stop, double direction,
-                      Doubts& doubts) {
-  struct Seen {
+                      Implausible& doubts) {
+  struct TopForce {
     double ratio = 0.0, force_kN = 0.0;
     const ExperimentData* run = nullptr;
   };
-  std::vector<Seen> seen;
+  std::vector<TopForce> tops;
   for (const ExperimentData& run : runs) {
     double highest_Pa = -std::numeric_limits<double>::infinity();
-    Seen here;
+    TopForce here;
     for (int k = 0; k < run.size(); ++k) {
       if (!run.valid[static_cast<std::size_t>(k)] ||
           run.stop[static_cast<std::size_t>(k)] != stop || run.torque.value[k] * direction < 0.0 ||
@@ -139,10 +139,10 @@ void check_same_ratio(const std::vector<ExperimentData>& runs,
               1e-3 * estimator::secondary_clamp_force_N(variator, highest_Pa, run.omega_s.value[k]),
               &run};
     }
-    if (here.run != nullptr) seen.push_back(here);
+    if (here.run != nullptr) tops.push_back(here);
   }
-  for (const Seen& a : seen) {
-    for (const Seen& b : seen) {
+  for (const TopForce& a : tops) {
+    for (const TopForce& b : tops) {
       const double softness = kSoftestPerkN * std::max(0.0, a.force_kN - b.force_kN);
       if (b.ratio <= a.ratio * (kSameRatio + softness)) continue;
       doubts.notes.push_back(a.run->name + " and " + b.run->name + ": end-stop ratios " +
@@ -155,7 +155,7 @@ void check_same_ratio(const std::vector<ExperimentData>& runs,
 }
 
 void drop_uneven(std::vector<ExperimentData>& runs, GridSignal ExperimentData::*channel,
-                 const std::string& role, Doubts& doubts) {
+                 const std::string& role, Implausible& doubts) {
   const ExperimentData *with = nullptr, *without = nullptr;
   for (const ExperimentData& run : runs) {
     if (run.valid_count > 0) ((run.*channel).present ? with : without) = &run;
@@ -168,7 +168,7 @@ void drop_uneven(std::vector<ExperimentData>& runs, GridSignal ExperimentData::*
 
 }  // namespace
 
-void drop_copies(std::vector<SignalTable>& tables, Doubts& doubts) {
+void drop_copies(std::vector<SignalTable>& tables, Implausible& doubts) {
   for (std::size_t i = 0; i < tables.size(); ++i) {
     for (std::size_t j = i + 1; j < tables.size();) {
       if (!same_data(tables[i], tables[j])) {
@@ -182,13 +182,13 @@ void drop_copies(std::vector<SignalTable>& tables, Doubts& doubts) {
   }
 }
 
-void drop_uneven_channels(std::vector<ExperimentData>& runs, Doubts& doubts) {
+void drop_uneven_channels(std::vector<ExperimentData>& runs, Implausible& doubts) {
   drop_uneven(runs, &ExperimentData::temperature, "oil_temperature", doubts);
   drop_uneven(runs, &ExperimentData::command, "secondary_pressure_command", doubts);
 }
 
 void check_same_machine(const std::vector<ExperimentData>& runs,
-                        const estimator::VariatorParameters& variator, Doubts& doubts) {
+                        const estimator::VariatorParameters& variator, Implausible& doubts) {
   for (const int stop : {kOverdriveStop, kLowStop}) {
     for (const double direction : {1.0, -1.0}) {
       check_same_ratio(runs, variator, stop, direction, doubts);
@@ -196,7 +196,7 @@ void check_same_machine(const std::vector<ExperimentData>& runs,
   }
 }
 
-void check_torques(const std::vector<ExperimentData>& runs, Doubts& doubts) {
+void check_torques(const std::vector<ExperimentData>& runs, Implausible& doubts) {
   for (const ExperimentData& run : runs) {
     if (!run.torque_s.present) continue;
     const std::string what = contradiction(torque_pair(run));
@@ -207,7 +207,7 @@ void check_torques(const std::vector<ExperimentData>& runs, Doubts& doubts) {
 }
 
 void check_friction(const std::vector<ExperimentData>& runs,
-                    const estimator::VariatorParameters& variator, Doubts& doubts) {
+                    const estimator::VariatorParameters& variator, Implausible& doubts) {
   std::vector<double> mu;
   double highest_Pa = 0.0;
   for (const ExperimentData& run : runs) {
@@ -256,7 +256,7 @@ Steps steps_of(const SignalTable& table) {
   return Steps::kFine;
 }
 
-void check_fitted_friction(const std::map<std::string, Interval>& machine, Doubts& doubts) {
+void check_fitted_friction(const std::map<std::string, Interval>& machine, Implausible& doubts) {
   const Interval& mu_max = machine.at("mu_max");
   const auto slips = [&](const char* name) {
     const auto found = machine.find(name);

@@ -12,26 +12,26 @@
 
 namespace beltgrip::diagnose {
 
-struct Doubts {
+struct Implausible {
   std::vector<std::string> notes;
   std::optional<Unexplained> impossible;
 };
 
 // The same data under two names would count as two experiments that agree in everything.
-void drop_copies(std::vector<SignalTable>& tables, Doubts& doubts);
+void drop_copies(std::vector<SignalTable>& tables, Implausible& doubts);
 
 // An optional channel that some experiments have and others have not would make of the others what
 // it is not: left out of all.
-void drop_uneven_channels(std::vector<ExperimentData>& runs, Doubts& doubts);
+void drop_uneven_channels(std::vector<ExperimentData>& runs, Implausible& doubts);
 
 void check_same_machine(const std::vector<ExperimentData>& runs,
-                        const estimator::VariatorParameters& variator, Doubts& doubts);
-void check_torques(const std::vector<ExperimentData>& runs, Doubts& doubts);
+                        const estimator::VariatorParameters& variator, Implausible& doubts);
+void check_torques(const std::vector<ExperimentData>& runs, Implausible& doubts);
 // By what was measured alone: the fitted mu_max may lie far beyond what the data reached.
 void check_friction(const std::vector<ExperimentData>& runs,
-                    const estimator::VariatorParameters& variator, Doubts& doubts);
+                    const estimator::VariatorParameters& variator, Implausible& doubts);
 // By the fit of the machine's constants.
-void check_fitted_friction(const std::map<std::string, Interval>& machine, Doubts& doubts);
+void check_fitted_friction(const std::map<std::string, Interval>& machine, Implausible& doubts);
 
 // Steps of pressure, torque and speed against their noise: means smooth fine ones; of those that
 // leak something stays in means.

@@ -29,14 +29,14 @@ std::array<ResidualColumns, kRandomEffects> random_columns(const Campaign& campa
                                                            const Residuals& at) {
   const auto n = at.foot.size();
   std::array<ResidualColumns, kRandomEffects> out;
-  QuantityChange level, seat, zero, zero_out, zero_track;
+  QuantityChange level, slip_offset, zero, zero_out, zero_track;
   level.ln_capacity = ArrayXd::Ones(n);
   out[0] = propagate(campaign, at, level);
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   // A speed that is held on one step of its rounding is off by the same all along.
-  seat.slip_share =
+  slip_offset.slip_share =
       ArrayXd::Constant(n, std::hypot(1.0, data.rounding_slip_share / kDefaultScatter[1]));
-  out[1] = propagate(campaign, at, seat);
+  out[1] = propagate(campaign, at, slip_offset);
   zero.torque = ArrayXd::Ones(n);
   zero.balance = ArrayXd::Ones(n);
   out[2] = propagate(campaign, at, zero);

@@ -67,7 +67,7 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
         (shape.evaluate(x + kStep).slope - shape.evaluate(x - kStep).slope) / (2.0 * kStep);
     return 0.5 * q.capacity[k] * bend * spread * per_peak * per_peak;
   };
-  const auto find_foot = [&](int k) {
+  const auto find_nearest = [&](int k) {
     const auto stop = static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)]);
     const double peak = peak_slip_share[stop], per_peak = 1.0 / peak;
     const double capacity = q.capacity[k];
@@ -76,10 +76,10 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
     const double torque_variance = sensor_variance + carried_Nm * carried_Nm;
     const double torque_weight = 1.0 / torque_variance;
     // Foot point: Gauss-Newton, halved while the distance would grow.
-    struct Place {
+    struct CurvePoint {
       double x = 0.0, model_Nm = 0.0, slope = 0.0, distance = 0.0;
     };
-    const auto at = [&](double x) -> Place {
+    const auto at = [&](double x) -> CurvePoint {
       const CurveShape::Point point = curve[stop].evaluate(x);
       const double model_Nm = capacity * point.value;
       const double gap_slip_share = q.slip_share[k] - x * peak;
@@ -87,11 +87,11 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
       return {x, model_Nm, capacity * point.slope * per_peak,
               gap_slip_share * gap_slip_share * slip_weight + gap_Nm * gap_Nm * torque_weight};
     };
-    Place foot = at(q.slip_share[k] * per_peak);
+    CurvePoint foot = at(q.slip_share[k] * per_peak);
     // Right of the rising branch the next point of the curve may lie on it, at the same torque:
     // from beyond the peak no small steps lead there.
     if (const double rising = nominal_inverse(torque_Nm / capacity); std::isfinite(rising)) {
-      if (const Place there = at(rising); there.distance < foot.distance) foot = there;
+      if (const CurvePoint there = at(rising); there.distance < foot.distance) foot = there;
     }
     for (int i = 0; i < 12; ++i) {
       const double gap_slip_share = q.slip_share[k] - foot.x * peak;
@@ -101,7 +101,7 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
       step = std::clamp(step, -0.5, 0.5);
       const double before = foot.x;
       for (int halving = 0; halving < 6; ++halving, step *= 0.4) {
-        if (const Place there = at(before + step); there.distance <= foot.distance) {
+        if (const CurvePoint there = at(before + step); there.distance <= foot.distance) {
           foot = there;
           break;
         }
@@ -117,7 +117,7 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
         out.weight[k];
   };
   for (const auto& [begin, end] : data.stretches) {
-    for (int k = begin; k < end; ++k) find_foot(k);
+    for (int k = begin; k < end; ++k) find_nearest(k);
   }
   out.balance_weight = ArrayXd::Zero(n);
   for (int k = 0; k < n; k += kBalanceStep) {

@@ -52,7 +52,7 @@ class Run {
   Answer run() {
     answer_.extended = request_.model;
     std::vector<ExperimentData> runs;
-    drop_copies(request_.experiments, doubts_);
+    drop_copies(request_.experiments, implausible_);
     for (const SignalTable& table : request_.experiments) {
       steps_ = std::max(steps_, steps_of(table));
     }
@@ -72,14 +72,14 @@ class Run {
         out().notes.push_back(run.name + ": " + why_unusable(run));
       }
     }
-    drop_uneven_channels(runs, doubts_);
-    check_same_machine(runs, request_.model.variator, doubts_);
-    check_torques(runs, doubts_);
+    drop_uneven_channels(runs, implausible_);
+    check_same_machine(runs, request_.model.variator, implausible_);
+    check_torques(runs, implausible_);
     if (out().samples < kSamplesMin) {
       answer_.impossible = too_little();
       return std::move(answer_);
     }
-    check_friction(runs, request_.model.variator, doubts_);
+    check_friction(runs, request_.model.variator, implausible_);
     progress(0.1, "fit");
     Engine engine(make_campaign(std::move(runs), request_.model), request_.jobs);
     Naming naming = name_effects(engine, stop());
@@ -106,7 +106,7 @@ class Run {
 
   // With the note that most likely says why.
   std::string too_little() {
-    tell_doubts();
+    note_implausible();
     const std::vector<std::string>& notes = out().notes;
     const auto telling = std::find_if(notes.begin(), notes.end(), [](const std::string& note) {
       return note.find(": not used: ") != std::string::npos;
@@ -137,8 +137,8 @@ class Run {
     return "not used: never 1.6 s without gaps, shifts, saturation or run-away at an end stop";
   }
 
-  void tell_doubts() {
-    out().notes.insert(out().notes.end(), doubts_.notes.begin(), doubts_.notes.end());
+  void note_implausible() {
+    out().notes.insert(out().notes.end(), implausible_.notes.begin(), implausible_.notes.end());
   }
 
   void nothing_identifiable(const std::string& reason) {
@@ -201,7 +201,8 @@ class Run {
   }
 
   void learn_in_turn(Engine& engine, Naming& naming, Learning& out) {
-    const bool sensible = !doubts_.impossible && used_runs(engine.campaign()) >= kLearningRunsMin;
+    const bool sensible =
+        !implausible_.impossible && used_runs(engine.campaign()) >= kLearningRunsMin;
     for (int round = 0; round < kRoundsMax && sensible && !out.left.passed(); ++round) {
       Learning more = learn(engine, out.left, steps_, stop());
       out.needs_levels = more.needs_levels;
@@ -235,15 +236,15 @@ class Run {
       out().notes.emplace_back("stopped before the end: what is not named here may be there");
     }
     fill_machine(engine, naming);
-    check_fitted_friction(out().machine, doubts_);
-    tell_doubts();
+    check_fitted_friction(out().machine, implausible_);
+    note_implausible();
     fill_baseline(engine, naming);
     out().simulation = simulated_signals(campaign, naming.nominal.state);
     fill_not_identifiable(engine, naming);
-    if (doubts_.impossible) {
+    if (implausible_.impossible) {
       nothing_identifiable("the data cannot be of one belt as configured");
       out().verdict = Verdict::kUnexplained;
-      out().unexplained = doubts_.impossible;
+      out().unexplained = implausible_.impossible;
       return;
     }
     const std::size_t used = used_runs(campaign);
@@ -679,7 +680,7 @@ class Run {
 
   Request request_;
   Answer answer_;
-  Doubts doubts_;
+  Implausible implausible_;
   Steps steps_ = Steps::kFine;
   Reaches reached_{};  // by what is fitted and what is held out
 };
