@@ -63,7 +63,7 @@ PollLimits make_limits() {
 }
 
 // What one ECU has been sent.
-struct Seen {
+struct Counts {
   MonoTime request{-kSecond};
   MonoTime foreign{-10 * kSecond};
   std::array<MonoTime, 3> last{MonoTime{-kSecond}, MonoTime{-kSecond},
@@ -80,7 +80,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   FaultSet faults;
   TxGate gate({}, Control::kObserve, {}, make_limits());
   std::array<bool, kBusMax> up{true, true};
-  std::array<Seen, 2> seen;
+  std::array<Counts, 2> seen;
   const auto byte = [&]() -> std::uint8_t {
     return size == 0 ? std::uint8_t{0} : (--size, *data++);
   };
@@ -98,7 +98,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         require(gate.permits(frame, bus, next));
         require(frame.id == (bus == 0 ? can::CanId{0x7E1, false} : can::CanId{0x18DA10F1, true}));
         require(frame.length == 8 && !frame.fd && !frame.remote && !frame.error);
-        Seen& ecu = seen[bus];
+        Counts& ecu = seen[bus];
         require(next - ecu.foreign >= 5 * kSecond - kStep);
         if (frame.data[0] == 0x03) {
           require(frame.data[1] == 0x22);

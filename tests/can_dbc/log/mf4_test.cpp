@@ -89,11 +89,11 @@ class Mdf {
     return at;
   }
   std::uint64_t text(const std::string& text) { return block("TX", {}, text + '\0'); }
-  struct Place {
+  struct Position {
     unsigned type = 0, data_type = 0, bit = 0, byte = 0, bits = 8;
     std::uint64_t data = 0, conversion = 0;
   };
-  std::uint64_t channel(const std::string& name, const Place& place, std::uint64_t next = 0,
+  std::uint64_t channel(const std::string& name, const Position& place, std::uint64_t next = 0,
                         std::uint64_t parts = 0) {
     const std::uint64_t name_at = text(name);
     return block("CN", {next, parts, name_at, 0, place.conversion, place.data, 0, 0},

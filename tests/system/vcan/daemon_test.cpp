@@ -145,8 +145,8 @@ TEST_F(Daemon, ASecondOneWithOtherIdentifiersRuns) {
   const std::string path = folder() + "/other.toml";
   std::ofstream(path) << text;
   const Process second({program("beltgripd"), "--config", path});
-  EXPECT_TRUE(
-      bus.receive_until([](const SeenFrame& seen) { return seen.frame.can_id == 0x6B3; }, kLimit));
+  EXPECT_TRUE(bus.receive_until(
+      [](const ReceivedFrame& seen) { return seen.frame.can_id == 0x6B3; }, kLimit));
 }
 
 class StopSignal : public Daemon, public testing::WithParamInterface<int> {};
@@ -399,7 +399,8 @@ TEST_F(Daemon, BusOffIsAFaultUntilFramesComeAgain) {
 constexpr canid_t kOtherStatus = 0x6B3;
 
 bool sees(const BusSocket& bus, canid_t id) {
-  return bus.receive_until([&](const SeenFrame& seen) { return seen.frame.can_id == id; }, kLimit)
+  return bus
+      .receive_until([&](const ReceivedFrame& seen) { return seen.frame.can_id == id; }, kLimit)
       .has_value();
 }
 
@@ -447,7 +448,7 @@ TEST_F(Reloading, TakesWhatIsRightAndKeepsTheOldOtherwise) {
   EXPECT_TRUE(sees(after, kOtherStatus));
   const BusSocket later("vcan0");
   later.receive_until(
-      [](const SeenFrame& seen) {
+      [](const ReceivedFrame& seen) {
         EXPECT_NE(seen.frame.can_id, 0x6A3U);
         return seen.frame.can_id == kOtherStatus;
       },

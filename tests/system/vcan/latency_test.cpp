@@ -87,7 +87,7 @@ double calls_a_frame(pid_t pid, const std::string& folder, const BusSocket& bus)
   if (!strace.wait_for_error("attached", kLimit)) return 0.0;
   int frames = 0;
   bus.receive_until(
-      [&](const SeenFrame& frame) {
+      [&](const ReceivedFrame& frame) {
         const canid_t id = frame.frame.can_id;
         if (id == 0x110 || id == 0x120 || id == 0x130) ++frames;
         return frames >= kFrames;
@@ -130,7 +130,7 @@ TEST_P(Latency, FromSampleToFrame) {
   const Spent before_it = spent_by(daemon.pid());
   const auto begin = std::chrono::steady_clock::now();
   const auto seen = bus.receive_until(
-      [&](const SeenFrame& frame) {
+      [&](const ReceivedFrame& frame) {
         if (frame.frame.can_id == kSlip && !theirs_ns.empty()) ours_ns.push_back(frame.t_ns);
         if (frame.frame.can_id == kMinimal) theirs_ns.push_back(frame.t_ns);
         return ours_ns.size() >= wanted;

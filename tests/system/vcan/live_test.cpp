@@ -87,7 +87,7 @@ TEST_F(Live, ThePapersExperimentComesBackAsFrames) {
 
   Process player(canplayer(trace(), "vcan0"));
   std::int64_t first_ns = 0;  // of the trace on the bus
-  const auto over = [&](const SeenFrame& seen) {
+  const auto over = [&](const ReceivedFrame& seen) {
     if (first_ns == 0 && seen.frame.can_id == kRigSpeed) first_ns = seen.t_ns;
     return published.take(seen) && has_result(published) && !stop_is_set(published);
   };
@@ -169,7 +169,7 @@ TEST_F(Live, TheFlightRecordersRunIsReplayedByteByByte) {
   Process beltgripd(argv);
   PublishedFrames published;
   std::string live;
-  const auto take = [&](const SeenFrame& seen) {
+  const auto take = [&](const ReceivedFrame& seen) {
     if (seen.frame.can_id >= 0x6A0 && seen.frame.can_id <= 0x6A3) {
       live += std::to_string(seen.frame.can_id);
       for (int i = 0; i < seen.frame.len; ++i) live += ' ' + std::to_string(seen.frame.data[i]);
@@ -181,7 +181,7 @@ TEST_F(Live, TheFlightRecordersRunIsReplayedByteByByte) {
   ASSERT_TRUE(beltgripd.wait_for_error("recording to " + kept, kLimit)) << log_of(beltgripd);
   Process player(canplayer(trace(), "vcan0"));
   ASSERT_TRUE(bus.receive_until(
-      [&](const SeenFrame& seen) {
+      [&](const ReceivedFrame& seen) {
         if (!take(seen)) return false;
         const auto status = published.last("BeltGripStatus").signals;
         return !status.empty() && status.at("Outcome") != 0 && !stop_is_set(published);
@@ -244,7 +244,7 @@ TEST_F(Live, StrangersOnTheBusChangeNothing) {
   const Process load({"cangen", "vcan0", "-g", "2", "-I", "2AA", "-L", "8", "-D", "r"});
   Process player(canplayer(trace(), "vcan0"));
   std::size_t next = 0;
-  const auto result = [&](const SeenFrame& seen) {
+  const auto result = [&](const ReceivedFrame& seen) {
     if (seen.frame.can_id == kRigSpeed) {
       const auto& [id, data] = kStrangers[next++ % kStrangers.size()];
       stranger.send(id, data);

@@ -47,7 +47,7 @@ Published PublishedFrames::last(const std::string& message) const {
   return all.empty() ? Published{} : all.back();
 }
 
-bool PublishedFrames::take(const SeenFrame& seen) {
+bool PublishedFrames::take(const ReceivedFrame& seen) {
   const auto found = messages_.find(seen.frame.can_id);
   if (found == messages_.end()) return false;
   const auto& [id, message] = *found;

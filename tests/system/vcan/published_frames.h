@@ -24,7 +24,7 @@ class PublishedFrames {
   explicit PublishedFrames(Control control = Control::kObserve);
 
   // Frames in order of arrival; those of other nodes are passed over. True if it was one of ours.
-  bool take(const SeenFrame& seen);
+  bool take(const ReceivedFrame& seen);
   const std::vector<Published>& of(const std::string& message) const { return frames_.at(message); }
   // The last one, or none of its signals when there was none.
   Published last(const std::string& message) const;

@@ -8,8 +8,8 @@
 namespace beltgrip::test {
 namespace {
 
-SeenFrame frame(canid_t id, const std::vector<std::uint8_t>& data) {
-  SeenFrame seen;
+ReceivedFrame frame(canid_t id, const std::vector<std::uint8_t>& data) {
+  ReceivedFrame seen;
   seen.frame.can_id = id;
   seen.frame.len = static_cast<std::uint8_t>(data.size());
   std::copy(data.begin(), data.end(), seen.frame.data);

@@ -68,8 +68,8 @@ std::vector<std::string> canplayer(const std::string& log, const std::string& in
 bool listen(const BusSocket& bus, PublishedFrames& published,
             const std::function<bool(const PublishedFrames&)>& done, Milliseconds limit) {
   return bus
-      .receive_until([&](const SeenFrame& seen) { return published.take(seen) && done(published); },
-                     limit)
+      .receive_until(
+          [&](const ReceivedFrame& seen) { return published.take(seen) && done(published); }, limit)
       .has_value();
 }
 

@@ -49,7 +49,7 @@ class Ecu {
       if (seen) take(bus, *seen);
     }
   }
-  void take(const BusSocket& bus, const SeenFrame& seen) {
+  void take(const BusSocket& bus, const ReceivedFrame& seen) {
     const std::vector<std::uint8_t> bytes(seen.frame.data, seen.frame.data + seen.frame.len);
     if (seen.frame.can_id == kRequest && bytes == kPoll) {
       const int number = ++requests_;
@@ -211,10 +211,10 @@ TEST_F(Diagnostics, AnotherTesterHasTheRightOfWay) {
   tester.send(kRequest, {0x03, 0x22, 0xF1, 0x90});
   const auto sent = std::chrono::steady_clock::now();
   // What the daemon had sent before it saw the tester is still on its way here.
-  std::optional<SeenFrame> asked;
+  std::optional<ReceivedFrame> asked;
   do {
     asked = tester.receive_until(
-        [](const SeenFrame& seen) { return seen.frame.can_id == kRequest; }, kLimit);
+        [](const ReceivedFrame& seen) { return seen.frame.can_id == kRequest; }, kLimit);
     ASSERT_TRUE(asked.has_value());
   } while (std::chrono::steady_clock::now() - sent < Milliseconds{500});
   EXPECT_GE(std::chrono::steady_clock::now() - sent, Milliseconds{4900});

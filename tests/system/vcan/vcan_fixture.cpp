@@ -67,10 +67,10 @@ void BusSocket::send_fd(canid_t id, const std::vector<std::uint8_t>& data) const
   send_frame<canfd_frame>(fd_, id, data);
 }
 
-std::optional<SeenFrame> BusSocket::receive(Milliseconds limit) const {
+std::optional<ReceivedFrame> BusSocket::receive(Milliseconds limit) const {
   pollfd waiting{fd_, POLLIN, 0};
   if (poll(&waiting, 1, static_cast<int>(limit.count())) <= 0) return std::nullopt;
-  SeenFrame seen;
+  ReceivedFrame seen;
   iovec part{&seen.frame, sizeof seen.frame};
   alignas(cmsghdr) std::array<char, 256> control{};
   msghdr message{};
@@ -91,13 +91,13 @@ std::optional<SeenFrame> BusSocket::receive(Milliseconds limit) const {
   return seen;
 }
 
-std::optional<SeenFrame> BusSocket::receive_until(
-    const std::function<bool(const SeenFrame&)>& wanted, Milliseconds limit) const {
+std::optional<ReceivedFrame> BusSocket::receive_until(
+    const std::function<bool(const ReceivedFrame&)>& wanted, Milliseconds limit) const {
   const auto deadline = std::chrono::steady_clock::now() + limit;
   for (;;) {
     const auto left = std::chrono::ceil<Milliseconds>(deadline - std::chrono::steady_clock::now());
     if (left.count() <= 0) return std::nullopt;
-    const std::optional<SeenFrame> seen = receive(left);
+    const std::optional<ReceivedFrame> seen = receive(left);
     if (!seen || wanted(*seen)) return seen;
   }
 }

@@ -21,7 +21,7 @@ namespace beltgrip::test {
 // is busy).
 inline constexpr Milliseconds kLimit{300'000};
 
-struct SeenFrame {
+struct ReceivedFrame {
   std::int64_t t_ns = 0;  // receive stamp of the kernel, wall clock
   canfd_frame frame{};    // can_id with its flag bits
   bool fd = false;
@@ -38,10 +38,10 @@ class BusSocket {
   void send(canid_t id, const std::vector<std::uint8_t>& data) const;
   void send_fd(canid_t id, const std::vector<std::uint8_t>& data) const;
   // The next frame, or nothing within the limit or once the interface has gone down.
-  std::optional<SeenFrame> receive(Milliseconds limit) const;
+  std::optional<ReceivedFrame> receive(Milliseconds limit) const;
   // The first frame for which `wanted` holds; the frames before it are dropped.
-  std::optional<SeenFrame> receive_until(const std::function<bool(const SeenFrame&)>& wanted,
-                                         Milliseconds limit) const;
+  std::optional<ReceivedFrame> receive_until(
+      const std::function<bool(const ReceivedFrame&)>& wanted, Milliseconds limit) const;
 
  private:
   int fd_ = -1;

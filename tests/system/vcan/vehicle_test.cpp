@@ -120,7 +120,7 @@ TEST_F(Vehicle, OutlivesADaemonKilledAtAnyInstant) {
   const auto first = bus.receive(kLimit);
   ASSERT_TRUE(first.has_value());
   ASSERT_TRUE(bus.receive_until(
-      [&](const SeenFrame& seen) { return seen.t_ns > first->t_ns + 1500 * kMs; }, kLimit));
+      [&](const ReceivedFrame& seen) { return seen.t_ns > first->t_ns + 1500 * kMs; }, kLimit));
   const json truth = this->truth();
   expect_unharmed(truth);
   EXPECT_GE(truth.at("requests").size(), static_cast<std::size_t>(kills));

@@ -4,7 +4,7 @@
 
 namespace beltgrip::test {
 
-bool Watch::take(const SeenFrame& seen) {
+bool Watch::take(const ReceivedFrame& seen) {
   last_ns = seen.t_ns;
   return published.take(seen);
 }
@@ -18,7 +18,7 @@ bool Watch::until(const BusSocket& bus, const std::function<bool(const Watch&)>&
                   Milliseconds limit) {
   return bus
       .receive_until(
-          [&](const SeenFrame& seen) {
+          [&](const ReceivedFrame& seen) {
             take(seen);
             return done(*this);
           },

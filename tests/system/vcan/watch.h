@@ -16,7 +16,7 @@ struct Watch {
   PublishedFrames published{PublishedFrames::Control::kCommand};
   std::int64_t last_ns = 0;  // of any frame
 
-  bool take(const SeenFrame& seen);
+  bool take(const ReceivedFrame& seen);
   // The last value on the bus; 0 before the first.
   double clamp(const char* signal) const { return last("BeltGripClamp", signal); }
   double estimate(const char* signal) const { return last("BeltGripEstimate", signal); }

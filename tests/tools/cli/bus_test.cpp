@@ -60,7 +60,7 @@ TEST_F(Bus, ReplayPlaysALogAtItsOwnPace) {
   const RunResult result =
       beltgrip({"replay", folder() + "/x.log", "--bus", "vcan0", "--speed", "2"});
   EXPECT_EQ(result.status, 0) << result.err;
-  std::vector<SeenFrame> seen;
+  std::vector<ReceivedFrame> seen;
   while (const auto frame = bus.receive(Milliseconds{20})) seen.push_back(*frame);
   ASSERT_EQ(seen.size(), 3U);  // BeltGrip's own stays out
   EXPECT_EQ(seen[0].frame.can_id, 0x123U);

@@ -26,13 +26,13 @@ std::string drive_toml(bool pedal) {
   return text;
 }
 
-struct Told {
+struct Summary {
   std::vector<json> experiments;
   json summary;
 };
 
-Told told(const std::string& text) {
-  Told result;
+Summary summary_of(const std::string& text) {
+  Summary result;
   std::istringstream stream(text);
   for (std::string line; std::getline(stream, line);) {
     json each = json::parse(line);
@@ -105,11 +105,11 @@ Workplace* ReplayAsRecorded::place_ = nullptr;
 TEST_F(ReplayAsRecorded, SameExperimentsSameStopsSameValues) {
   for (const std::string drive : {"twice", "pedal"}) {
     for (const std::string config : {"twice/beltgrip.toml", "twice/resting.toml"}) {
-      const Told live = told(place_->read(drive + ".json"));
+      const Summary live = summary_of(place_->read(drive + ".json"));
       const RunResult run =
           replay({path(drive + "/trace.log"), "--config", path(config), "--json", "-"});
       ASSERT_EQ(run.status, 0) << run.err;
-      const Told found = told(run.out);
+      const Summary found = summary_of(run.out);
       EXPECT_NE(run.err.find("follow the 2 clamp requests"), std::string::npos) << run.err;
       EXPECT_EQ(found.summary.at("requests_followed"), 2);
       ASSERT_EQ(live.experiments.size(), 2u);
@@ -135,14 +135,14 @@ TEST_F(ReplayAsRecorded, SameExperimentsSameStopsSameValues) {
       }
     }
   }
-  EXPECT_EQ(told(place_->read("pedal.json")).experiments.at(1).at("stop_reason"), "driver");
+  EXPECT_EQ(summary_of(place_->read("pedal.json")).experiments.at(1).at("stop_reason"), "driver");
 }
 
 TEST_F(ReplayAsRecorded, DecidedAnewItAsksWhenItWouldNow) {
   const RunResult anew = replay({path("twice/trace.log"), "--config", path("twice/resting.toml"),
                                  "--decide-anew", "--json", "-"});
   ASSERT_EQ(anew.status, 0) << anew.err;
-  const Told found = told(anew.out);
+  const Summary found = summary_of(anew.out);
   EXPECT_EQ(found.experiments.size(), 0u);
   EXPECT_TRUE(found.summary.at("requests_followed").is_null());
   EXPECT_EQ(anew.err.find("as recorded"), std::string::npos);
@@ -151,16 +151,16 @@ TEST_F(ReplayAsRecorded, DecidedAnewItAsksWhenItWouldNow) {
 TEST_F(ReplayAsRecorded, ALogWithoutClampFramesIsDecidedAnew) {
   const std::string log = place_->read("twice/trace.log");
   const RunResult anew = replay_log(part(log, 0.0, 62.0, " 6A2#"));
-  EXPECT_TRUE(told(anew.out).summary.at("requests_followed").is_null());
-  EXPECT_EQ(told(anew.out).experiments.size(), 2u);
+  EXPECT_TRUE(summary_of(anew.out).summary.at("requests_followed").is_null());
+  EXPECT_EQ(summary_of(anew.out).experiments.size(), 2u);
   const RunResult none = replay_log(part(log, 0.0, 62.0, " 6A2#"), {"--as-recorded"});
-  EXPECT_EQ(told(none.out).summary.at("requests_followed"), 0);
-  EXPECT_EQ(told(none.out).experiments.size(), 0u) << none.out;
+  EXPECT_EQ(summary_of(none.out).summary.at("requests_followed"), 0);
+  EXPECT_EQ(summary_of(none.out).experiments.size(), 0u) << none.out;
 }
 
 TEST_F(ReplayAsRecorded, ARequestThatTheLogCutsOffEndsWithTheLog) {
   const RunResult run = replay_log(part(place_->read("twice/trace.log"), 0.0, 16.0));
-  const Told found = told(run.out);
+  const Summary found = summary_of(run.out);
   EXPECT_EQ(found.summary.at("requests_followed"), 1);
   ASSERT_EQ(found.experiments.size(), 1u) << run.out;
   EXPECT_EQ(found.experiments[0].at("stop_reason"), "trace_end");
@@ -170,7 +170,7 @@ TEST_F(ReplayAsRecorded, ARequestThatTheLogCutsOffEndsWithTheLog) {
 
 TEST_F(ReplayAsRecorded, ARequestWithoutItsBeginningIsNoExperiment) {
   const RunResult run = replay_log(part(place_->read("twice/trace.log"), 16.0, 62.0));
-  const Told found = told(run.out);
+  const Summary found = summary_of(run.out);
   EXPECT_EQ(found.summary.at("requests_followed"), 1);
   ASSERT_EQ(found.experiments.size(), 1u) << run.out;
   EXPECT_NEAR(found.experiments[0].at("start_s").get<double>(), begin_s(1), kSampleAndFrame_s);
@@ -180,7 +180,7 @@ TEST_F(ReplayAsRecorded, ARequestWithoutItsBeginningIsNoExperiment) {
 // A recorder that starts anew a moment before a request: nothing has settled yet.
 TEST_F(ReplayAsRecorded, ALogThatBeginsJustBeforeARequestHasItsExperiment) {
   const std::string log = part(place_->read("twice/trace.log"), 49.0, 62.0);
-  const Told found = told(replay_log(log).out);
+  const Summary found = summary_of(replay_log(log).out);
   ASSERT_EQ(found.experiments.size(), 1u);
   EXPECT_EQ(found.experiments[0].at("outcome"), "completed");
   EXPECT_NEAR(found.experiments[0].at("start_s").get<double>(), begin_s(1), kSampleAndFrame_s);
@@ -189,7 +189,8 @@ TEST_F(ReplayAsRecorded, ALogThatBeginsJustBeforeARequestHasItsExperiment) {
 // Nobody obeys a request for 50 ms after its last frame: there it ends, whatever comes later.
 TEST_F(ReplayAsRecorded, FramesThatFallSilentEndTheRequest) {
   const std::string log = place_->read("twice/trace.log");
-  const Told found = told(replay_log(part(log, 0.0, 15.0) + part(log, 15.0, 62.0, " 6A")).out);
+  const Summary found =
+      summary_of(replay_log(part(log, 0.0, 15.0) + part(log, 15.0, 62.0, " 6A")).out);
   ASSERT_EQ(found.experiments.size(), 1u);
   EXPECT_NEAR(found.experiments[0].at("start_s").get<double>() +
                   found.experiments[0].at("samples").get<double>() / 200.0,

@@ -34,12 +34,12 @@ struct Course {
   double end_s = 0.9;
 };
 
-struct Told {
+struct LagBounds {
   double least_s, most_s;
 };
 
 // Told of 0.06 + 0.15 s, and of the noise.
-Told told(const Actuator& actuator, const Course& course = {}, unsigned seed = 1) {
+LagBounds lag_bounds(const Actuator& actuator, const Course& course = {}, unsigned seed = 1) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   AnswerLag lag;
@@ -75,7 +75,7 @@ TEST(AnswerLag, IsFoundFromTheRestInAFall) {
   for (const double dead_s : {0.05, 0.1, 0.2, 0.3}) {
     for (const double lag_s : {0.1, 0.15, 0.2}) {
       const Actuator actuator{.dead_s = dead_s, .lag_s = lag_s, .noise_N = 5.0};
-      const Told now = told(actuator, {.rests_s = 0.6, .end_s = 1.4});
+      const LagBounds now = lag_bounds(actuator, {.rests_s = 0.6, .end_s = 1.4});
       const double truth_s = dead_s + lag_s;
       EXPECT_LT(now.least_s, truth_s + 0.04) << dead_s << ' ' << lag_s;
       EXPECT_GT(now.most_s, truth_s - 0.04) << dead_s << ' ' << lag_s;
@@ -88,17 +88,17 @@ TEST(AnswerLag, IsFoundFromTheRestInAFall) {
 // One that answers at once is known to, and one that has not answered at all no earlier than the
 // longest.
 TEST(AnswerLag, BeyondTheLagsThatAreTriedIsOpen) {
-  const Told quick = told({.dead_s = 0.0, .lag_s = 0.01, .noise_N = 5.0});
+  const LagBounds quick = lag_bounds({.dead_s = 0.0, .lag_s = 0.01, .noise_N = 5.0});
   EXPECT_EQ(quick.least_s, 0.0);
   EXPECT_LT(quick.most_s, 0.1);
-  const Told slow = told({.dead_s = 1.2, .noise_N = 5.0});
+  const LagBounds slow = lag_bounds({.dead_s = 1.2, .noise_N = 5.0});
   EXPECT_EQ(slow.most_s, kOpen);
 }
 
 TEST(AnswerLag, AnOffsetOfTheSensorIsNoLag) {
-  const Told right = told({});
+  const LagBounds right = lag_bounds({});
   for (const double offset_N : {-200.0, 200.0}) {
-    const Told off = told({.offset_N = offset_N});
+    const LagBounds off = lag_bounds({.offset_N = offset_N});
     EXPECT_NEAR(off.least_s, right.least_s, 2e-3) << offset_N;
     EXPECT_NEAR(off.most_s, right.most_s, 2e-3) << offset_N;
   }
@@ -108,18 +108,21 @@ TEST(AnswerLag, AnOffsetOfTheSensorIsNoLag) {
 // stays: 300 N higher, where 0.7 of them are possible.
 TEST(AnswerLag, AForceThatStaysHasNotAnswered) {
   for (double end_s = 0.85; end_s < 1.2; end_s += 0.05) {
-    EXPECT_EQ(told({.dead_s = 1.2, .noise_N = 10.0}, {.end_s = end_s}).most_s, kOpen) << end_s;
+    EXPECT_EQ(lag_bounds({.dead_s = 1.2, .noise_N = 10.0}, {.end_s = end_s}).most_s, kOpen)
+        << end_s;
   }
   for (const double offset_N : {-80.0, 80.0}) {
-    EXPECT_LT(told({.dead_s = 0.0, .lag_s = 0.01, .offset_N = offset_N, .noise_N = 1.0}).most_s,
-              0.1);
+    EXPECT_LT(
+        lag_bounds({.dead_s = 0.0, .lag_s = 0.01, .offset_N = offset_N, .noise_N = 1.0}).most_s,
+        0.1);
   }
-  EXPECT_EQ(told({.dead_s = 0.0, .lag_s = 0.01, .offset_N = 225.0, .noise_N = 1.0}).most_s, kOpen);
+  EXPECT_EQ(lag_bounds({.dead_s = 0.0, .lag_s = 0.01, .offset_N = 225.0, .noise_N = 1.0}).most_s,
+            kOpen);
 }
 
 TEST(AnswerLag, AGainOfTheSensorHardlyMatters) {
   for (const double gain : {0.95, 1.05}) {
-    const Told now = told({.gain = gain, .noise_N = 10.0});
+    const LagBounds now = lag_bounds({.gain = gain, .noise_N = 10.0});
     EXPECT_LT(now.least_s, 0.21) << gain;
     EXPECT_GT(now.most_s, 0.20) << gain;
     EXPECT_LT(now.most_s, 0.30) << gain;
@@ -128,18 +131,18 @@ TEST(AnswerLag, AGainOfTheSensorHardlyMatters) {
 
 // From 1.5 times 0.24 s on, with each second reading: before, noise alone tells.
 TEST(AnswerLag, SaysNothingAtOnce) {
-  EXPECT_EQ(told({}, {.end_s = 0.855}).most_s, kOpen);
-  EXPECT_NE(told({}, {.end_s = 0.87}).most_s, kOpen);
-  EXPECT_EQ(told({.every = 1}, {.end_s = 0.86}).most_s, kOpen);
-  EXPECT_NE(told({.every = 1}, {.end_s = 0.865}).most_s, kOpen);
-  EXPECT_EQ(told({.every = 90}, {.end_s = 0.9}).most_s, kOpen);  // one reading
+  EXPECT_EQ(lag_bounds({}, {.end_s = 0.855}).most_s, kOpen);
+  EXPECT_NE(lag_bounds({}, {.end_s = 0.87}).most_s, kOpen);
+  EXPECT_EQ(lag_bounds({.every = 1}, {.end_s = 0.86}).most_s, kOpen);
+  EXPECT_NE(lag_bounds({.every = 1}, {.end_s = 0.865}).most_s, kOpen);
+  EXPECT_EQ(lag_bounds({.every = 90}, {.end_s = 0.9}).most_s, kOpen);  // one reading
 }
 
 TEST(AnswerLag, APlainRampDoesNotTell) {
   for (double end_s = 0.5; end_s < 3.0; end_s += 0.1) {
     for (const double lag_s : {0.05, 0.15, 0.25}) {
       const Actuator actuator{.lag_s = lag_s, .offset_N = 150.0, .noise_N = 20.0};
-      const Told now = told(actuator, {.rests_s = 0.0, .end_s = end_s});
+      const LagBounds now = lag_bounds(actuator, {.rests_s = 0.0, .end_s = end_s});
       // The start of the ramp is not what readings are compared with.
       EXPECT_LT(now.least_s, lag_s + 0.06 + 0.02) << end_s << ' ' << lag_s;
       EXPECT_GT(now.most_s, lag_s + 0.06 - 0.02) << end_s << ' ' << lag_s;
@@ -163,9 +166,9 @@ TEST(AnswerLag, NoiseAndStepsWidenIt) {
     for (const double dead_s : {0.06, 0.375}) {
       int out = 0, wide = 0, mistaken = 0;
       for (unsigned seed = 1; seed <= kSeeds; ++seed) {
-        const Told now =
-            told({.dead_s = dead_s, .noise_N = c.noise_N, .step_N = c.step_N, .every = c.every},
-                 {.rests_s = 0.6, .creeps_N_per_s = c.creeps_N_per_s, .end_s = 1.3}, seed);
+        const LagBounds now = lag_bounds(
+            {.dead_s = dead_s, .noise_N = c.noise_N, .step_N = c.step_N, .every = c.every},
+            {.rests_s = 0.6, .creeps_N_per_s = c.creeps_N_per_s, .end_s = 1.3}, seed);
         const double truth_s = dead_s + 0.15;
         out += now.least_s > truth_s + 0.01 || now.most_s < truth_s - 0.01 ? 1 : 0;
         wide += now.most_s - now.least_s > c.width_s ? 1 : 0;

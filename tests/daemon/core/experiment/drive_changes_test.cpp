@@ -16,7 +16,7 @@ using estimator::StopReason;
 
 constexpr Duration kSample = 5 * kMillisecond;
 
-struct Told {
+struct Detected {
   Stop stop;
   double after_s = 0.0;
 };
@@ -29,7 +29,7 @@ struct Drive {
   double from_s = -3.0, to_s = 3.0;
 };
 
-std::optional<Told> told(const Drive& drive, unsigned seed = 1) {
+std::optional<Detected> detect(const Drive& drive, unsigned seed = 1) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   DriveChanges changes;
@@ -45,16 +45,16 @@ std::optional<Told> told(const Drive& drive, unsigned seed = 1) {
       now.torque_at = now.t;
     }
     // A request stands no sooner than some seconds after the daemon knows its inputs.
-    if (const Stop stop = changes.step(now); stop && i > from + 400) return Told{stop, t_s};
+    if (const Stop stop = changes.step(now); stop && i > from + 400) return Detected{stop, t_s};
   }
   return std::nullopt;
 }
 
 TEST(DriveChanges, APedalThatStepsIsToldAtOnce) {
   for (const double step : {0.035, 0.05, 0.2, -0.05}) {
-    const auto now = told({.pedal = [=](double t_s) { return 0.2 + (t_s >= 0.0 ? step : 0.0); },
-                           .pedal_noise = 1e-3,
-                           .torque_noise_Nm = 0.3});
+    const auto now = detect({.pedal = [=](double t_s) { return 0.2 + (t_s >= 0.0 ? step : 0.0); },
+                             .pedal_noise = 1e-3,
+                             .torque_noise_Nm = 0.3});
     ASSERT_TRUE(now) << step;
     EXPECT_EQ(now->stop.reason, StopReason::kDriver);
     EXPECT_EQ(now->stop.cause.role, Role::kAcceleratorPedal);
@@ -65,10 +65,10 @@ TEST(DriveChanges, APedalThatStepsIsToldAtOnce) {
 }
 
 TEST(DriveChanges, APedalThatIsHeldIsNoChange) {
-  EXPECT_FALSE(told({.pedal_noise = 5e-3}));
-  EXPECT_FALSE(told({.pedal = [](double t_s) { return t_s < 0.0 ? 0.2 : 0.229; }}));
+  EXPECT_FALSE(detect({.pedal_noise = 5e-3}));
+  EXPECT_FALSE(detect({.pedal = [](double t_s) { return t_s < 0.0 ? 0.2 : 0.229; }}));
   // A cruise control, by 2.5 points a second.
-  EXPECT_FALSE(told({.pedal = [](double t_s) { return 0.2 + 0.025 * std::max(0.0, t_s); }}));
+  EXPECT_FALSE(detect({.pedal = [](double t_s) { return 0.2 + 0.025 * std::max(0.0, t_s); }}));
 }
 
 // An engine that takes 0.12 s for it.
@@ -81,7 +81,7 @@ TEST(DriveChanges, ATorqueThatMovesIsToldSoon) {
     double step_Nm, within_s;
   };
   for (const Case& c : {Case{8.0, 0.11}, Case{11.0, 0.08}, Case{-11.0, 0.08}, Case{40.0, 0.04}}) {
-    const auto now = told({.torque_Nm = rises_by(c.step_Nm), .torque_noise_Nm = 0.3});
+    const auto now = detect({.torque_Nm = rises_by(c.step_Nm), .torque_noise_Nm = 0.3});
     ASSERT_TRUE(now) << c.step_Nm;
     EXPECT_EQ(now->stop.reason, StopReason::kTorque);
     EXPECT_FALSE(now->stop.cause.role);
@@ -95,9 +95,9 @@ TEST(DriveChanges, ATorqueThatMovesIsToldSoon) {
 TEST(DriveChanges, ATorqueThatDriftsIsNoChange) {
   for (const double torque_Nm : {45.0, -45.0}) {
     const auto drifts = [=](double rate_Nm_per_s) {
-      return told({.torque_Nm =
-                       [=](double t_s) { return torque_Nm + rate_Nm_per_s * std::max(0.0, t_s); },
-                   .to_s = 1.2})
+      return detect({.torque_Nm =
+                         [=](double t_s) { return torque_Nm + rate_Nm_per_s * std::max(0.0, t_s); },
+                     .to_s = 1.2})
           .has_value();
     };
     EXPECT_FALSE(drifts(4.0));
@@ -136,7 +136,7 @@ TEST(DriveChanges, NoiseIsNoChange) {
   int alarms = 0;
   for (unsigned seed = 1; seed <= 200; ++seed) {
     for (const double noise_Nm : {0.1, 0.5, 2.0, 5.0}) {
-      alarms += told({.torque_noise_Nm = noise_Nm, .from_s = -5.0, .to_s = 5.0}, seed) ? 1 : 0;
+      alarms += detect({.torque_noise_Nm = noise_Nm, .from_s = -5.0, .to_s = 5.0}, seed) ? 1 : 0;
     }
   }
   EXPECT_EQ(alarms, 0);

@@ -43,7 +43,7 @@ Config config() {
 // A bus with the four signals, and beside it what each has told: the account's own knowledge.
 class Bus {
  public:
-  struct Told {
+  struct Sent {
     MonoTime t{};
     double value = 0.0;
   };
@@ -56,8 +56,8 @@ class Bus {
     frame.data[0] = static_cast<std::uint8_t>(raw & 0xFF);
     frame.data[1] = static_cast<std::uint8_t>(raw >> 8 & 0xFF);
     EXPECT_EQ(monitor.on_frame({.t = t_, .frame = frame}, faults), FrameUse::kTaken);
-    told[signal].push_back({t_, raw * kSteps[signal]});
-    course[signal].add(t_, told[signal].back().value);
+    sent[signal].push_back({t_, raw * kSteps[signal]});
+    course[signal].add(t_, sent[signal].back().value);
   }
   void update() {
     faults = {};
@@ -66,12 +66,12 @@ class Bus {
   MonoTime t() const { return t_; }
   SignalQuality quality(std::size_t signal) const { return monitor.quality(kRoles[signal]); }
   bool heard(std::size_t signal) const {
-    return !told[signal].empty() && t_ - told[signal].back().t <= kSilence;
+    return !sent[signal].empty() && t_ - sent[signal].back().t <= kSilence;
   }
 
   InputMonitor monitor{config()};
   FaultSet faults;
-  std::array<std::vector<Told>, kSignals> told;
+  std::array<std::vector<Sent>, kSignals> sent;
   std::array<ValueCourse, kSignals> course{ValueCourse(0.1, true), ValueCourse(0.25, true),
                                            ValueCourse(0.1, true), ValueCourse(500.0, false)};
 
@@ -82,17 +82,17 @@ class Bus {
 // How far a signal has moved since then, less three deviations of its noise and one step; nothing
 // where it is silent or not known so far back, 128 values. Between two values it lies on a line.
 double moved(const Bus& bus, std::size_t signal, MonoTime since) {
-  const std::vector<Bus::Told>& told = bus.told[signal];
+  const std::vector<Bus::Sent>& sent = bus.sent[signal];
   if (!bus.heard(signal)) return 0.0;
-  std::size_t after = told.size() > 128 ? told.size() - 128 : 0;
-  if (told[after].t > since) return 0.0;
-  while (after + 1 < told.size() && told[after].t < since) ++after;
-  double then = told[after].value;
-  if (told[after].t > since) {
-    const Bus::Told &from = told[after - 1], &to = told[after];
+  std::size_t after = sent.size() > 128 ? sent.size() - 128 : 0;
+  if (sent[after].t > since) return 0.0;
+  while (after + 1 < sent.size() && sent[after].t < since) ++after;
+  double then = sent[after].value;
+  if (sent[after].t > since) {
+    const Bus::Sent &from = sent[after - 1], &to = sent[after];
     then = std::lerp(from.value, to.value, fraction(since - from.t, to.t - from.t));
   }
-  const double by = told.back().value - then;
+  const double by = sent.back().value - then;
   const double sure =
       std::abs(by) - 3.0 * bus.course[signal].noise() - bus.course[signal].resolution();
   if (sure <= 0.0) return 0.0;
@@ -158,13 +158,13 @@ void drive(std::mt19937_64& random, Counts& counts) {
   for (int i = 0; i < 270; ++i) {
     bus.tick();
     const bool event = i >= 150 && i < 240;
-    if (i == 240) value[still] = bus.told[still].back().value;
+    if (i == 240) value[still] = bus.sent[still].back().value;
     for (std::size_t each = 0; each < kSignals; ++each) {
       if (event) value[each] += slope[each];
       if (event && each == silent) continue;
       const bool same = event && each == still;
       bus.send(each,
-               same ? bus.told[each].back().value : value[each] + noise[each] * normal(random));
+               same ? bus.sent[each].back().value : value[each] + noise[each] * normal(random));
     }
     bus.update();
     std::array<bool, kSignals> found{};

@@ -31,7 +31,8 @@ void Drive::exchange() {
   const auto due = start_ + ticks() * kTick;
   for (;;) {
     const auto left = std::chrono::ceil<test::Milliseconds>(due - Clock::now());
-    const std::optional<test::SeenFrame> seen = bus_.receive(std::max(left, test::Milliseconds{0}));
+    const std::optional<test::ReceivedFrame> seen =
+        bus_.receive(std::max(left, test::Milliseconds{0}));
     if (seen) hear(seen->frame.can_id, Bytes(seen->frame.data, seen->frame.data + seen->frame.len));
     if (!seen && Clock::now() >= due) break;
   }
