@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "estimator/statistics/order.h"
+#include "tools/diagnose/infer/foot_points.h"
 #include "tools/diagnose/model/curve_family.h"
 
 namespace beltgrip::diagnose {
@@ -50,74 +51,35 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
   out.slope = ArrayXd::Zero(n);
   out.model_Nm = ArrayXd::Zero(n);
   out.weight = ArrayXd::Zero(n);
-  const double slip_variance =
-      campaign.slip_noise_share_of(run) * campaign.slip_noise_share_of(run);
-  const double slip_weight = 1.0 / slip_variance;
+  const double slip_variance = campaign.slip_noise_share_of(run) * campaign.slip_noise_share_of(run);
   const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
-  const std::array<double, kStops> peak_slip_share{std::exp(q.ln_peak_slip[0]),
-                                                   std::exp(q.ln_peak_slip[1])};
-  // What the mean of the curve over a sample is more than the curve at the mean slip, Nm.
-  const auto bend_Nm = [&](int k, const CurveShape& shape, double per_peak) {
-    constexpr double kStep = 0.05;    // in slips at the peak
-    constexpr double kLeast = 1e-10;  // squared shares: less is nothing on the steepest curve
-    const double spread = data.slip_spread_share2[k];
-    if (spread < kLeast) return 0.0;
-    const double x = q.slip_share[k] * per_peak;
-    const double bend =
-        (shape.evaluate(x + kStep).slope - shape.evaluate(x - kStep).slope) / (2.0 * kStep);
-    return 0.5 * q.capacity[k] * bend * spread * per_peak * per_peak;
-  };
-  const auto find_nearest = [&](int k) {
-    const auto stop = static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)]);
-    const double peak = peak_slip_share[stop], per_peak = 1.0 / peak;
-    const double capacity = q.capacity[k];
-    const double torque_Nm = q.belt_torque[k] - bend_Nm(k, curve[stop], per_peak);
-    const double carried_Nm = q.belt_torque[k] * campaign.noise.force_N / q.force_N[k];
-    const double torque_variance = sensor_variance + carried_Nm * carried_Nm;
-    const double torque_weight = 1.0 / torque_variance;
-    // Foot point: Gauss-Newton, halved while the distance would grow.
-    struct CurvePoint {
-      double x = 0.0, model_Nm = 0.0, slope = 0.0, distance = 0.0;
-    };
-    const auto at = [&](double x) -> CurvePoint {
-      const CurveShape::Point point = curve[stop].evaluate(x);
-      const double model_Nm = capacity * point.value;
-      const double gap_slip_share = q.slip_share[k] - x * peak;
-      const double gap_Nm = torque_Nm - model_Nm;
-      return {x, model_Nm, capacity * point.slope * per_peak,
-              gap_slip_share * gap_slip_share * slip_weight + gap_Nm * gap_Nm * torque_weight};
-    };
-    CurvePoint foot = at(q.slip_share[k] * per_peak);
-    // Right of the rising branch the next point of the curve may lie on it, at the same torque:
-    // from beyond the peak no small steps lead there.
-    if (const double rising = nominal_inverse(torque_Nm / capacity); std::isfinite(rising)) {
-      if (const CurvePoint there = at(rising); there.distance < foot.distance) foot = there;
-    }
-    for (int i = 0; i < 12; ++i) {
-      const double gap_slip_share = q.slip_share[k] - foot.x * peak;
-      const double gap_Nm = torque_Nm - foot.model_Nm;
-      double step = (gap_slip_share * slip_weight + foot.slope * gap_Nm * torque_weight) /
-                    ((slip_weight + foot.slope * foot.slope * torque_weight) * peak);
-      step = std::clamp(step, -0.5, 0.5);
-      const double before = foot.x;
-      for (int halving = 0; halving < 6; ++halving, step *= 0.4) {
-        if (const CurvePoint there = at(before + step); there.distance <= foot.distance) {
-          foot = there;
-          break;
-        }
-      }
-      if (std::abs(foot.x - before) < 1e-5) break;  // the distance is flat there
-    }
-    out.foot[k] = foot.x;
-    out.slope[k] = foot.slope;
-    out.model_Nm[k] = foot.model_Nm;
-    out.weight[k] = 1.0 / std::sqrt(torque_variance + foot.slope * foot.slope * slip_variance);
-    out.value[kFrictionResidual][k] =
-        (torque_Nm - foot.model_Nm - foot.slope * (q.slip_share[k] - foot.x * peak)) *
-        out.weight[k];
-  };
+  std::array<std::vector<int>, kStops> at_stop;  // samples
   for (const auto& [begin, end] : data.stretches) {
-    for (int k = begin; k < end; ++k) find_nearest(k);
+    for (int k = begin; k < end; ++k) {
+      at_stop[static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)])].push_back(k);
+    }
+  }
+  for (std::size_t stop = 0; stop < kStops; ++stop) {
+    const std::vector<int>& all = at_stop[stop];
+    for (std::size_t first = 0; first < all.size(); first += FootBatch::kMost) {
+      const auto samples =
+          std::span(all).subspan(first, std::min(FootBatch::kMost, all.size() - first));
+      FootBatch batch(curve[stop], std::exp(q.ln_peak_slip[stop]), slip_variance);
+      for (const int k : samples) {
+        const double carried_Nm = q.belt_torque[k] * campaign.noise.force_N / q.force_N[k];
+        batch.add(q.slip_share[k], q.belt_torque[k], q.capacity[k], data.slip_spread_share2[k],
+                  sensor_variance + carried_Nm * carried_Nm);
+      }
+      batch.find();
+      for (std::size_t i = 0; i < samples.size(); ++i) {
+        const int k = samples[i];
+        out.foot[k] = batch.x(i);
+        out.slope[k] = batch.slope(i);
+        out.model_Nm[k] = batch.model_Nm(i);
+        out.weight[k] = batch.weight(i);
+        out.value[kFrictionResidual][k] = batch.value(i);
+      }
+    }
   }
   out.balance_weight = ArrayXd::Zero(n);
   for (int k = 0; k < n; k += kBalanceStep) {

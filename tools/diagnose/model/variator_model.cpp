@@ -86,15 +86,10 @@ double fall_function(double x) {
   return beyond <= 0.0 ? 0.0 : -beyond * beyond / (0.3 + beyond);
 }
 
-double nominal_inverse(double value) {
-  // Against the root of what the peak is away by it is smooth, also at the peak: cubics.
-  constexpr int kRoots = 64;
-  struct Point {
-    double x, step;  // change of x over one step of the table
-  };
-  static const std::array<Point, kRoots + 1> kTable = [] {
+const NominalInverse::Points& NominalInverse::points() {
+  static const Points kPoints = [] {
     const double stiffness = std::tan(std::numbers::pi / (2.0 * kBend));
-    std::array<Point, kRoots + 1> table{};
+    Points table{};
     for (std::size_t i = 0; i < table.size(); ++i) {
       const double root = static_cast<double>(i) / kRoots;
       const double x = std::tan(std::asin(1.0 - root * root) / kBend) / stiffness;
@@ -105,12 +100,18 @@ double nominal_inverse(double value) {
     }
     return table;
   }();
+  return kPoints;
+}
+
+double nominal_inverse(double value) {
+  constexpr int kRoots = NominalInverse::kRoots;
+  const NominalInverse::Points& points = NominalInverse::points();
   const double size = std::abs(value);
   if (!(size < 1.0)) return std::numeric_limits<double>::quiet_NaN();
   const double at = std::sqrt(1.0 - size) * kRoots;
   const auto i = std::min(static_cast<std::size_t>(at), std::size_t{kRoots - 1});
   const double u = at - static_cast<double>(i);
-  const Point &a = kTable[i], &b = kTable[i + 1];
+  const NominalInverse::Point &a = points[i], &b = points[i + 1];
   const double rise = b.x - a.x;
   const double x =
       a.x +

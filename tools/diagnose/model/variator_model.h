@@ -118,7 +118,8 @@ constexpr int end_of_knot(int knot) { return knot < kKnotsBelowPeak ? knot + 1 :
 
 // g(x), x = slip / slip at the peak, odd; nominal: sin(1.3 atan(B x)), peak 1 at x = 1; departure:
 // cubic through the knots; fall: beyond the peak.
-// Evaluated millions of times: the nominal curve stands in a table.
+// Evaluated millions of times: the nominal curve stands in a table. Many points of one curve at
+// once: curve_lanes.h.
 class CurveShape {
  public:
   CurveShape() = default;
@@ -158,6 +159,8 @@ class CurveShape {
 
  private:
   friend CurvePlace place_on_curve(double x);
+  template <typename Lanes>
+  friend class CurveLanes;
   // Ends of the intervals of the cubic: 0, the knots below the peak, the peak, the knots beyond it.
   static constexpr int kEnds = kShapeKnots + 2;
   static constexpr int kPeakEnd = kKnotsBelowPeak + 1;
@@ -192,7 +195,17 @@ class CurveShape {
   Cubics cubic_{};                // per interval, from its left end
   double fall_ = 0.0;
 };
-// Where the nominal curve, before its peak, has this value; NaN beyond.
+// Where the nominal curve, before its peak, has this value; NaN beyond. Against the root of what
+// the peak is away by it is smooth, also at the peak: cubics.
+class NominalInverse {
+ public:
+  static constexpr int kRoots = 64;
+  struct Point {
+    double x, step;  // change of x over one step of the table
+  };
+  using Points = std::array<Point, kRoots + 1>;
+  static const Points& points();
+};
 double nominal_inverse(double value);
 double fall_function(double x);  // d g / d fall, x >= 0
 

@@ -1,0 +1,281 @@
+// No function takes or gives lanes once all is inline: there is no calling convention to change.
+#pragma GCC diagnostic ignored "-Wpsabi"
+#include "tools/diagnose/infer/foot_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "tools/diagnose/model/curve_lanes.h"
+
+namespace beltgrip::diagnose {
+
+namespace {
+constexpr double kStepMost = 0.5;  // in slips at the peak
+constexpr double kShorter = 0.4;   // times, where the distance would grow
+constexpr double kNoStep = 1e-5;   // the distance is flat there
+constexpr int kIterations = 12, kHalvings = 6;
+constexpr double kBendStep = 0.05;      // in slips at the peak
+constexpr double kSpreadLeast = 1e-10;  // squared shares: less is nothing on the steepest curve
+}  // namespace
+
+void FootBatch::find_one(std::size_t i) {
+  const double slip = slip_[i], capacity_Nm = capacity_Nm_[i];
+  const double torque_weight = 1.0 / torque_variance_[i];
+  // What the mean of the curve over a sample is more than the curve at the mean slip, Nm.
+  double bend_Nm = 0.0;
+  if (!(slip_spread_[i] < kSpreadLeast)) {
+    const double x = slip * per_peak_;
+    const double bend =
+        (curve_.evaluate(x + kBendStep).slope - curve_.evaluate(x - kBendStep).slope) /
+        (2.0 * kBendStep);
+    bend_Nm = 0.5 * capacity_Nm * bend * slip_spread_[i] * per_peak_ * per_peak_;
+  }
+  const double torque_Nm = torque_Nm_[i] - bend_Nm;
+  struct Place {
+    double x = 0.0, model_Nm = 0.0, slope = 0.0, distance = 0.0;
+  };
+  const auto at = [&](double x) -> Place {
+    const CurveShape::Point point = curve_.evaluate(x);
+    const double model_Nm = capacity_Nm * point.value;
+    const double gap_slip = slip - x * peak_;
+    const double gap_Nm = torque_Nm - model_Nm;
+    return {x, model_Nm, capacity_Nm * point.slope * per_peak_,
+            gap_slip * gap_slip * slip_weight_ + gap_Nm * gap_Nm * torque_weight};
+  };
+  Place foot = at(slip * per_peak_);
+  // Right of the rising branch the next point of the curve may lie on it, at the same torque:
+  // from beyond the peak no small steps lead there.
+  if (const double rising = nominal_inverse(torque_Nm / capacity_Nm); std::isfinite(rising)) {
+    if (const Place there = at(rising); there.distance < foot.distance) foot = there;
+  }
+  // Gauss-Newton, the step shortened while the distance would grow.
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    const double gap_slip = slip - foot.x * peak_;
+    const double gap_Nm = torque_Nm - foot.model_Nm;
+    double step = (gap_slip * slip_weight_ + foot.slope * gap_Nm * torque_weight) /
+                  ((slip_weight_ + foot.slope * foot.slope * torque_weight) * peak_);
+    step = std::clamp(step, -kStepMost, kStepMost);
+    const double before = foot.x;
+    for (int halving = 0; halving < kHalvings; ++halving, step *= kShorter) {
+      if (const Place there = at(before + step); there.distance <= foot.distance) {
+        foot = there;
+        break;
+      }
+    }
+    if (std::abs(foot.x - before) < kNoStep) break;
+  }
+  x_[i] = foot.x;
+  model_Nm_[i] = foot.model_Nm;
+  slope_[i] = foot.slope;
+  weight_[i] = 1.0 / std::sqrt(torque_variance_[i] + foot.slope * foot.slope * slip_variance_);
+  value_[i] = (torque_Nm - foot.model_Nm - foot.slope * (slip - foot.x * peak_)) * weight_[i];
+}
+
+void FootBatch::find_simply() {
+  for (std::size_t i = 0; i < count_; ++i) find_one(i);
+}
+
+// The same in lanes, for all samples of a batch. Those that are still searched for stand together
+// at the front.
+template <typename Lanes>
+class FootSearch {
+ public:
+  using Curve = CurveLanes<Lanes>;
+  using Value = typename Curve::Value;
+  using Mask = typename Curve::Mask;
+  static constexpr std::size_t kCount = Curve::kCount;
+  static constexpr std::size_t kMost = FootBatch::kMost;
+
+  BELTGRIP_LANES explicit FootSearch(FootBatch& batch) : batch_(batch), curve_(batch.curve_) {}
+
+  BELTGRIP_LANES void run() {
+    for (std::size_t i = batch_.count_; i % kCount != 0; ++i) fill_up(i);
+    for (std::size_t i = 0; i < batch_.count_; i += kCount) begin(i);
+    std::size_t left = batch_.count_;
+    for (std::size_t i = 0; i < left; ++i) sample_[i] = i;
+    while (left > 0) {
+      for (std::size_t i = 0; i < left; i += kCount) step(i);
+      for (std::size_t i = left; i-- > 0;) {
+        if (!ends_[i]) continue;
+        take(i);
+        move(--left, i);
+      }
+    }
+    for (std::size_t i = 0; i < batch_.count_; i += kCount) weigh(i);
+    for (std::size_t i = 0; i < batch_.count_; ++i) {
+      if (is_odd_[i]) batch_.find_one(i);
+    }
+  }
+
+ private:
+  using Column = FootBatch::Column;
+  using Flags = std::array<std::int64_t, kMost>;
+
+  BELTGRIP_LANES static Value load(const Column& from, std::size_t i) {
+    Value out;
+    std::memcpy(&out, from.data() + i, sizeof out);
+    return out;
+  }
+  BELTGRIP_LANES static void store(Value value, Column& to, std::size_t i) {
+    std::memcpy(to.data() + i, &value, sizeof value);
+  }
+  BELTGRIP_LANES static void store(Mask value, Flags& to, std::size_t i) {
+    std::memcpy(to.data() + i, &value, sizeof value);
+  }
+
+  // Behind the last sample: lanes that are counted nowhere.
+  BELTGRIP_LANES void fill_up(std::size_t i) {
+    batch_.slip_[i] = batch_.torque_Nm_[i] = batch_.slip_spread_[i] = 0.0;
+    batch_.capacity_Nm_[i] = batch_.torque_variance_[i] = 1.0;
+  }
+
+  struct Sample {
+    Value slip, torque_Nm, capacity_Nm, torque_weight;
+  };
+  struct Place {
+    Value x, model_Nm, slope, distance;
+  };
+  BELTGRIP_LANES Place at(const Sample& sample, Value x) const {
+    const typename Curve::Point point = curve_.evaluate(x);
+    const Value model_Nm = sample.capacity_Nm * point.value;
+    const Value gap_slip = sample.slip - x * batch_.peak_;
+    const Value gap_Nm = sample.torque_Nm - model_Nm;
+    return {x, model_Nm, sample.capacity_Nm * point.slope * batch_.per_peak_,
+            gap_slip * gap_slip * batch_.slip_weight_ + gap_Nm * gap_Nm * sample.torque_weight};
+  }
+  BELTGRIP_LANES static Place chosen(Mask first, const Place& a, const Place& b) {
+    return {first ? a.x : b.x, first ? a.model_Nm : b.model_Nm, first ? a.slope : b.slope,
+            first ? a.distance : b.distance};
+  }
+  BELTGRIP_LANES Value step_from(const Sample& sample, const Place& foot) const {
+    const double weight = batch_.slip_weight_;
+    const Value gap_slip = sample.slip - foot.x * batch_.peak_;
+    const Value gap_Nm = sample.torque_Nm - foot.model_Nm;
+    const Value step = (gap_slip * weight + foot.slope * gap_Nm * sample.torque_weight) /
+                       ((weight + foot.slope * foot.slope * sample.torque_weight) * batch_.peak_);
+    const Value least = Value{} - kStepMost, most = Value{} + kStepMost;
+    return step < least ? least : step > most ? most : step;
+  }
+
+  BELTGRIP_LANES void begin(std::size_t i) {
+    const Value capacity_Nm = load(batch_.capacity_Nm_, i), spread = load(batch_.slip_spread_, i);
+    Sample sample{load(batch_.slip_, i), load(batch_.torque_Nm_, i), capacity_Nm,
+                  1.0 / load(batch_.torque_variance_, i)};
+    const Value x = sample.slip * batch_.per_peak_;
+    const Value above = x + kBendStep, below = x - kBendStep;
+    const Value bend =
+        (curve_.evaluate(above).slope - curve_.evaluate(below).slope) / (2.0 * kBendStep);
+    const Value bend_Nm = 0.5 * capacity_Nm * bend * spread * batch_.per_peak_ * batch_.per_peak_;
+    sample.torque_Nm -= spread < kSpreadLeast ? Value{} : bend_Nm;
+    const Place here = at(sample, x);
+    const Value height = sample.torque_Nm / capacity_Nm;
+    const Value rising = curve_.nominal_inverse(height);
+    const Place there = at(sample, rising);
+    const Mask is_nearer = Curve::has_inverse(height) & (there.distance < here.distance);
+    const Place foot = chosen(is_nearer, there, here);
+    store(Curve::is_beyond(x) | Curve::is_beyond(above) | Curve::is_beyond(below), is_odd_, i);
+    store(sample.slip, slip_, i);
+    store(sample.torque_Nm, torque_Nm_, i);
+    store(sample.torque_Nm, level_Nm_, i);
+    store(sample.capacity_Nm, capacity_Nm_, i);
+    store(sample.torque_weight, torque_weight_, i);
+    keep(foot, i);
+    store(step_from(sample, foot), step_, i);
+    store(Value{}, halvings_, i);
+    store(Value{}, iterations_, i);
+  }
+
+  BELTGRIP_LANES void keep(const Place& foot, std::size_t i) {
+    store(foot.x, x_, i);
+    store(foot.model_Nm, model_Nm_, i);
+    store(foot.slope, slope_, i);
+    store(foot.distance, distance_, i);
+  }
+
+  BELTGRIP_LANES void step(std::size_t i) {
+    const Sample sample{load(slip_, i), load(torque_Nm_, i), load(capacity_Nm_, i),
+                        load(torque_weight_, i)};
+    const Place before{load(x_, i), load(model_Nm_, i), load(slope_, i), load(distance_, i)};
+    const Value tried = load(step_, i);
+    const Place there = at(sample, before.x + tried);
+    const Mask is_nearer = there.distance <= before.distance;
+    const Place foot = chosen(is_nearer, there, before);
+    const Value halvings = load(halvings_, i) + 1.0;
+    const Mask turns = is_nearer | (halvings == static_cast<double>(kHalvings));
+    const Value iterations = load(iterations_, i) + (turns ? Value{} + 1.0 : Value{});
+    const Mask is_flat = Curve::size_of(foot.x - before.x) < kNoStep;
+    const Mask is_beyond = Curve::is_beyond(there.x);
+    store((turns & (is_flat | (iterations == static_cast<double>(kIterations)))) | is_beyond, ends_,
+          i);
+    store(is_beyond, is_beyond_, i);
+    keep(foot, i);
+    store(turns ? step_from(sample, foot) : tried * kShorter, step_, i);
+    store(turns ? Value{} : halvings, halvings_, i);
+    store(iterations, iterations_, i);
+  }
+
+  BELTGRIP_LANES void take(std::size_t i) {
+    const std::size_t sample = sample_[i];
+    batch_.x_[sample] = x_[i];
+    batch_.model_Nm_[sample] = model_Nm_[i];
+    batch_.slope_[sample] = slope_[i];
+    is_odd_[sample] |= is_beyond_[i];
+  }
+  BELTGRIP_LANES void move(std::size_t from, std::size_t to) {
+    const auto each = [&](Column& column)
+                          BELTGRIP_INLINE { column.data()[to] = column.data()[from]; };
+    each(slip_), each(torque_Nm_), each(capacity_Nm_), each(torque_weight_);
+    each(x_), each(model_Nm_), each(slope_), each(distance_);
+    each(step_), each(halvings_), each(iterations_);
+    sample_[to] = sample_[from];
+  }
+
+  BELTGRIP_LANES void weigh(std::size_t i) {
+    const Value slope = load(batch_.slope_, i);
+    const Value noise =
+        Curve::root(load(batch_.torque_variance_, i) + slope * slope * batch_.slip_variance_);
+    const Value weight = 1.0 / noise;
+    const Value value = (load(level_Nm_, i) - load(batch_.model_Nm_, i) -
+                         slope * (load(batch_.slip_, i) - load(batch_.x_, i) * batch_.peak_)) *
+                        weight;
+    store(weight, batch_.weight_, i);
+    store(value, batch_.value_, i);
+  }
+
+  FootBatch& batch_;
+  Curve curve_;
+  alignas(64) Column slip_, torque_Nm_, capacity_Nm_, torque_weight_;
+  alignas(64) Column x_, model_Nm_, slope_, distance_, step_, halvings_, iterations_;
+  alignas(64) Flags ends_, is_beyond_;
+  std::array<std::size_t, kMost> sample_;
+  // By sample: its torque less the bend; the search left the table.
+  alignas(64) Column level_Nm_;
+  alignas(64) Flags is_odd_;
+};
+
+namespace {
+void find_by_two(FootBatch& batch) { FootSearch<LanesOf<2>>(batch).run(); }
+#if defined(__x86_64__)
+[[gnu::target("avx2")]] void find_by_four(FootBatch& batch) { FootSearch<LanesOf<4>>(batch).run(); }
+bool has_four() { return __builtin_cpu_supports("avx2") != 0; }
+#else
+void find_by_four(FootBatch& batch) { find_by_two(batch); }
+bool has_four() { return false; }
+#endif
+}  // namespace
+
+void FootBatch::find() {
+  static const bool kHasFour = has_four();
+  if (!CurveLanes<LanesOf<2>>::can(curve_)) {
+    find_simply();
+  } else if (kHasFour) {
+    find_by_four(*this);
+  } else {
+    find_in_pairs();
+  }
+}
+
+void FootBatch::find_in_pairs() { find_by_two(*this); }
+
+}  // namespace beltgrip::diagnose
