@@ -300,7 +300,11 @@ Summary summary_of(const Campaign& campaign, int run, const RawColumns& raw,
     const auto rows = block.rows.leftCols(count);
     out.samples += static_cast<int>(block.rows.rows());
     // A signal that never moves leaves a block without columns: nothing to add.
-    if (!effects.empty()) out.uu(effects, effects) += random.transpose() * random;
+    if (!effects.empty() && raw.with_random) {
+      out.uu(effects, effects) += random.transpose() * random;
+    } else if (!effects.empty()) {
+      out.uu(effects, effects) += whitening.random_products[static_cast<std::size_t>(run)][i];
+    }
     if (columns.empty()) continue;
     MatrixXd aa = MatrixXd::Zero(count, count);
     aa.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
@@ -573,6 +577,10 @@ Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>&
     RawColumns random;
     random.columns.assign(raw[e].columns.end() - kRandomEffects, raw[e].columns.end());
     out.random.push_back(whitened(campaign, static_cast<int>(e), random, out));
+    std::vector<MatrixXd>& products = out.random_products.emplace_back();
+    for (const WhiteBlock& block : out.random.back()) {
+      products.push_back(block.rows.transpose() * block.rows);
+    }
   }
   return out;
 }

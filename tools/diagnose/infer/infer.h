@@ -36,6 +36,7 @@ struct Whitening {
   // Columns of the random effects per experiment, whitened; the same for all hypotheses. Empty:
   // from the state at hand.
   std::vector<std::vector<WhiteBlock>> random;
+  std::vector<std::vector<Eigen::MatrixXd>> random_products;  // of these columns with each other
 };
 
 // Whitened normal equations of one experiment. Columns: parameters asked for, then the residual.
