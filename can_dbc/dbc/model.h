@@ -62,7 +62,7 @@ struct SignalDef {
 struct SignalGroup {
   Text name;
   std::uint64_t repetitions = 1;
-  std::vector<Text> signals;
+  List<Text> signals;
 };
 
 struct MessageDef {
@@ -76,9 +76,9 @@ struct MessageDef {
   ShortText comment;
   std::vector<SignalDef> signals;
   Attributes attributes;
-  ShortText short_name;       // as in SignalDef
-  std::vector<Text> senders;  // further transmitters (BO_TX_BU_)
-  std::vector<SignalGroup> groups;
+  ShortText short_name;  // as in SignalDef
+  List<Text> senders;    // further transmitters (BO_TX_BU_)
+  List<SignalGroup> groups;
 
   const SignalDef* find_signal(std::string_view signal_name) const;
 };

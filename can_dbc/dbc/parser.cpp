@@ -1137,11 +1137,13 @@ bool StatementReader::signal_group() {
   }
   if (!expect(':', "\":\"")) return false;
   reference.group.name = draft_.utf8(name);
-  names_until_semicolon(reference.group.signals);
+  std::vector<Text> signals;
+  names_until_semicolon(signals);
+  reference.group.signals = draft_.arena().list(signals);
   expect_semicolon();
   reference.offset = start_;
   reference.end = scan_.position();
-  draft_.groups.push_back(std::move(reference));
+  draft_.groups.push_back(reference);
   return true;
 }
 

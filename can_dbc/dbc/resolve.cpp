@@ -480,16 +480,23 @@ void Resolver::value_types() {
 }
 
 void Resolver::senders() {
-  for (SendersRef& reference : draft_.senders) {
-    for_messages(reference, [&](MessageDef& message) {
-      message.senders.insert(message.senders.end(), reference.senders.begin(),
-                             reference.senders.end());
-    });
+  Gathered<MessageDef, const SendersRef*> said(draft_.senders.size());
+  for (const SendersRef& reference : draft_.senders) {
+    for_messages(reference, [&](MessageDef& message) { said.add(&message, &reference); });
   }
+  std::vector<Text> all;
+  said.give([&](MessageDef& message, const std::vector<const SendersRef*>& references) {
+    all.clear();
+    for (const SendersRef* each : references) {
+      all.insert(all.end(), each->senders.begin(), each->senders.end());
+    }
+    message.senders = draft_.arena().list(all);
+  });
 }
 
 void Resolver::groups() {
-  for (GroupRef& reference : draft_.groups) {
+  Gathered<MessageDef, SignalGroup> said(draft_.groups.size());
+  for (const GroupRef& reference : draft_.groups) {
     for_messages(reference, [&](MessageDef& message) {
       for (const Text name : reference.group.signals) {
         const auto index = static_cast<std::uint32_t>(&message - db_.messages.data());
@@ -498,9 +505,12 @@ void Resolver::groups() {
                              "message \"" + clip(message.name) + "\" has no signal \"" +
                                  clip(name) + "\", which a group names");
       }
-      message.groups.push_back(reference.group);
+      said.add(&message, reference.group);
     });
   }
+  said.give([&](MessageDef& message, const std::vector<SignalGroup>& groups) {
+    message.groups = draft_.arena().list(groups);
+  });
 }
 
 // One message: which signal selects which. SG_MUL_VAL_ says so where it stands; else "m3" is
@@ -688,7 +698,12 @@ void Resolver::long_names() {
     for (Text& node : variable.access_nodes) rename_node(node);
   }
 
-  std::vector<Text> receivers;
+  std::vector<Text> renamed;
+  const auto rename_each = [&](List<Text>& names, const auto& rename) {
+    renamed.assign(names.begin(), names.end());
+    for (Text& name : renamed) rename(name);
+    if (!(names == renamed)) names = draft_.arena().list(renamed);
+  };
   for (MessageDef& message : db_.messages) {
     if (const Text* name = long_name(message.attributes, "SystemMessageLongSymbol")) {
       if (*name != message.name) {
@@ -697,18 +712,14 @@ void Resolver::long_names() {
     }
     if (!nodes.empty()) {
       rename_node(message.transmitter);
-      for (Text& node : message.senders) rename_node(node);
+      rename_each(message.senders, rename_node);
     }
     std::map<Text, Text> signals;  // short -> long
     for (SignalDef& signal : message.signals) {
       if (!nodes.empty()) {
         SignalUsage usage = *signal.usage;
-        receivers.assign(usage.receivers.begin(), usage.receivers.end());
-        for (Text& node : receivers) rename_node(node);
-        if (!(usage.receivers == receivers)) {
-          usage.receivers = draft_.arena().list(receivers);
-          signal.usage = draft_.arena().one(usage);
-        }
+        rename_each(usage.receivers, rename_node);
+        if (!(usage.receivers == signal.usage->receivers)) signal.usage = draft_.arena().one(usage);
       }
       const Text* name = long_name(signal.attributes, "SystemSignalLongSymbol");
       if (name == nullptr || *name == signal.name) continue;
@@ -726,9 +737,9 @@ void Resolver::long_names() {
       rename_signal(rule.selector);
       signal.multiplexed_by = draft_.arena().one(rule);
     }
-    for (SignalGroup& group : message.groups) {
-      for (Text& name : group.signals) rename_signal(name);
-    }
+    std::vector<SignalGroup> groups(message.groups.begin(), message.groups.end());
+    for (SignalGroup& group : groups) rename_each(group.signals, rename_signal);
+    message.groups = draft_.arena().list(groups);
   }
 }
 
