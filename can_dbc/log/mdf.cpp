@@ -89,7 +89,8 @@ class MdfParser : public BinaryParser {
     }
     if (groups_.empty()) {
       return broken(0, "an MDF measurement without CAN frames, of " + std::to_string(described) +
-                           " groups of signals; expected a bus log. Export the signals as .csv");
+                           " group" + (described == 1 ? "" : "s") +
+                           " of signals; expected a bus log. Export the signals as .csv");
     }
     return RecordKind::kNothing;
   }

@@ -431,7 +431,7 @@ TEST(Mf4, WhatIsWrongIsTold) {
       {good.substr(0, 40), "the file's identification is cut off", 0},
       {good.substr(0, 64), "a link to byte 64, where no block is: the file has 64 bytes", 0},
       {old, "an MDF measurement of version 3.30, expected 4", 0},
-      {table, "an MDF measurement without CAN frames, of 1 groups of signals", 0},
+      {table, "an MDF measurement without CAN frames, of 1 group of signals", 0},
       {without_id, "a group of CAN_DataFrame without ID", 0},
       {round_channels, "more channels in a group than 65536", 0},
       {round_groups, "more than 1000000 blocks of description: links that point back", 0},
