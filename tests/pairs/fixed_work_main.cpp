@@ -13,8 +13,14 @@
 #include "can_dbc/dbc/message_codec.h"
 #include "can_dbc/dbc/parser.h"
 #include "can_dbc/log/can_log.h"
+#include "daemon/core/loop/pipeline.h"
+#include "tests/loop/closed_loop.h"
+#include "tests/loop/recorded_drive.h"
 #include "tests/pairs/made_inputs.h"
+#include "tests/tools/diagnose/recorded_runs.h"
+#include "tools/diagnose/decide/namer.h"
 #include "tools/ports/log_timeline.h"
+#include "tools/sim/vehicle_scenario.h"
 #include "tools/text/short_number.h"
 
 namespace beltgrip::test {
@@ -67,6 +73,40 @@ void follow(const std::string& path, bool one_in_five) {
   }
 }
 
+// A coast-down with its experiment: what a replay does but for reading the log.
+void drive() {
+  const sim::VehicleScenario scenario = sim::shipped_vehicle_scenario("coast-overdrive").scenario;
+  const daemon::Config config = vehicle_config(scenario, {});
+  const std::vector<DriveStep> steps = record_drive(scenario, config);
+  count("drive_step", static_cast<long>(steps.size()), [&] {
+    daemon::Pipeline pipeline(config);
+    for (const DriveStep& step : steps) {
+      daemon::Outbox out;
+      if (step.is_frame) {
+        pipeline.on_frame(step.frame);
+      } else {
+        pipeline.on_sample(step.t, out);
+      }
+    }
+  });
+}
+
+// A rig without a cause: the fit of the machine, and the search for what is not there.
+void diagnose_rig() {
+  constexpr int kExperiments = 3;
+  blind::Random random(1);
+  blind::Trial trial;
+  trial.machine = blind::draw_machine(random);
+  trial.plan = blind::draw_plan(random, trial.machine.setting, kExperiments);
+  const diagnose::Campaign campaign = diagnose::campaign_of(trial);
+  long samples = 0;
+  for (const diagnose::ExperimentData& run : campaign.runs) samples += run.size();
+  count("diagnosis_sample", samples, [&] {
+    diagnose::Engine engine(campaign);
+    diagnose::name_effects(engine, [] { return false; });
+  });
+}
+
 void write_numbers() {
   std::array<char, text::kNumberLongest> text;
   for (int i = 0; i < kFrames; ++i) text::write_short(text.data(), i * 0.25 - 40.0, 2);
@@ -90,6 +130,8 @@ int run() {
   count("replay_one_in_five", kFrames, [&] { follow(log, true); });
   count("replay_foreign", kFrames, [&] { follow(log, false); });
   count("number_text", kFrames, write_numbers);
+  drive();
+  diagnose_rig();
   return 0;
 }
 
