@@ -286,7 +286,7 @@ TEST_F(Recorded, NothingWhileNothingHappens) {
 
 TEST_F(Recorded, TheFolderStaysWithinItsSizeAndTheOldestGo) {
   RecordLimits limits;
-  limits.file_bytes = 8000;
+  limits.file_bytes = 2000;
   limits.folder_bytes = 24000;
   limits.after = 3600 * kSecond;
   fs::create_directories(folder());
