@@ -51,6 +51,37 @@ class Noise {
   std::mt19937 generator_{1};
 };
 
+// A shaft whose speed swings, sampled so that its line folds back to about 0 Hz on the way, has
+// there only its own course: no ripple, where none is; and none is lost where it does not.
+TEST(OrderLine, IsNotLookedForWhereItFoldsBackToZero) {
+  constexpr double kPeriod_s = 0.02, kAmplitude = 5e-4;
+  const auto line_at = [&](double mean_Hz, double amplitude) {
+    Channel speed;
+    Noise noise;
+    constexpr double kSwing = 0.066, kSwing_rad_s = 2.0 * std::numbers::pi * 0.23;
+    const double mean_rad_s = 2.0 * std::numbers::pi * mean_Hz;
+    for (int i = 0; i < 3000; ++i) {
+      const double t = kPeriod_s * i;
+      const double omega = mean_rad_s * (1.0 + kSwing * std::sin(kSwing_rad_s * t));
+      const double angle = mean_rad_s * (t - kSwing / kSwing_rad_s * std::cos(kSwing_rad_s * t));
+      speed.t_s.push_back(t);
+      speed.value.push_back(omega * (1.0 + amplitude * std::sin(angle) + 1e-4 * noise()));
+    }
+    return order_line(speed);
+  };
+  const OrderLine folded = line_at(47.0, 0.0);
+  EXPECT_EQ(folded.pieces, 0);
+  EXPECT_GE(folded.folded, 10);
+  EXPECT_EQ(folded.chi2(), 0.0);
+  for (const double mean_Hz : {38.0, 60.0}) {
+    SCOPED_TRACE(mean_Hz);
+    const OrderLine line = line_at(mean_Hz, kAmplitude);
+    EXPECT_EQ(line.folded, 0);
+    EXPECT_NEAR(line.amplitude(), kAmplitude, 0.05 * kAmplitude);
+    EXPECT_LT(std::sqrt(line_at(mean_Hz, 0.0).chi2()), 3.0);
+  }
+}
+
 // 105 rad/s, a belt of 0.703 m on a radius of 0.0784 m: 11.7 Hz. 1.5 % beside the order that is
 // looked for, as a radius is off.
 TEST(BeltLines, ShowThePassageAndNotTheShaft) {

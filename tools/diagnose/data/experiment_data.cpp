@@ -469,6 +469,12 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
 
   data.line_p = order_line(speed);
   data.line_s = order_line(table[Role::kSecondarySpeed]);
+  for (const auto& [line, name] :
+       {std::pair{&data.line_p, "primary_speed"}, {&data.line_s, "secondary_speed"}}) {
+    if (line->folded == 0) continue;
+    data.notes.push_back(table.name + ": at its sample rate a line once per revolution of " + name +
+                         " folds back to about 0 Hz; not judged there");
+  }
   add_belt_lines(table, variator, data);
   data.torque_spectrum =
       pooled_spectrum(table[data.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque]);

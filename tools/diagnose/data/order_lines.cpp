@@ -4,6 +4,7 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <optional>
 
 namespace beltgrip::diagnose {
 namespace {
@@ -14,6 +15,9 @@ constexpr double kSpeedMin_rad_s = 20.0;
 constexpr int kSamplesMin = 60;  // per piece
 // One sigma of what jitter of the clock and unfinished revolutions leave, share of the amplitude.
 constexpr double kAmplitudeShare = 3e-3;
+// Chosen, of a line: where the local straight line leaves less of it, it leaves the course of the
+// speed as well.
+constexpr double kLeft = 0.5;
 // Neighbouring orders: what noise there is without a line.
 constexpr double kNeighbours[] = {0.80, 0.84, 0.88, 0.92, 1.08, 1.12, 1.16, 1.20};
 
@@ -55,6 +59,7 @@ void OrderLine::add(const OrderLine& other) {
   power += other.power;
   power_squares += other.power_squares;
   noise += other.noise;
+  folded += other.folded;
 }
 
 double OrderLine::amplitude() const {
@@ -77,11 +82,10 @@ double OrderLine::chi2() const {
 
 namespace {
 
-// A few seconds of a speed: shaft angle and relative departure from the smooth speed.
+// A few seconds of a speed: shaft angle, the smooth speed and the relative departure from it.
 struct Piece {
-  std::vector<double> angle, rest;
-  double passed = 0.0;  // of a line once per revolution: what the smoothing leaves of it
-  double omega_rad_s = 0.0, period_s = 0.0;
+  std::vector<double> angle, omega_rad_s, rest;
+  double period_s = 0.0;
   double power_at(double order) const {
     std::complex<double> sum;
     for (std::size_t i = 0; i < rest.size(); ++i) {
@@ -98,6 +102,18 @@ double followed(double omega, double period_s) {
   if (std::abs(half) < 1e-9) return 1.0;
   const double reach = each_side(period_s);
   return std::sin((reach + 0.5) * omega * period_s) / ((2.0 * reach + 1.0) * half);
+}
+
+// What the smoothing leaves of a line at an order, mean; nothing where that is too little at any
+// time.
+std::optional<double> left_of(const Piece& piece, double order) {
+  double sum = 0.0;
+  for (const double omega : piece.omega_rad_s) {
+    const double left = 1.0 - followed(order * omega, piece.period_s);
+    if (left < kLeft) return std::nullopt;
+    sum += left;
+  }
+  return sum / static_cast<double>(piece.omega_rad_s.size());
 }
 
 std::vector<Piece> pieces_of(const Channel& speed) {
@@ -118,14 +134,11 @@ std::vector<Piece> pieces_of(const Channel& speed) {
             0.5 * (speed.value[end] + speed.value[end - 1]) * (speed.t_s[end] - speed.t_s[end - 1]);
       }
       piece.angle.push_back(phi);
+      piece.omega_rad_s.push_back(smooth[end]);
       piece.rest.push_back(speed.value[end] / smooth[end] - 1.0);
       ++end;
     }
     const double span_s = speed.t_s[end - 1] - speed.t_s[begin];
-    for (std::size_t i = begin; i < end; ++i) {
-      piece.passed += (1.0 - followed(smooth[i], period_s)) / static_cast<double>(end - begin);
-    }
-    piece.omega_rad_s = phi / std::max(span_s, period_s);
     piece.period_s = period_s;
     const bool usable = piece.rest.size() >= kSamplesMin && span_s > 0.8 * kPiece_s &&
                         std::isfinite(phi) && phi > kSpeedMin_rad_s * span_s &&
@@ -142,18 +155,29 @@ std::vector<Piece> pieces_of(const Channel& speed) {
 
 namespace {
 
-double noise_about(const Piece& piece, double order) {
-  double noise = 0.0;
-  for (const double neighbour : kNeighbours) noise += piece.power_at(neighbour * order);
-  return noise / static_cast<double>(std::size(kNeighbours));
+// Mean of the neighbours that do not fold back themselves.
+struct Noise {
+  double mean = 0.0, count = 0.0;
+  bool is_known() const { return mean > 0.0 && count > 2.0; }
+};
+
+Noise noise_about(const Piece& piece, double order) {
+  Noise out;
+  for (const double neighbour : kNeighbours) {
+    if (!left_of(piece, neighbour * order)) continue;
+    out.mean += piece.power_at(neighbour * order);
+    out.count += 1.0;
+  }
+  out.mean /= std::max(out.count, 1.0);
+  return out;
 }
 
-void add_piece(double here, double noise, double passed, OrderLine& out) {
+void add_piece(double here, const Noise& about, double left, OrderLine& out) {
+  const double noise = about.mean;
   // The noise itself is a mean of a few: its inverse is biased by n / (n - 1).
-  constexpr double kMean = static_cast<double>(std::size(kNeighbours));
-  const double excess = here / noise * (kMean - 1.0) / kMean - 1.0;
+  const double excess = here / noise * (about.count - 1.0) / about.count - 1.0;
   out.excess += std::min(excess, 50.0);
-  const double power = (here - noise) / (passed * passed);
+  const double power = (here - noise) / (left * left);
   out.power += power;
   out.power_squares += power * power;
   out.noise += noise;
@@ -165,8 +189,13 @@ void add_piece(double here, double noise, double passed, OrderLine& out) {
 OrderLine order_line(const Channel& speed) {
   OrderLine out;
   for (const Piece& piece : pieces_of(speed)) {
-    const double noise = noise_about(piece, 1.0);
-    if (noise > 0.0) add_piece(piece.power_at(1.0), noise, piece.passed, out);
+    const std::optional<double> left = left_of(piece, 1.0);
+    if (!left) {
+      ++out.folded;
+      continue;
+    }
+    const Noise noise = noise_about(piece, 1.0);
+    if (noise.is_known()) add_piece(piece.power_at(1.0), noise, *left, out);
   }
   return out;
 }
@@ -174,11 +203,11 @@ OrderLine order_line(const Channel& speed) {
 BeltLines belt_lines(const Channel& speed, double order) {
   BeltLines out;
   for (const Piece& piece : pieces_of(speed)) {
-    const double noise = noise_about(piece, order);
-    if (!(noise > 0.0)) continue;
-    const double passed = 1.0 - followed(order * piece.omega_rad_s, piece.period_s);
+    const std::optional<double> left = left_of(piece, order);
+    const Noise noise = noise_about(piece, order);
+    if (!left || !noise.is_known()) continue;
     for (std::size_t i = 0; i < out.size(); ++i) {
-      add_piece(piece.power_at(kBeltOrders[i] * order), noise, passed, out[i]);
+      add_piece(piece.power_at(kBeltOrders[i] * order), noise, *left, out[i]);
     }
   }
   return out;

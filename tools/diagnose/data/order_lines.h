@@ -1,6 +1,7 @@
 // Lines at once per revolution in a speed signal: run-out and pitch errors of its toothed wheel.
 // From the channel's own samples, against the angle of its own shaft, so that speed changes and
-// sampling below the line's frequency do not matter.
+// sampling below the line's frequency do not matter; where sampling folds the line back to about
+// 0 Hz, the speed's own course lies there, and nothing is judged.
 #pragma once
 
 #include <array>
@@ -16,6 +17,7 @@ struct OrderLine {
   double power = 0.0;          // sum of |A|^2 - noise
   double power_squares = 0.0;  // sum of its squares
   double noise = 0.0;          // sum of the noise's |A|^2
+  int folded = 0;              // pieces left out: the line folds back to about 0 Hz
   void add(const OrderLine& other);
   double amplitude() const;
   double amplitude_sigma() const;
