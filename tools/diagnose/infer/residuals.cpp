@@ -39,6 +39,22 @@ std::array<CurveShape, kStops> shapes(const Eigen::VectorXd& nuisance, const Qua
   return out;
 }
 
+namespace {
+// One sigma of what the noise of the clamp force comes to in the torque that the belt carries. The
+// force as configured: its noise is the same share of it in every hypothesis (evaluate()), and one
+// with less force would be forgiven more else.
+double carried_noise_Nm(const Campaign& campaign, const ExperimentData& data, int k,
+                        double belt_torque_Nm) {
+  const estimator::VariatorParameters& variator = campaign.variator;
+  constexpr double kLeast_N = 50.0;
+  const double force_N =
+      variator.secondary_piston_area_m2 * data.pressure.value[k] +
+      variator.secondary_spring_force_N +
+      variator.secondary_centrifugal_N_s2 * data.omega_s.value[k] * data.omega_s.value[k];
+  return belt_torque_Nm * campaign.noise.force_N / std::max(force_N, kLeast_N);
+}
+}  // namespace
+
 Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state) {
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   Residuals out;
@@ -51,7 +67,8 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
   out.slope = ArrayXd::Zero(n);
   out.model_Nm = ArrayXd::Zero(n);
   out.weight = ArrayXd::Zero(n);
-  const double slip_variance = campaign.slip_noise_share_of(run) * campaign.slip_noise_share_of(run);
+  const double slip_variance =
+      campaign.slip_noise_share_of(run) * campaign.slip_noise_share_of(run);
   const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
   std::array<std::vector<int>, kStops> at_stop;  // samples
   for (const auto& [begin, end] : data.stretches) {
@@ -66,7 +83,7 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
           std::span(all).subspan(first, std::min(FootBatch::kMost, all.size() - first));
       FootBatch batch(curve[stop], std::exp(q.ln_peak_slip[stop]), slip_variance);
       for (const int k : samples) {
-        const double carried_Nm = q.belt_torque[k] * campaign.noise.force_N / q.force_N[k];
+        const double carried_Nm = carried_noise_Nm(campaign, data, k, q.belt_torque[k]);
         batch.add(q.slip_share[k], q.belt_torque[k], q.capacity[k], data.slip_spread_share2[k],
                   sensor_variance + carried_Nm * carried_Nm);
       }
@@ -114,7 +131,7 @@ void move_to_foot(const Campaign& campaign, int run, Residuals& at) {
   for (const auto& [begin, end] : data.stretches) {
     for (int k = begin; k < end; ++k) {
       // Share of the misfit that is the clamp force's: its noise comes with the torque it carries.
-      const double carried_Nm = q.belt_torque[k] * campaign.noise.force_N / q.force_N[k];
+      const double carried_Nm = carried_noise_Nm(campaign, data, k, q.belt_torque[k]);
       const double carried_variance = carried_Nm * carried_Nm;
       const double force_share = carried_variance / (sensor_variance + carried_variance);
       const double off_Nm = q.belt_torque[k] - at.model_Nm[k];

@@ -234,8 +234,9 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
     for (const estimator::LearnedTerm& each : effects.learned_too) apply_learned(c, each, stage);
   };
   apply(Stage::kMeasurement);
-  c.force_N = variator.secondary_piston_area_m2 * c.pressure + variator.secondary_spring_force_N +
-              variator.secondary_centrifugal_N_s2 * c.omega_s.square();
+  const ArrayXd beside_pressure_N =
+      variator.secondary_spring_force_N + variator.secondary_centrifugal_N_s2 * c.omega_s.square();
+  c.force_N = variator.secondary_piston_area_m2 * c.pressure + beside_pressure_N;
   apply(Stage::kForce);
   c.loss_Nm = nuisance[kLossConstant_Nm] + nuisance[kLossPerSpeed_Nms] * c.omega_p +
               nuisance[kLossPerkN_Nm] * 1e-3 * c.force_N;
@@ -266,7 +267,13 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
 
   Quantities q;
   q.slip_share = std::move(c.slip_share);
-  q.capacity = lever_m * c.force_N.max(50.0);
+  // What effects change of the clamp force counts as a share of it, without the pressure's noise:
+  // else a hypothesis with more force would divide that noise by more, and fit better for that
+  // alone.
+  const double area_m2 = variator.secondary_piston_area_m2;
+  const ArrayXd read_N = area_m2 * read.pressure_Pa + beside_pressure_N;
+  const ArrayXd calm_N = area_m2 * run.pressure.sharp + beside_pressure_N;
+  q.capacity = lever_m * (read_N * (1.0 + (c.force_N - read_N) / calm_N.max(50.0))).max(50.0);
   if (!is_zero(c.ln_friction)) q.capacity *= c.ln_friction.exp();
   if (run.torque_s.present) {
     // From the slow copies of all channels, the inertia's share of the engine's torque among them:
