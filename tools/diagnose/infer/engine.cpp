@@ -31,6 +31,10 @@ constexpr int kSettled = 20;           // steps, where all else stays
 constexpr double kReach = 3.0;         // chosen, tolerances: no healthy machine is farther off
 constexpr double kFarReach = 3.0;      // chosen, times: as far the equation is that of a far size
 constexpr double kSizePrior = 3.0;     // one sigma of an effect's size, in usual sizes
+// Chosen, one sigma of what the form of friction over slip at the low end stop differs from that in
+// overdrive by, of what belts differ from each other by: it is the same belt on the same pulleys. A
+// curve of its own takes over what the friction itself differs by.
+constexpr double kFormsDiffer = 0.3;
 
 bool stop_used(const Campaign& campaign, int stop) {
   for (const ExperimentData& run : campaign.runs) {
@@ -140,6 +144,9 @@ Engine::Engine(Campaign campaign, int jobs) : jobs_(jobs), campaign_(std::move(c
     if ((i == kCommandGain || i == kCommandOffset_Pa) && !campaign_.has_tracking) continue;
     nuisances_.push_back(i);
   }
+  for (int i = kShapeLow; i <= kEndOfShapes && low && overdrive; ++i) {
+    campaign_.nuisances[static_cast<std::size_t>(i)].tolerance = kFormsDiffer;
+  }
   for (int slot = 0; slot < static_cast<int>(campaign_.slots.size()); ++slot) {
     for (const double size : campaign_.slots[static_cast<std::size_t>(slot)].row->far_sizes) {
       far_sizes_.push_back({slot, size});
@@ -159,11 +166,13 @@ Prior Engine::prior(const std::vector<int>& parameters, const ModelState& at) co
   for (Index j = 0; j < n; ++j) {
     const int p = parameters[static_cast<std::size_t>(j)];
     if (const int first = first_knot(p); first >= 0) {
+      // At the low end stop of what it differs from the curve in overdrive by.
+      const auto off = [&](int knot) {
+        return campaign_.nuisances[static_cast<std::size_t>(knot)].nominal - at.nuisance[knot];
+      };
       for (int i = 0; i < kShapeKnots; ++i) {
-        const int knot = first + i;
-        out.pull[j] +=
-            curve_modes_inverse()(p - first, i) *
-            (campaign_.nuisances[static_cast<std::size_t>(knot)].nominal - at.nuisance[knot]);
+        const double here = off(first + i) - (first == kShapeLow ? off(kShapeOverdrive + i) : 0.0);
+        out.pull[j] += curve_modes_inverse()(p - first, i) * here / scale(p);
       }
     } else if (p < kNuisanceCount) {
       out.pull[j] =
@@ -485,7 +494,11 @@ std::vector<Score> Engine::screen(const Fit& from, int scatter_steps) const {
   }
   const std::vector<int> curve_columns = columns_of(curve);
   const auto curve_size = static_cast<Index>(curve.size());
-  const Prior any_curve{VectorXd::Zero(curve_size), VectorXd::Constant(curve_size, 1e-3)};
+  Prior any_curve{VectorXd::Zero(curve_size), VectorXd::Constant(curve_size, 1e-3)};
+  for (Index j = 0; j < curve_size; ++j) {  // whatever the form, both end stops have it
+    const int p = curve[static_cast<std::size_t>(j)];
+    if (first_knot(p) == kShapeLow && scale(p) == kFormsDiffer) any_curve.precision[j] = 1.0;
+  }
   std::vector<int> slots;
   for (int slot = 0; slot < static_cast<int>(campaign_.slots.size()); ++slot) {
     if (std::find(accepted_.begin(), accepted_.end(), slot) == accepted_.end()) {
@@ -618,8 +631,9 @@ void Engine::add_curve_bounds(const ModelState& state, const std::vector<int>& p
              std::span<const double, kShapeKnots>(state.nuisance.data() + first, kShapeKnots))) {
       row.setZero();
       for (std::size_t j = 0; j < parameters.size(); ++j) {
-        if (first_knot(parameters[j]) == first) {
-          row[static_cast<Index>(j)] = each.by_mode[parameters[j] - first];
+        const int of = first_knot(parameters[j]);
+        if (of == first || (of == kShapeOverdrive && first == kShapeLow)) {
+          row[static_cast<Index>(j)] = each.by_mode[parameters[j] - of] * scale(parameters[j]);
         }
       }
       row[last] = each.slope;
@@ -635,7 +649,9 @@ void Engine::move(const std::vector<int>& parameters, const VectorXd& step, doub
   for (std::size_t j = 0; j < parameters.size(); ++j) {
     const double by = share * step[static_cast<Index>(j)] * scale(parameters[j]);
     if (const int first = first_knot(parameters[j]); first >= 0) {
-      state.nuisance.segment(first, kShapeKnots) += by * curve_modes().col(parameters[j] - first);
+      const VectorXd change = by * curve_modes().col(parameters[j] - first);
+      state.nuisance.segment(first, kShapeKnots) += change;
+      if (first == kShapeOverdrive) state.nuisance.segment(kShapeLow, kShapeKnots) += change;
     } else if (parameters[j] < kNuisanceCount) {
       double& value = state.nuisance[parameters[j]];
       value += by;

@@ -65,14 +65,19 @@ FittedPeak fitted_peak(const Engine& engine, const Hypothesis& hypothesis, int s
   Eigen::VectorXd place = Eigen::VectorXd::Zero(covariance.rows());
   height[column_of(engine, kLnMuMax)] = engine.scale(kLnMuMax);
   place[column_of(engine, slip)] = engine.scale(slip);
-  for (int mode = 0; mode < kShapeKnots; ++mode) {
-    const Eigen::Index column = column_of(engine, first + mode);
-    const CurveShape& shape = mode_shape(mode);
-    height[column] = shape.departure(place_on_curve(x)) / value;
-    const double slope =
-        (shape.departure(place_on_curve(x + kStep)) - shape.departure(place_on_curve(x - kStep))) /
-        (2.0 * kStep);
-    if (is_inside) place[column] = -slope / (bend * x);
+  // The form at the low end stop is that in overdrive, where that is used, and what it differs by.
+  for (const int of : {kShapeOverdrive, kShapeLow}) {
+    if (of != first && !(low && uses_stop(engine, kOverdriveStop))) continue;
+    for (int mode = 0; mode < kShapeKnots; ++mode) {
+      const Eigen::Index column = column_of(engine, of + mode);
+      const CurveShape& shape = mode_shape(mode);
+      const double unit = engine.scale(of + mode);
+      height[column] = unit * shape.departure(place_on_curve(x)) / value;
+      const double slope = (shape.departure(place_on_curve(x + kStep)) -
+                            shape.departure(place_on_curve(x - kStep))) /
+                           (2.0 * kStep);
+      if (is_inside) place[column] = -unit * slope / (bend * x);
+    }
   }
   const auto sigma = [&](const Eigen::VectorXd& lever, double form) {
     return std::sqrt(std::max(lever.dot(covariance * lever), 0.0) + form * form);

@@ -190,16 +190,14 @@ ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
 
 namespace {
 // Of one mode of the friction curve of one stop.
-ResidualColumns mode_column(const std::vector<CurveSample>& samples, int mode, int size) {
-  ResidualColumns out;
-  if (samples.empty()) return out;
+void add_mode(const std::vector<CurveSample>& samples, int mode, int size, ResidualColumns& out) {
+  if (samples.empty()) return;
   ArrayXd& column = out[kFrictionResidual];
-  column = ArrayXd::Zero(size);
+  if (column.size() == 0) column = ArrayXd::Zero(size);
   const CurveShape& shape = mode_shape(mode);
   for (const CurveSample& each : samples) {
     column[each.k] = each.capacity_Nm * shape.departure(each.place) * each.weight;
   }
-  return out;
 }
 
 bool energy_acts(const Campaign& campaign, const ModelState& state) {
@@ -298,11 +296,12 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
     default:
       break;
   }
-  if (parameter >= kShapeOverdrive && parameter < kShapeLow) {
-    return mode_column(at.on_curve[kOverdriveStop], parameter - kShapeOverdrive, n);
-  }
-  if (parameter >= kShapeLow && parameter <= kEndOfShapes) {
-    return mode_column(at.on_curve[kLowStop], parameter - kShapeLow, n);
+  // The form in overdrive is that of both end stops; the other is what the low one differs by.
+  if (const int first = first_knot(parameter); first >= 0) {
+    ResidualColumns out;
+    add_mode(at.on_curve[kLowStop], parameter - first, n, out);
+    if (first == kShapeOverdrive) add_mode(at.on_curve[kOverdriveStop], parameter - first, n, out);
+    return out;
   }
   // The rest by central differences of the quantities.
   const bool slot = parameter >= kNuisanceCount;

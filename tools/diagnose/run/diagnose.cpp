@@ -431,10 +431,15 @@ class Run {
       const auto i = static_cast<Eigen::Index>(j);
       double variance = fit.covariance(i, i) * engine.scale(p) * engine.scale(p);
       if (const int first = first_knot(p); first >= 0) {
-        const Eigen::Index block = i - (p - first);
-        const auto lever = curve_modes().row(p - first);
-        variance = lever.dot(fit.covariance.block(block, block, kShapeKnots, kShapeKnots) *
-                             lever.transpose());
+        // At the low end stop the form in overdrive counts as well, where that is used.
+        Eigen::VectorXd lever = Eigen::VectorXd::Zero(fit.covariance.rows());
+        for (std::size_t k = 0; k < engine.active_nuisances().size(); ++k) {
+          const int q = engine.active_nuisances()[k];
+          const int of = first_knot(q);
+          if (of != first && !(of == kShapeOverdrive && first == kShapeLow)) continue;
+          lever[static_cast<Eigen::Index>(k)] = curve_modes()(p - first, q - of) * engine.scale(q);
+        }
+        variance = lever.dot(fit.covariance * lever);
       }
       const double sigma = std::sqrt(std::max(variance, 0.0));
       const double value = naming.hypothesis.state.nuisance[p];
