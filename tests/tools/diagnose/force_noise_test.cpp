@@ -4,8 +4,10 @@
 
 #include <cmath>
 #include <numbers>
+#include <string>
 
-#include "tools/diagnose/infer/engine.h"
+#include "tests/tools/diagnose/recorded_runs.h"
+#include "tools/diagnose/decide/namer.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -66,6 +68,30 @@ TEST(ForceNoise, IsTheSameShareOfTheCapacityInEveryHypothesis) {
     ++tried;
   }
   EXPECT_EQ(tried, 5);
+}
+
+// Two experiments in the middle with less friction than those before and behind them: that is no
+// wear, which does not come back.
+TEST(Wear, DoesNotComeBack) {
+  blind::Trial trial;
+  trial.seed = 11;
+  blind::Random random(trial.seed);
+  trial.plan = blind::draw_plan(random, trial.machine.setting, 10);
+  estimator::VariatorParameters variator;
+  variator.primary_inertia_kg_m2 = trial.machine.primary_inertia_kg_m2;
+  std::vector<std::string> csv = blind::record(trial).csv;
+  trial.planted.push_back({"wear", {{"step", 0.08}, {"at", 0.0}}, {}});
+  const std::vector<std::string> worn = blind::record(trial).csv;
+  for (const std::size_t i : {5U, 6U}) csv[i] = worn[i];
+  std::vector<ExperimentData> runs;
+  for (const std::string& text : csv) runs.push_back(prepare(parse_csv(text, "run.csv"), variator));
+  Engine engine(make_campaign(std::move(runs), nominal_model(variator)));
+  const Naming naming = name_effects(engine, [] { return false; });
+  int steps = 0;
+  for (const Accepted& each : naming.accepted) {
+    steps += engine.campaign().slots[static_cast<std::size_t>(each.slot)].counts_experiments();
+  }
+  EXPECT_LT(steps, 2);
 }
 
 }  // namespace

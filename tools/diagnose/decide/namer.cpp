@@ -125,8 +125,18 @@ bool credible(const Engine& engine, int slot, double size) {
          (whole > row.low || row.low == 0.0);
 }
 
+// Friction that falls from one experiment on and rises from another one on is no wear.
+bool comes_back(const Engine& engine, const Hypothesis& h) {
+  bool falls = false, rises = false;
+  for (const int slot : h.slots) {
+    if (!engine.campaign().slots[static_cast<std::size_t>(slot)].counts_experiments()) continue;
+    (h.state.effects[slot] > 0.0 ? falls : rises) = true;
+  }
+  return falls && rises;
+}
+
 bool credible(const Engine& engine, const Hypothesis& h) {
-  if (bends_machine(engine, h)) return false;
+  if (bends_machine(engine, h) || comes_back(engine, h)) return false;
   return std::all_of(h.slots.begin(), h.slots.end(),
                      [&](int slot) { return credible(engine, slot, h.state.effects[slot]); });
 }
