@@ -128,6 +128,7 @@ class FootSearch {
   BELTGRIP_LANES void fill_up(std::size_t i) {
     batch_.slip_[i] = batch_.torque_Nm_[i] = batch_.slip_spread_[i] = 0.0;
     batch_.capacity_Nm_[i] = batch_.torque_variance_[i] = 1.0;
+    batch_.x_[i] = batch_.model_Nm_[i] = batch_.slope_[i] = 0.0;
   }
 
   struct Sample {
