@@ -62,6 +62,18 @@ std::vector<int> plus(std::vector<int> set, int slot) {
   return set;
 }
 
+// A ratio of friction hides in a curve at the low end stop that reaches its peak elsewhere, and no
+// small step leads back from there: the state with the curve of the overdrive at both.
+ModelState with_one_curve(const Engine& engine) {
+  ModelState out = engine.state();
+  Eigen::VectorXd& x = out.nuisance;
+  const NuisanceTable& rows = engine.campaign().nuisances;
+  x.segment(kShapeLow, kShapeKnots) = x.segment(kShapeOverdrive, kShapeKnots);
+  x[kLnPeakSlipLow] =
+      x[kLnPeakSlipOverdrive] + rows[kLnPeakSlipLow].nominal - rows[kLnPeakSlipOverdrive].nominal;
+  return out;
+}
+
 // The slots to refit: by gain and by significance, none that is barred.
 std::vector<int> shortlist(const std::vector<Score>& scores, int count, double in_curve_max,
                            const std::vector<int>& barred) {
@@ -416,6 +428,9 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
       };
       if (h.log_likelihood < base.log_likelihood) or_better(engine.refine(candidate));
       if (afar) or_better(engine.refine_from_afar(candidate));
+      if (id_of(engine, candidate.back()) == "friction_ratio") {
+        or_better(engine.refine_from(with_one_curve(engine), candidate));
+      }
       return h;
     };
     const auto consider = [&](Hypothesis h) {
@@ -433,6 +448,16 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
     };
     const double in_curve_max = possible ? kInCurveMax : 2.0;
     std::vector<int> candidates = shortlist(scores, kRefined, in_curve_max, out.not_confirmed);
+    // Whatever its derivative says.
+    for (const Score& score : scores) {
+      const auto is_here = [&](const std::vector<int>& slots) {
+        return std::find(slots.begin(), slots.end(), score.slot) != slots.end();
+      };
+      if (id_of(engine, score.slot) == "friction_ratio" && !is_here(candidates) &&
+          !is_here(out.not_confirmed)) {
+        candidates.push_back(score.slot);
+      }
+    }
     if (scattered) {
       const std::vector<int> usual =
           shortlist(engine.screen_with_usual_scatter(), static_cast<int>(kFromAfar), in_curve_max,

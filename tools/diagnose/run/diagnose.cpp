@@ -525,7 +525,10 @@ class Run {
   // ramp shows, and beside the torque where none is recorded behind the belt.
   static void add_twins(const Campaign& campaign, Finding& finding, const EffectRow& row) {
     if (row.stage != Stage::kFriction) return;
-    if (row.depends_on != "oil_temperature" && row.depends_on != "primary_speed") return;
+    if (row.depends_on != "oil_temperature" && row.depends_on != "primary_speed" &&
+        row.depends_on != "ratio") {
+      return;
+    }
     const bool is_alone = finding.aliases.empty();
     const std::string over = " over " + std::string(row.depends_on);
     if (!campaign.has_balance) finding.aliases.push_back("learned torque_gain" + over);
@@ -533,7 +536,11 @@ class Run {
     if (!is_alone) return;
     finding.separate_by =
         campaign.has_balance
-            ? "a reference gauge of the secondary pressure where the oil or the speed differs"
+            ? "a reference gauge of the secondary pressure where the " +
+                  std::string(row.depends_on == "oil_temperature" ? "oil"
+                              : row.depends_on == "ratio"         ? "ratio"
+                                                                  : "speed") +
+                  " differs"
             : "record secondary_torque: a gain of the torque shows there, friction does not; and a "
               "reference gauge of the secondary pressure";
   }
