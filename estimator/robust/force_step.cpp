@@ -26,6 +26,12 @@ constexpr double kLargeShare = 0.04;
 constexpr double kFallsOn = 0.5;    // chosen: of the ramp before it, to go on as a ramp
 constexpr double kLeastMove = 0.4;  // of what slip would have to move by
 constexpr double kSlipDeviations = 4.0, kSlopeDeviations = 2.0;
+// Derived: a pressure between two readings is foretold by the line of the last four. Shorter groups
+// hold errors of that line, which their neighbours share, and a mean's noise does not tell them.
+// Measured on 40 ramps read every 100 ms (curve_health_test): in steps of 452 N a false step in 31
+// without it, 19 with two readings, 1 with four; steps of 25 % in a fine reading are found in 39
+// instead of 40. 500 recordings of other make are answered alike with 2, 3.2, 4 and 4.8.
+constexpr double kReadings = 4.0;
 constexpr double kStairs = 1.5;  // steps of a signal that is rounded coarsely are no steps
 }  // namespace
 
@@ -36,6 +42,7 @@ ForceStep::ForceStep(double sample_rate_hz, double resolution_N)
 void ForceStep::reset() noexcept {
   count_ = 0;
   filled_ = 0;
+  foretold_s_ = 0.0;
   sum_ = {};
   sums_[0] = {};
 }
@@ -113,8 +120,9 @@ bool ForceStep::steps(std::size_t length, double slip_noise_percent2_s,
   return std::abs(slip_jump_percent) + slip_noise_percent < kLeastMove * expected;
 }
 
-bool ForceStep::step(const Cell& sample, double slip_noise_percent2_s,
+bool ForceStep::step(const Cell& sample, double pressure_ahead_s, double slip_noise_percent2_s,
                      const Trend& force) noexcept {
+  foretold_s_ = std::max(foretold_s_, pressure_ahead_s);
   sum_.force_N += sample.clamp_force_N / per_cell_;
   sum_.torque_Nm += sample.torque_Nm / per_cell_;
   sum_.slip_percent += sample.slip_percent / per_cell_;
@@ -128,6 +136,7 @@ bool ForceStep::step(const Cell& sample, double slip_noise_percent2_s,
   sum_ = {};
   for (std::size_t length = kShortest; length <= kLongest; length *= 2) {
     if (count_ < 4 * length + kGapCells) break;
+    if (kCell_s * static_cast<double>(length) < kReadings * foretold_s_) continue;
     if (steps(length, slip_noise_percent2_s, force)) return true;
   }
   return false;

@@ -22,9 +22,10 @@ class ForceStep {
   // resolution_N: of the clamp force, as its pressure's signal is rounded; 0: not known.
   ForceStep(double sample_rate_hz, double resolution_N);
   void reset() noexcept;
-  // One sample; slip_noise_percent2_s: a density, force: the trend of the clamp force. True when a
-  // step has just been seen.
-  bool step(const Cell& sample, double slip_noise_percent2_s, const Trend& force) noexcept;
+  // One sample, its pressure foretold for so long; slip_noise_percent2_s: a density, force: the
+  // trend of the clamp force. True when a step has just been seen.
+  bool step(const Cell& sample, double pressure_ahead_s, double slip_noise_percent2_s,
+            const Trend& force) noexcept;
 
  private:
   struct Means {
@@ -38,6 +39,7 @@ class ForceStep {
   std::array<Means, kCells> sums_{};  // of all cells before
   std::size_t count_ = 0;
   double stair_N_;
+  double foretold_s_ = 0.0;  // the longest: the pressure is read about as seldom
   int per_cell_;
   int filled_ = 0;
   Means sum_;

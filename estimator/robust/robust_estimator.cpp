@@ -98,8 +98,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     publish(now);
     if (ended) {
       if (started_) {
-        after_stop_.step(cell_of(sample),
-                         static_cast<double>(sample.pressure_ahead_ns) * kNanosecond_s);
+        after_stop_.step(cell_of(sample), ahead_s(sample));
         follow_on_.step(cell_of(sample));
       }
       stepped_ = true;
@@ -117,7 +116,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     omega_p_.follow(read.omega_p_rad_s);
     omega_s_.follow(read.omega_s_rad_s);
     const Cell cell = cell_of(sample);
-    watch_force(cell);
+    watch_force(cell, ahead_s(sample));
     if (record_.step(cell)) decide();
     if (peak_forecast_.step()) expect();
     return out_;
@@ -171,6 +170,10 @@ class RobustEstimator final : public SlipCurveEstimator {
         .omega_p_rad_s = sign * sample.omega_p_rad_s};
   }
 
+  static double ahead_s(const VariatorSample& sample) noexcept {
+    return static_cast<double>(sample.pressure_ahead_ns) * kNanosecond_s;
+  }
+
   void publish(const Measurement& now) noexcept {
     excitation_.step(now.slip_percent);
     out_.mu_star = now.mu_star;
@@ -208,8 +211,9 @@ class RobustEstimator final : public SlipCurveEstimator {
 
   void begin_fit() noexcept { fit_.begin(record_, traction_, inertia_kg_m2_, stop_s_); }
 
-  void watch_force(const Cell& cell) noexcept {
-    if (force_step_.step(cell, record_.slip_noise_percent2_s(), record_.force())) {
+  void watch_force(const Cell& cell, double pressure_ahead_s) noexcept {
+    if (force_step_.step(cell, pressure_ahead_s, record_.slip_noise_percent2_s(),
+                         record_.force())) {
       pressure_.take_step(cell.t_s);
     }
   }
@@ -219,7 +223,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     record_.slips();
     for (int i = 0; i < kFollowedPerStep && next_after_ < after_stop_.size(); ++i) {
       const Cell& cell = after_stop_[next_after_++];
-      watch_force(cell);
+      watch_force(cell, 0.0);
       record_.step(cell);
     }
     if (next_after_ < after_stop_.size()) return;

@@ -248,7 +248,7 @@ TEST(ForceStep, SeesAReadingThatStepsWhereSlipStaysAndNoForceThatSlipFollows) {
           .torque_Nm = 50.0,
           .clamp_force_N = force_N,
           .omega_p_rad_s = 100.0};
-      seen |= watch.step(cell, slip_noise_percent2_s * slip_noise_percent2_s / 200.0, trend);
+      seen |= watch.step(cell, 0.0, slip_noise_percent2_s * slip_noise_percent2_s / 200.0, trend);
       trend.step(t, force_N, 0.0);
     }
     return seen;
@@ -279,6 +279,52 @@ TEST(ForceStep, SeesAReadingThatStepsWhereSlipStaysAndNoForceThatSlipFollows) {
   EXPECT_FALSE(steps(slow, right, 300.0, 300.0));
   EXPECT_TRUE(steps(
       slow, [](double t) { return t < 10.0 ? 1.0 : 1.15; }, 150.0, 150.0));
+}
+
+// A ramp of 64 N/s whose pressure is read every 100 ms in such steps, with such noise, and foretold
+// in between by the line of the last four readings. tells: whether the samples say how long they
+// are foretold for. Of 40 ramps, those where a step is found.
+int ramps_with_a_step(double rounded_N, double noise_N, double step_share, bool tells) {
+  constexpr int kPer = 20;  // samples a reading
+  int found = 0;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    ForceStep watch(200.0, rounded_N);
+    Trend trend(200.0, 4096, Course::kBends);
+    std::vector<double> read_N;
+    bool seen = false;
+    for (int i = 0; i < 3000; ++i) {
+      const double t = i / 200.0, truth_N = 5500.0 - 64.0 * t;
+      if (i % kPer == 0) {
+        const double shown_N =
+            truth_N * (t < 8.0 ? 1.0 : 1.0 + step_share) + noise_N * normal(random);
+        read_N.push_back(rounded_N * std::round(shown_N / rounded_N));
+      }
+      double slope_N = 0.0;  // from one reading to the next
+      if (const std::size_t n = read_N.size(); n >= 4) {
+        slope_N = 0.3 * (read_N[n - 1] - read_N[n - 4]) + 0.1 * (read_N[n - 2] - read_N[n - 3]);
+      }
+      const double ahead = static_cast<double>(i % kPer) / kPer;
+      const Cell cell{.t_s = t,
+                      .slip_percent = 8000.0 / truth_N - 1.0 + 0.02 * normal(random),
+                      .torque_Nm = 50.0,
+                      .clamp_force_N = read_N.back() + ahead * slope_N,
+                      .omega_p_rad_s = 100.0};
+      seen |= watch.step(cell, tells ? 0.1 * ahead : 0.0, 0.02 * 0.02 / 200.0, trend);
+      trend.step(t, cell.clamp_force_N, 0.0);
+    }
+    found += seen;
+  }
+  return found;
+}
+
+// Rests on a step of the signal, then a reading on the next one and back, are none of the force.
+TEST(ForceStep, WhatASeldomReadPressureIsForetoldByIsNoStep) {
+  EXPECT_GT(ramps_with_a_step(452.0, 20.0, 0.0, false), 20);
+  EXPECT_LE(ramps_with_a_step(452.0, 20.0, 0.0, true), 2);
+  EXPECT_GE(ramps_with_a_step(113.0, 20.0, 0.25, true), 38);
+  EXPECT_GE(ramps_with_a_step(113.0, 20.0, -0.25, true), 38);
 }
 
 TEST(Trend, LearnsTheNoiseBesideAStepAndACorner) {
