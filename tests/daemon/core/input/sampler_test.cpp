@@ -173,6 +173,10 @@ TEST(Sampler, TheDelayIsThatOfTheSlowerSpeedAndASlowPressureAddsNone) {
 TEST(Sampler, ASampleTellsHowFarItsPressureIsForetold) {
   EXPECT_EQ(sample_all(channels(10, 10, 10)).pressure_ahead_s, 0.0);
   EXPECT_NEAR(sample_all(channels(10, 100, 10)).pressure_ahead_s, 0.0881, 1e-6);
+  // What a frame tells late was read so much earlier.
+  std::vector<Channel> late = channels(10, 100, 10);
+  late[2].late_ms = late[2].delay_ms = 30.0;
+  EXPECT_NEAR(sample_all(late).pressure_ahead_s, 0.1181, 1e-6);
 }
 
 TEST(Sampler, LearnedPeriodsGiveTheSame) {
