@@ -20,7 +20,7 @@ constexpr std::size_t kCellsPerStep = 48, kPointsPerStep = 64, kFormsPerStep = 4
 constexpr std::size_t kLevelsPerStep = 4;
 constexpr int kFormWork = 8000, kPointWork = 130, kSolveWork = 650;
 constexpr std::size_t kTermsPerStep = 16;
-constexpr double kSlipStep_percent = 0.04;  // percent: slip moves on by this, or
+constexpr double kSlipStep_percent = 0.04;  // slip moves on by this, or
 constexpr double kShortestPoint_s = 0.02;
 constexpr std::size_t kTailCells = 4;  // of a point; by so many deviations they leave its mean
 constexpr double kDrift = 3.0;

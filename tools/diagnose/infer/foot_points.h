@@ -16,20 +16,20 @@ class FootBatch {
   static constexpr std::size_t kMost = 128;
   using Column = std::array<double, kMost>;
 
-  FootBatch(const CurveShape& curve, double peak_slip, double slip_variance)
+  FootBatch(const CurveShape& curve, double peak_slip_share, double slip_variance_share2)
       : curve_(curve),
-        peak_(peak_slip),
-        per_peak_(1.0 / peak_slip),
-        slip_variance_(slip_variance),
-        slip_weight_(1.0 / slip_variance) {}
+        peak_(peak_slip_share),
+        per_peak_(1.0 / peak_slip_share),
+        slip_variance_(slip_variance_share2),
+        slip_weight_(1.0 / slip_variance_share2) {}
 
-  // slip_spread: by how much the slip varies within the sample, squared shares.
-  void add(double slip, double torque_Nm, double capacity_Nm, double slip_spread,
+  // slip_spread_share2: by how much the slip varies within the sample.
+  void add(double slip_share, double torque_Nm, double capacity_Nm, double slip_spread_share2,
            double torque_variance) {
-    slip_[count_] = slip;
+    slip_[count_] = slip_share;
     torque_Nm_[count_] = torque_Nm;
     capacity_Nm_[count_] = capacity_Nm;
-    slip_spread_[count_] = slip_spread;
+    slip_spread_[count_] = slip_spread_share2;
     torque_variance_[count_] = torque_variance;
     ++count_;
   }
