@@ -33,8 +33,8 @@ constexpr double kFarReach = 3.0;      // chosen, times: as far the equation is 
 constexpr double kSizePrior = 3.0;     // one sigma of an effect's size, in usual sizes
 // Chosen, one sigma of what the form of friction over slip at the low end stop differs from that in
 // overdrive by, of what belts differ from each other by: it is the same belt on the same pulleys. A
-// curve of its own takes over what the friction itself differs by. A fifth less and a fifth more name
-// the same in 20 campaigns of other make.
+// curve of its own takes over what the friction itself differs by. A fifth less and a fifth more
+// name the same in 20 campaigns of other make.
 constexpr double kFormsDiffer = 0.3;
 
 bool stop_used(const Campaign& campaign, int stop) {
