@@ -69,6 +69,16 @@ void judge_at_once(const CampaignCase& given, const sim::RequestTruth& broken,
   }
 }
 
+// Did the daemon ask for it? Another node's request that begins when the daemon's own has ended, or
+// before it, is answered by the controller (CLAMP_CONTRACT.md), not by the daemon.
+bool asked_by_daemon(const LoopRun& run, const sim::RequestTruth& request) {
+  constexpr double kSame_s = 0.1;  // from the daemon's frame to the controller's obeying
+  return std::any_of(run.results.begin(), run.results.end(), [&](const auto& each) {
+    return request.begin_s < static_cast<double>(each.end.ns()) * 1e-9 + kSame_s &&
+           request.end_s > static_cast<double>(each.start.ns()) * 1e-9;
+  });
+}
+
 // Friction that falls within a request is shown, but none of the catalogue's faults: X2 has it fall
 // between experiments.
 bool promised(const CampaignCase& given, const sim::RequestTruth& request) {
@@ -82,6 +92,7 @@ void judge_slip(const CampaignCase& given, const LoopRun& run, CampaignVerdict& 
   bool beyond = run.stalls > 0;
   const sim::RequestTruth* broken = nullptr;
   for (const sim::RequestTruth& request : run.requests) {
+    if (!asked_by_daemon(run, request)) continue;
     verdict.slip_max_percent = std::max(verdict.slip_max_percent, 100.0 * request.slip_max_share);
     verdict.slip_speed_max_m_s = std::max(verdict.slip_speed_max_m_s, request.slip_speed_max_m_s);
     verdict.slip_stop_percent =
@@ -96,6 +107,7 @@ void judge_slip(const CampaignCase& given, const LoopRun& run, CampaignVerdict& 
     const double end_s = request.end_s + kAfter_s;
     const double alone_slip_share = alone.slip_max_share(request.begin_s, end_s);
     worst = std::max(worst, alone_slip_share);
+    if (!asked_by_daemon(run, request)) continue;
     if (!promised(given, request) || request.slip_max_share <= alone_slip_share + kAlone) continue;
     if (beyond_limits(request, verdict.has_peak)) broken = &request;
     if (request.slip_max_share > kSlip_share) {
