@@ -8,19 +8,11 @@
 namespace beltgrip::estimator {
 namespace {
 
-// For so long the belt is watched after the stop (follow_on.h); a clamp that is given back ends it
-// sooner.
-constexpr double kKeep_s = 0.5;
 // The force is judged in means over this; a group that has not risen shows that what was read
 // before it had not.
 constexpr double kGroup_s = 0.02;
-constexpr double kForceDeviations = 3.0;
-// Further away slip moves on too fast for channels that are read one after the other. Measured on
-// 4,800 traces of other make: with 1.5 instead 2 % fewer values with harsh noise, as many else.
-constexpr double kRunAway_percent = 2.0;
 constexpr double kSwingFrom_s = 0.02, kSwingTo_s = 0.08, kSwingShortest_s = 0.03;
 constexpr std::size_t kBeforeCells = 20, kSwingCells = 10;
-constexpr double kSwing_percent = 0.3, kSwingDeviations = 3.0, kSwingShare = 0.4;
 
 std::size_t samples_in(double duration_s, double sample_rate_hz) {
   return static_cast<std::size_t>(std::max(1.0, std::round(duration_s * sample_rate_hz)));
@@ -29,7 +21,7 @@ std::size_t samples_in(double duration_s, double sample_rate_hz) {
 }  // namespace
 
 AfterStop::AfterStop(double sample_rate_hz)
-    : samples_(samples_in(kKeep_s, sample_rate_hz)),
+    : samples_(samples_in(kAfterStop_s, sample_rate_hz)),
       per_group_(samples_in(kGroup_s, sample_rate_hz)) {}
 
 void AfterStop::reset() noexcept {
@@ -53,9 +45,9 @@ void AfterStop::begin(const ExperimentRecord& record) noexcept {
     slip_at_end_percent_ = std::max(slip_at_end_percent_, history.cell(0, i).slip_percent);
   }
   slip_noise_percent2_s_ = record.slip_noise_percent2_s();
-  force_limit_N_ = force.at(stop_t_s_) +
-                   kForceDeviations * std::sqrt(force.variance_at(stop_t_s_) +
-                                                record.force().density(kGroup_s) / kGroup_s);
+  force_limit_N_ =
+      force.at(stop_t_s_) + kEvident * std::sqrt(force.variance_at(stop_t_s_) +
+                                                 record.force().density(kGroup_s) / kGroup_s);
 }
 
 void AfterStop::step(const Cell& sample, double pressure_ahead_s) noexcept {
@@ -99,12 +91,12 @@ void AfterStop::judge_group() noexcept {
 
 bool AfterStop::swung_back() const noexcept {
   // The force was back too soon: that is no period of a rattle.
-  const double watched_s = kKeep_s * swing_samples_ / static_cast<double>(samples_.size());
+  const double watched_s = kAfterStop_s * swing_samples_ / static_cast<double>(samples_.size());
   if (watched_s < kSwingShortest_s) return false;
   const double gained = slip_at_end_percent_ - slip_before_percent_;
   const double noise = std::sqrt(slip_noise_percent2_s_ / watched_s);
-  return gained > kSwing_percent + kSwingDeviations * noise &&
-         swing_slip_percent_ / swing_samples_ < slip_before_percent_ + kSwingShare * gained;
+  return gained > kSwing_percent + kEvident * noise &&
+         swing_slip_percent_ / swing_samples_ < slip_before_percent_ + kSwingLeft * gained;
 }
 
 }  // namespace beltgrip::estimator

@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/robust/thresholds.h"
 #include "estimator/signal/slow_noise.h"
 #include "estimator/statistics/square.h"
 
 namespace beltgrip::estimator {
 namespace {
 
-constexpr double kFormTolerance = 0.003;  // of mu: friction that is not quite a curve
-constexpr double kLeastShare = 0.1;       // of the chord, on either side
+constexpr double kLeastShare = 0.1;  // of the chord, on either side
 constexpr double kLeastGap_percent = 0.02;
 constexpr std::size_t kFewest = 12;  // residuals
 
@@ -55,7 +55,7 @@ double below(const Group& a, const Group& b, const Group& c, double slow_relativ
   const double lacks = (1.0 - share) * a.mu + share * c.mu - b.mu;
   const double slope = (c.mu - a.mu) / span;
   const double force = b.force_N - (1.0 - share) * a.force_N - share * c.force_N;
-  double variance = combined(a.variance, b.variance, c.variance) + square(kFormTolerance * b.mu) +
+  double variance = combined(a.variance, b.variance, c.variance) + square(kChordTolerance * b.mu) +
                     square(slope) * (combined(a.slip_variance_percent2, b.slip_variance_percent2,
                                               c.slip_variance_percent2) +
                                      square(kDeformation_percent_per_N * force));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/robust/thresholds.h"
 #include "estimator/statistics/square.h"
 
 namespace beltgrip::estimator {
@@ -11,9 +12,6 @@ namespace {
 // Before the stop, in cells of the finest level.
 constexpr std::size_t kBeforeCell = 10, kBeforeCells = 5;
 constexpr double kFewest = 5.0;
-constexpr double kStillCarried = 0.99;  // of mu
-constexpr double kSlower = 2.0;
-constexpr double kDeviations = 3.0;
 
 }  // namespace
 
@@ -58,7 +56,7 @@ void FollowOn::step(const Cell& sample) noexcept {
 // is given back.
 bool FollowOn::clamped_again() const noexcept {
   const double lowest_N = std::min(before_.force_N(), middle_.force_N());
-  return late_.force_N() - lowest_N > kDeviations * std::sqrt(2.0 * force_variance_N2_);
+  return late_.force_N() - lowest_N > kEvident * std::sqrt(2.0 * force_variance_N2_);
 }
 
 double FollowOn::carried(double traction_per_Nm_N, double inertia_kg_m2) const noexcept {
@@ -78,7 +76,7 @@ bool FollowOn::stood_still(double mu, double traction_per_Nm_N,
   const double later = late_.mean_slip_percent() - middle_.mean_slip_percent();
   const double variance = slip_noise_percent2_s_ *
                           (1.0 / before_cells_s_ + (square(1.0 + times) + square(times)) / kMean_s);
-  return gained - times * later > kDeviations * std::sqrt(variance);
+  return gained - times * later > kEvident * std::sqrt(variance);
 }
 
 }  // namespace beltgrip::estimator

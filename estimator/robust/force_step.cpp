@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/robust/thresholds.h"
 #include "estimator/statistics/square.h"
 
 namespace beltgrip::estimator {
@@ -11,28 +12,14 @@ namespace {
 constexpr double kCell_s = 0.05;
 constexpr std::size_t kGapCells = 2;
 constexpr std::size_t kShortest = 2, kLongest = 64;  // cells in each of four groups
-constexpr double kDeviations = 5.0;
 // The scatter is read off a number of squares that share half of what they say: Student's quantile
 // is (z^2 + 1) / 4 nu larger than the normal one.
-constexpr double kStudent = 2.0 * (kDeviations * kDeviations + 1.0) / 4.0;
+constexpr double kStudent = 2.0 * (kInManyLooks * kInManyLooks + 1.0) / 4.0;
 constexpr double kFewestSquares = 6.0;
 // Chosen: longer means have few squares, and the density is that of the shorter ones as well.
 constexpr double kKnownScale_s = 0.2;
 // Chosen: a ramp may change its rate within a second or two, which are four such means.
 constexpr double kStraight_s = 0.4;
-constexpr double kShare = 0.015;  // of the force
-// Chosen: what a lag makes of the reading at the corner of a ramp stays below.
-constexpr double kLargeShare = 0.04;
-constexpr double kFallsOn = 0.5;    // chosen: of the ramp before it, to go on as a ramp
-constexpr double kLeastMove = 0.4;  // of what slip would have to move by
-constexpr double kSlipDeviations = 4.0, kSlopeDeviations = 2.0;
-// Derived: a pressure between two readings is foretold by the line of the last four. Shorter groups
-// hold errors of that line, which their neighbours share, and a mean's noise does not tell them.
-// Measured on 40 ramps read every 100 ms (curve_health_test): in steps of 452 N a false step in 31
-// without it, 19 with two readings, 1 with four; steps of 25 % in a fine reading are found in 39
-// instead of 40. 500 recordings of other make are answered alike with 2, 3.2, 4 and 4.8.
-constexpr double kReadings = 4.0;
-constexpr double kStairs = 1.5;  // steps of a signal that is rounded coarsely are no steps
 }  // namespace
 
 ForceStep::ForceStep(double sample_rate_hz, double resolution_N)
@@ -69,7 +56,7 @@ bool ForceStep::steps(std::size_t length, double slip_noise_percent2_s,
   const double drift_N = before.force_N - earlier.force_N;
   const double drift_after_N = later.force_N - after.force_N;
   const double jump_N = after.force_N - before.force_N - on * (drift_N + drift_after_N);
-  if (std::abs(jump_N) < std::max(kShare * std::abs(before.force_N), stair_N_)) return false;
+  if (std::abs(jump_N) < std::max(kStepShare * std::abs(before.force_N), stair_N_)) return false;
   // A corner of the force's course, in one of the groups, looks like a step of less than this.
   if (std::abs(jump_N) < std::abs(drift_after_N - drift_N)) return false;
   // What means scatter by without the corners and steps themselves, and at least the white noise;
@@ -79,7 +66,7 @@ bool ForceStep::steps(std::size_t length, double slip_noise_percent2_s,
                              : std::max(force.quiet_density(length_s),
                                         force.density(std::min(length_s, kKnownScale_s)));
   const double force_deviation_N = std::sqrt(density / length_s);
-  if (std::abs(jump_N) < kDeviations * spread * force_deviation_N) return false;
+  if (std::abs(jump_N) < kInManyLooks * spread * force_deviation_N) return false;
   const double mu_after = after.torque_Nm / after.force_N;
   // Relative to mu*.
   const double rise =
@@ -97,9 +84,9 @@ bool ForceStep::steps(std::size_t length, double slip_noise_percent2_s,
   const bool falls_on =
       drift_N < 0.0 && drift_after_N < std::min(kFallsOn * drift_N, -surely_falls_N);
   const double squares = force.squares(std::min(length_s, kKnownScale_s));
-  const double large_N =
-      std::max(kDeviations * (1.0 + kStudent / std::max(squares, 1.0)) * spread * force_deviation_N,
-               kLargeShare * std::abs(before.force_N));
+  const double large_N = std::max(
+      kInManyLooks * (1.0 + kStudent / std::max(squares, 1.0)) * spread * force_deviation_N,
+      kLargeStepShare * std::abs(before.force_N));
   if (falls_on && squares >= kFewestSquares && std::abs(jump_N) > large_N &&
       -slip_jump_percent * jump_N < slip_noise_percent * std::abs(jump_N)) {
     return true;
@@ -117,7 +104,7 @@ bool ForceStep::steps(std::size_t length, double slip_noise_percent2_s,
       expected = std::max(expected, before.slip_percent - past.slip_percent - surely);
     }
   }
-  return std::abs(slip_jump_percent) + slip_noise_percent < kLeastMove * expected;
+  return std::abs(slip_jump_percent) + slip_noise_percent < kSlipFollows * expected;
 }
 
 bool ForceStep::step(const Cell& sample, double pressure_ahead_s, double slip_noise_percent2_s,

@@ -20,29 +20,16 @@ constexpr std::size_t kCellsPerStep = 48, kPointsPerStep = 64, kFormsPerStep = 4
 constexpr std::size_t kLevelsPerStep = 4;
 constexpr int kFormWork = 8000, kPointWork = 130, kSolveWork = 650;
 constexpr std::size_t kTermsPerStep = 16;
-constexpr double kSlipStep_percent = 0.04;  // slip moves on by this, or
-constexpr double kShortestPoint_s = 0.02;
-constexpr std::size_t kTailCells = 4;  // of a point; by so many deviations they leave its mean
-constexpr double kDrift = 3.0;
-constexpr double kLongestPoint_s = 1.0;  // time does
-constexpr double kStretchFrom = 0.9;     // of the top of mu*
+constexpr std::size_t kTailCells = 4;  // of a point
 constexpr std::size_t kWantedPoints = 16;
 constexpr std::size_t kMostNeighbours = 24;
-constexpr double kCoursePrecision = 0.02;
 constexpr std::size_t kNeighbours = 3;  // to each side, for a first look at the course of mu*
 constexpr std::size_t kEdgeCells = 2;   // to each side of a point's end, for speed
-constexpr double kFirstLambda = 0.06;   // of the span of slip
-constexpr double kLastLambda = 1.2;
+constexpr double kLastLambda = 1.2;     // of the span of slip
 constexpr double kLambdaFactor = 1.35;
 constexpr std::size_t kCorners = 20;
-constexpr double kCornersOver = 0.75;  // of the span, from its upper end
 constexpr std::size_t kMostForms = 16 * (kCorners + 1) + kCorners * kCorners;
-constexpr double kFormError = 0.05;       // of how far mu* lies below its top: forms are local
-constexpr double kFormTolerance = 0.002;  // of mu: no friction is quite one of the forms
-constexpr double kSmallestSlope = 1e-9;   // 1/percent, of a deviation that is divided by
-constexpr double kNearTop = 0.98;
-constexpr double kHealthFrom = 0.6;        // of the top of mu*
-constexpr double kStandsStill = 0.02;      // of the clamp force
+constexpr double kSmallestSlope = 1e-9;    // 1/percent, of a deviation that is divided by
 constexpr std::size_t kLargestGroup = 16;  // points
 
 // R = L D L', positive definite, without pivoting.
@@ -215,7 +202,7 @@ void PeakFit::gather_level() noexcept {
 
 // By which slip has surely moved, from one mean over so long to the next.
 double PeakFit::slip_step_percent(double duration_s) const noexcept {
-  return std::max(kSlipStep_percent,
+  return std::max(kPointSlip_percent,
                   2.0 * std::sqrt(record_->slip_noise_percent2_s() / duration_s));
 }
 
@@ -236,18 +223,18 @@ void PeakFit::make_points() noexcept {
       count_in(next_cell_, 1.0, duration_s, slip_percent_s);
       count_in(next_cell_, 1.0, tail_s, tail);
       if (begin - next_cell_ > kTailCells) count_in(next_cell_ + kTailCells, -1.0, tail_s, tail);
-      if (duration_s < kShortestPoint_s) continue;
+      if (duration_s < kPointShortest_s) continue;
       if (std::abs(slip_percent_s / duration_s - last_slip_percent_) >
               slip_step_percent(duration_s) ||
-          duration_s > kLongestPoint_s)
+          duration_s > kPointLongest_s)
         break;
       // Slip that begins to run away is seen in the newest cells, before it moves the mean.
       const double head_s = duration_s - tail_s;
-      if (head_s < 0.5 * kShortestPoint_s) continue;
+      if (head_s < 0.5 * kPointShortest_s) continue;
       const double drift = tail / tail_s - (slip_percent_s - tail) / head_s;
       if (std::abs(drift) >
-          std::max(kSlipStep_percent,
-                   kDrift * std::sqrt(slip_noise_percent2_s * (1.0 / tail_s + 1.0 / head_s)))) {
+          std::max(kPointSlip_percent,
+                   kEvident * std::sqrt(slip_noise_percent2_s * (1.0 / tail_s + 1.0 / head_s)))) {
         break;
       }
     }

@@ -24,9 +24,6 @@
 
 namespace beltgrip::estimator {
 
-// By so many deviations what mu* has reached is lowered: the largest of many windows is taken.
-inline constexpr double kReachedDeviations = 3.3;
-
 struct PeakFitResult {
   bool valid = false;
   double mu = 0.0;            // largest value of the curve within the data

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/robust/thresholds.h"
 #include "estimator/statistics/interval.h"
 #include "estimator/statistics/square.h"
 
@@ -13,24 +14,15 @@ constexpr double kLargestU = 4.0;
 constexpr double kFirstPeak_percent = 0.6;
 constexpr double kPeakFactor = 1.16;
 constexpr double kDeformationStep_percent = 0.5;  // at the first force
-constexpr double kFallBeyond = 0.03;              // of mu_max per slip at the peak
-// Widths of the linear parameters, 1 deviation: end stop in percent of slip; half a step of the
-// grids.
-constexpr double kEndStop_percent = 0.1;
+// Widths of the linear parameters, 1 deviation: half a step of the grids.
 constexpr double kDeformation_percent = 0.25;
 constexpr double kPeakShift = 0.08;
 constexpr double kScale = 3.0;  // of m, in units of the largest mu* so far
-// No curve is exactly one of the forms: this much of mu* at every point.
-constexpr double kFormError = 0.009;
-// Neighbouring points share what is wrong with the form and with the line of the force: so much of
-// their evidence is their own.
-constexpr double kOwnEvidence = 0.75;
 // A point is complete when force or slip has moved on.
 constexpr double kForceStep = 0.02;  // relative
 constexpr double kSlipStep_percent = 0.08;
 constexpr double kShortestPoint_s = 0.05;
 constexpr std::size_t kFewestPoints = 5;
-constexpr double kReachedDeviations = 2.7;
 constexpr double kLeastPossible = 1e-3;
 // Curves that are less likely than the best by more than this do not count (of the logarithm), and
 // beyond the second are never looked at again: evidence does not turn round by so much.
@@ -157,7 +149,7 @@ void PeakForecast::raise_reached(double force_variance) noexcept {
     if (points_ % (std::size_t{1} << scale) != 0) continue;
     const double mu = weighted / weight;
     const double deviation = std::sqrt(1.0 / weight + square(mu) * force_variance);
-    reached_ = std::max(reached_, mu - kReachedDeviations * deviation);
+    reached_ = std::max(reached_, mu - kForecastReached * deviation);
     means_[scale] = {0.0, 0.0};
   }
 }
@@ -180,7 +172,7 @@ void PeakForecast::add_point(Curve& curve) const noexcept {
   const double slope = step * kTable / kLargestU;
   const double per_percent =
       point_.mu * slope / (std::max(0.3, std::abs(g)) * curve.slip_peak_percent);
-  const double form_variance = square(kFormError * point_.mu);
+  const double form_variance = square(kForecastFormError * point_.mu);
   const double w = 1.0 / (point_.variance_mu + square(per_percent) * point_.variance_slip_percent2 +
                           form_variance);
   const std::array<double, kTerms> phi{slope, slope * point_.force_share, -u * slope, g};

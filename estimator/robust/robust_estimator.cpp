@@ -15,6 +15,7 @@
 #include "estimator/robust/force_step.h"
 #include "estimator/robust/peak_fit.h"
 #include "estimator/robust/peak_forecast.h"
+#include "estimator/robust/stop_detector.h"
 #include "estimator/robust/thresholds.h"
 #include "estimator/signal/excitation.h"
 #include "estimator/signal/signal_chain.h"
@@ -25,27 +26,13 @@ namespace {
 
 constexpr double kPublished_hz = 8.0;  // low-pass of the published mu* and slip only
 constexpr double kExcitationWindow_s = 1.0;
-// Probability that the data contain the peak, with another end than a stop by the slope.
-constexpr double kInsideWithoutStop = 0.9;
-constexpr double kFallDeviations = 3.0;  // by which mu* must then have fallen
-constexpr double kFormDeviation = 5e-4;  // of mu: what the forms of the fit leave
-constexpr int kNarrowInARow = 4;
 constexpr int kFollowedPerStep = 3;
-constexpr double kClimb = 1.05;    // mu* at the stop, of the first one; or
-constexpr double kLowered = 0.99;  // the clamp force
-// A jump of the reading by more is looked at: of a speed and of the torque, relative; of noise.
-constexpr double kGlitchSlip_share = 0.005, kGlitchTorque = 0.2, kGlitchDeviations = 5.0;
 constexpr double kNoiseKnown_s = 1.0;
-constexpr double kFittedDeviations = 2.6;  // by which the fit's top is lowered for a bound
-constexpr double kChordDeviations = 5.5;   // beyond these the points lie on no one curve
-constexpr double kInnovation = 5.0;
-constexpr double kRuns = 4.5;
-constexpr double kSlipOfATop_percent = 1.5;  // less of it is that of a belt that grips
 
 class RobustEstimator final : public SlipCurveEstimator {
  public:
   RobustEstimator(const EstimatorSettings& settings, const VariatorParameters& variator,
-                  const SensorAccuracies& accuracies, const StopThresholds& thresholds)
+                  const SensorAccuracies& accuracies)
       : variator_(variator),
         accuracies_(accuracies),
         sample_rate_hz_(settings.sample_rate_hz),
@@ -57,7 +44,6 @@ class RobustEstimator final : public SlipCurveEstimator {
         chain_(settings, variator, kPublished_hz),
         excitation_(kExcitationWindow_s, settings.sample_rate_hz, 0.0),
         record_(settings.sample_rate_hz),
-        detector_(thresholds),
         after_stop_(settings.sample_rate_hz),
         force_step_(settings.sample_rate_hz,
                     variator.secondary_piston_area_m2 * settings.pressure_step_Pa),
@@ -195,7 +181,7 @@ class RobustEstimator final : public SlipCurveEstimator {
       if (!std::isfinite(value)) return sample;
     }
     const auto least = [this](double density) {
-      return kGlitchDeviations * std::sqrt(density * sample_rate_hz_);
+      return kInManyLooks * std::sqrt(density * sample_rate_hz_);
     };
     const double glitch_share =
         std::max(kGlitchSlip_share, least(record_.slip_noise_percent2_s()) / kPercent);
@@ -389,7 +375,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     const bool seen = out_.stop == StopReason::kSlope ||
                       (slips_on && first_mu_ < kRisenFrom * fit.mu) ||
                       (out_.stop != StopReason::kTorque && fit.inside >= kInsideWithoutStop &&
-                       fit.passed && fit.fall > kFallDeviations * std::sqrt(fit.fall_variance));
+                       fit.passed && fit.fall > kEvident * std::sqrt(fit.fall_variance));
     peak_.samples = std::lround(fit.duration_s * sample_rate_hz_);
     peak_.contradictory = contradictory(fit);
     if (peak_.contradictory) {
@@ -450,7 +436,7 @@ class RobustEstimator final : public SlipCurveEstimator {
            pressure_.has_stepped() || omega_p_.has_stepped() || omega_s_.has_stepped() ||
            after_stop_.swung_back() ||
            (fit.valid && follow_on_.stood_still(fit.mu, traction_, inertia_kg_m2_)) ||
-           fit.below_chord > kChordDeviations || fit.residuals.innovation > kInnovation ||
+           fit.below_chord > kChordDeviations || fit.residuals.innovation > kInManyLooks ||
            fit.residuals.runs > kRuns;
   }
 
@@ -491,9 +477,8 @@ class RobustEstimator final : public SlipCurveEstimator {
 
 std::unique_ptr<SlipCurveEstimator> make_robust_estimator(const EstimatorSettings& settings,
                                                           const VariatorParameters& variator,
-                                                          const SensorAccuracies& accuracies,
-                                                          const StopThresholds& thresholds) {
-  return std::make_unique<RobustEstimator>(settings, variator, accuracies, thresholds);
+                                                          const SensorAccuracies& accuracies) {
+  return std::make_unique<RobustEstimator>(settings, variator, accuracies);
 }
 
 }  // namespace beltgrip::estimator

@@ -14,13 +14,12 @@
 #include <memory>
 
 #include "estimator/method/slip_curve_estimator.h"
-#include "estimator/robust/stop_detector.h"
+#include "estimator/physics/parameters.h"
 
 namespace beltgrip::estimator {
 
 std::unique_ptr<SlipCurveEstimator> make_robust_estimator(const EstimatorSettings& settings,
                                                           const VariatorParameters& variator,
-                                                          const SensorAccuracies& accuracies,
-                                                          const StopThresholds& thresholds = {});
+                                                          const SensorAccuracies& accuracies);
 
 }  // namespace beltgrip::estimator

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/physics/slip.h"
+#include "estimator/physics/units.h"
+#include "estimator/robust/thresholds.h"
 #include "estimator/signal/slow_noise.h"
 #include "estimator/statistics/square.h"
 
@@ -13,9 +16,7 @@ namespace {
 
 constexpr double kShortestWindow_s = 0.12;
 constexpr double kWindowFactor = 1.3;
-constexpr double kSmallestLevelSlip_percent = 0.5;  // percent: slip taken for elasticity at least
-constexpr double kQuietDeviation = 0.05;            // percent: noise of the smallest slip at most
-constexpr double kSettle_s = 1.2;                   // load is being taken up: no slope before
+constexpr double kQuietDeviation = 0.05;  // percent: noise of the smallest slip at most
 constexpr double kTiny = 1e-12;
 
 struct Known {
@@ -48,7 +49,7 @@ StopDetector::Weights StopDetector::engine_weights(double tau) noexcept {
           {1.0 - 4.0 * tau + 3.0 * tau * tau, 2.0 * tau - 3.0 * tau * tau}};
 }
 
-StopDetector::StopDetector(const StopThresholds& limits) : limits_(limits) {
+StopDetector::StopDetector() {
   const auto fill = [](MomentTable& table, Weights (*weights)(double)) {
     for (std::size_t n = 1; n < table.size(); ++n) {
       for (std::size_t i = 0; i < n; ++i) {
@@ -126,21 +127,21 @@ StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
     s_2 += history.cell(level, i).slip_percent * per_quarter;
   }
   out.gained = s_2 - s_1;
-  if (out.gained < limits_.smallest_gain_percent) return out;  // most windows: no more is needed
+  if (out.gained < kSmallestGain_percent) return out;  // most windows: no more is needed
   double force_before = 0.0, force_after = 0.0;
   for (std::size_t i = 0; i < quarter; ++i) {
     force_before += history.cell(level, cells - quarter / 2 + i).clamp_force_N * per_quarter;
     force_after += record.clamp_force_N(history.cell(level, i)) * per_quarter;
   }
-  const double deformation =
-      limits_.deformation_percent_per_N * std::abs(force_before - force_after);
-  if (out.gained < limits_.smallest_gain_percent + deformation) return out;
-  // In a Gaussian's far tail: twice the logarithm of how much less often the window is a new one.
+  // Deformation moves the slip by itself as the clamp force falls: that counts for nothing.
+  const double deformation = kPercent * kDeformationMost_1_N * std::abs(force_before - force_after);
+  if (out.gained < kSmallestGain_percent + deformation) return out;
+  // A longer window is new less often in proportion, and may err more often in proportion. In a
+  // Gaussian's far tail: twice the logarithm of how much less often the window is a new one.
   // While the noise itself is known from few data, Student's tail is as much longer (Wallace).
   const double gained_variance = 2.0 * record.slip_noise_percent2_s() * per_quarter / cell_s;
   const double freedom = std::max(1.0, record.slip_noise_freedom());
-  const double normal_squared =
-      square(limits_.gain_deviations) - 2.0 * std::log(W / kShortestWindow_s);
+  const double normal_squared = square(kInManyLooks) - 2.0 * std::log(W / kShortestWindow_s);
   const double gain_deviations_squared = freedom * std::expm1(normal_squared / freedom);
   if (square(out.gained) < gain_deviations_squared * gained_variance) return out;
 
@@ -243,8 +244,8 @@ StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
   out.hold_deviation = std::sqrt(square(out.hold) * gain_variance + force_variance +
                                  square(c_ / (F_1 * out.gained)) * hold_variance);
   out.slip_percent = s_2;
-  out.level = limits_.level_elasticity * mu_1 /
-              std::max(s_2 - smallest_slip_percent_, kSmallestLevelSlip_percent);
+  out.level =
+      kLevelElasticity * mu_1 / std::max(s_2 - smallest_slip_percent_, kLevelSlipLeast_percent);
   out.duration_s = W;
   out.valid = std::isfinite(out.k) && std::isfinite(out.k_deviation) && out.level > 0.0;
   return out;
@@ -281,8 +282,8 @@ StopReason StopDetector::backup(const ExperimentRecord& record) const noexcept {
   const double rate_deviation =
       std::sqrt(record.slip_noise_percent2_s() / cell_s / moment) / cell_s;
   const double now = s + rate * middle * cell_s;
-  if (s - smallest_slip_percent_ > limits_.backup_slip_percent) return StopReason::kSlip;
-  if (now + (rate - 4.0 * rate_deviation) * limits_.backup_ahead_s > limits_.backup_ahead_percent) {
+  if (s - smallest_slip_percent_ > kBackupSlip_percent) return StopReason::kSlip;
+  if (now + (rate - 4.0 * rate_deviation) * kBackupAhead_s > kBackupAhead_percent) {
     return StopReason::kSlipRate;
   }
   return StopReason::kNone;
@@ -312,10 +313,9 @@ StopReason StopDetector::step(const ExperimentRecord& record) noexcept {
     }
     const double hold_most = std::max(slope.level, slope.hold + 2.0 * slope.hold_deviation);
     const double evidence =
-        std::min(limits_.most_deviations,
-                 limits_.base_deviations +
-                     limits_.deviations_per_e * std::log(hold_most / slope.level)) /
-        std::max(1.0, slope.gained / limits_.large_gain_percent);
+        std::min(kLevelDeviationsMost,
+                 kLevelDeviations + kLevelDeviationsPerE * std::log(hold_most / slope.level)) /
+        std::max(1.0, slope.gained / kLargeGain_percent);
     if (slope.k + evidence * slope.k_deviation < slope.level ||
         slope.hold + 2.0 * slope.hold_deviation < slope.level) {
       if (!level_) level_slip_percent_ = slope.slip_percent - slope.gained;
@@ -324,15 +324,14 @@ StopReason StopDetector::step(const ExperimentRecord& record) noexcept {
     }
     // A friction curve rises less and less: where it rises now it was not level before.
     if (level_ && slope.slip_percent - slope.gained >= level_slip_percent_ &&
-        slope.k - limits_.falling_deviations * slope.k_deviation > slope.level) {
+        slope.k - kEvident * slope.k_deviation > slope.level) {
       level_ = false;
       level_until_s_ = now_s;
     }
-    const bool falling =
-        slope.k + std::max(limits_.falling_deviations, evidence) * slope.k_deviation < 0.0;
+    const bool falling = slope.k + std::max(kEvident, evidence) * slope.k_deviation < 0.0;
     if (falling ||
-        (level_ && slope.slip_percent + limits_.ahead_s * 2.0 * slope.gained / slope.duration_s >
-                       level_slip_percent_ + limits_.follow_percent)) {
+        (level_ && slope.slip_percent + kAhead_s * 2.0 * slope.gained / slope.duration_s >
+                       level_slip_percent_ + kFollow_percent)) {
       stop = StopReason::kSlope;
     }
   }

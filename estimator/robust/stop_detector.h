@@ -26,46 +26,14 @@
 #include <cstddef>
 
 #include "estimator/method/slip_curve_estimator.h"
-#include "estimator/physics/slip.h"
-#include "estimator/physics/units.h"
 #include "estimator/record/experiment_record.h"
 
 namespace beltgrip::estimator {
 
-struct StopThresholds {
-  // Elasticity below which the curve counts as level.
-  double level_elasticity = 0.03;
-  // Evidence for "level", in standard deviations of k: base, more for each factor e by which
-  // k_hold lies above level, at most; less in proportion where slip has grown by more than
-  // large_gain within the window.
-  double base_deviations = 1.0;
-  double deviations_per_e = 0.8;
-  double most_deviations = 3.5;
-  double large_gain_percent = 0.4;
-  // For "falling" never less than:
-  double falling_deviations = 3.0;
-  // Slip by which a level curve is followed on, in search of its fall, from where the window that
-  // showed it begins; where slip runs away, by what it will gain this much later.
-  double follow_percent = 1.1;
-  double ahead_s = 0.07;
-  // A window is looked at where slip has grown by this much, and by so many deviations that noise
-  // alone does so in one look of three million: an experiment has thousands of looks at the
-  // shortest windows. A longer one is new less often in proportion, and may err more often in
-  // proportion. Deformation moves the slip by itself as the clamp force falls: by so much at most,
-  // which counts for nothing.
-  double smallest_gain_percent = 0.2;
-  double deformation_percent_per_N = kPercent * kDeformationMost_1_N;
-  double gain_deviations = 5.0;
-  // Backups: slip above its smallest value; slip that will be reached this much later.
-  double backup_slip_percent = 7.5;
-  double backup_ahead_s = 0.15;
-  double backup_ahead_percent = 9.0;
-};
-
 class StopDetector {
  public:
   // c: cos(theta) / (2 R_p); inertia 0 where the torque of the belt is measured.
-  explicit StopDetector(const StopThresholds& limits);
+  StopDetector();
   void reset(double traction_per_Nm_N, double inertia_kg_m2) noexcept;
   // After each cell of the record. First reason wins; the caller keeps it.
   StopReason step(const ExperimentRecord& record) noexcept;
@@ -110,7 +78,6 @@ class StopDetector {
   void update_smallest_slip(const ExperimentRecord& record) noexcept;
   StopReason backup(const ExperimentRecord& record) const noexcept;
 
-  StopThresholds limits_;
   MomentTable sensor_moments_, engine_moments_;
   SlowTable sensor_slow_, engine_slow_;
   double c_ = 0.0;

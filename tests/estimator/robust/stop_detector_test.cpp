@@ -27,7 +27,7 @@ double slip_percent_at_stop(double (*curve)(double), double wander_Nm, std::uint
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
   ExperimentRecord record(kRate_hz);
-  StopDetector detector{StopThresholds{}};
+  StopDetector detector;
   detector.reset(kTraction, 0.0);
   const double faded = std::exp(-1.0 / (kRate_hz * 1.2));
   double wander = normal(random), slip_percent = 0.5;
