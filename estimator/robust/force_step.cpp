@@ -14,7 +14,7 @@ constexpr std::size_t kGapCells = 2;
 constexpr std::size_t kShortest = 2, kLongest = 64;  // cells in each of four groups
 // The scatter is read off a number of squares that share half of what they say: Student's quantile
 // is (z^2 + 1) / 4 nu larger than the normal one.
-constexpr double kStudent = 2.0 * (kInManyLooks * kInManyLooks + 1.0) / 4.0;
+double student() noexcept { return 2.0 * (square(kInManyLooks) + 1.0) / 4.0; }
 constexpr double kFewestSquares = 6.0;
 // Chosen: longer means have few squares, and the density is that of the shorter ones as well.
 constexpr double kKnownScale_s = 0.2;
@@ -85,7 +85,7 @@ bool ForceStep::steps(std::size_t length, double slip_noise_percent2_s,
       drift_N < 0.0 && drift_after_N < std::min(kFallsOn * drift_N, -surely_falls_N);
   const double squares = force.squares(std::min(length_s, kKnownScale_s));
   const double large_N = std::max(
-      kInManyLooks * (1.0 + kStudent / std::max(squares, 1.0)) * spread * force_deviation_N,
+      kInManyLooks * (1.0 + student() / std::max(squares, 1.0)) * spread * force_deviation_N,
       kLargeStepShare * std::abs(before.force_N));
   if (falls_on && squares >= kFewestSquares && std::abs(jump_N) > large_N &&
       -slip_jump_percent * jump_N < slip_noise_percent * std::abs(jump_N)) {

@@ -2,16 +2,12 @@
 // generator, answered with each number a fifth smaller and a fifth larger. tests/vary runs it.
 //   constants_panel [--write FILE]   the table; into FILE, behind its heading
 // The sources that decide are compiled anew here, with numbers that can be moved.
-#include <algorithm>
 #include <array>
-#include <cstdio>
-#include <cstring>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
 #include "tests/statistics/blind/generator.h"
+#include "tests/statistics/varied_numbers.h"
 #include "tools/diagnose/data/signal_table.h"
 #include "tools/diagnose/decide/thresholds.h"
 #include "tools/diagnose/model/model_file.h"
@@ -20,17 +16,11 @@
 namespace beltgrip::blind {
 namespace {
 
-constexpr const char* kHeading = "## What the deciding numbers decide\n";
-
 // As short as an answer is still to be had from: hundreds are.
 constexpr int kRuns = 8;
 constexpr double kDuration_s = 45.0;
 
-struct Number {
-  const char* name;
-  double* value;
-};
-const Number kNumbers[] = {
+const test::VariedNumber kNumbers[] = {
 #include "varied_constants.inc"
 };
 
@@ -124,58 +114,20 @@ std::string text_of(const Counts& counts) {
   return out;
 }
 
-std::string table() {
-  const std::vector<Case> all = cases();
-  Counts of{};
-  for (const Case& each : all) ++of[each.part];
-  std::string out = "Of " + std::to_string(of[kHealthy]) + " healthy recordings of the generator " +
-                    "called so / of " + std::to_string(of[kNamed]) + " effects named first / of " +
-                    std::to_string(of[kFlagged]) +
-                    " causes outside the table flagged; as it is: " + text_of(right(all)) +
-                    ".\n\n| number | value | a fifth less | a fifth more |\n|---|---|---|---|\n";
-  for (const Number& each : kNumbers) {
-    const double value = *each.value;
-    char head[96];
-    std::snprintf(head, sizeof head, "| `%s` | %g |", each.name, value);
-    out += head;
-    for (const double share : {0.8, 1.2}) {
-      *each.value = share * value;
-      out += " " + text_of(right(all)) + " |";
-    }
-    *each.value = value;
-    out += "\n";
-  }
-  return out;
-}
-
-// In place of what stands below the heading, up to the next one.
-bool write(const char* path, const std::string& text) {
-  std::ifstream in(path);
-  std::string whole((std::istreambuf_iterator<char>(in)), {});
-  const std::size_t heading = whole.find(kHeading);
-  if (heading == std::string::npos) return false;
-  const std::size_t begin = heading + std::strlen(kHeading);
-  const std::size_t end = std::min(whole.find("\n## ", begin), whole.size());
-  whole.replace(begin, end - begin, text);
-  std::ofstream(path) << whole;
-  return true;
-}
-
 }  // namespace
 }  // namespace beltgrip::blind
 
 int main(int argc, char** argv) {
   using namespace beltgrip::blind;
-  const bool into_file = argc == 3 && std::strcmp(argv[1], "--write") == 0;
-  if (argc != 1 && !into_file) {
-    std::fprintf(stderr, "usage: constants_panel [--write FILE]\n");
-    return 64;
-  }
-  const std::string text = table();
-  if (into_file && !write(argv[2], text)) {
-    std::fprintf(stderr, "%s: has no heading \"%s\"\n", argv[2], kHeading);
-    return 65;
-  }
-  std::printf("%s", text.c_str());
-  return 0;
+  const std::vector<Case> all = cases();
+  Counts of{};
+  for (const Case& each : all) ++of[each.part];
+  const std::string introduction =
+      "Of " + std::to_string(of[kHealthy]) +
+      " healthy recordings of the generator called so / of " + std::to_string(of[kNamed]) +
+      " effects named first / of " + std::to_string(of[kFlagged]) +
+      " causes outside the table flagged; as it is: " + text_of(right(all)) + ".";
+  return beltgrip::test::write_varied(argc, argv, "## What the deciding numbers decide\n",
+                                      introduction, kNumbers,
+                                      [&all] { return text_of(right(all)); });
 }
