@@ -1,0 +1,162 @@
+// The stop detector beside the same written a second time (stop_reference.h), after every cell of
+// drawn ramps: torque measured or of an engine, quiet to harsh, curves that peak, level off, rise
+// on or run away.
+#include "tests/estimator/robust/stop_reference.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <string>
+
+#include "estimator/robust/stop_detector.h"
+
+namespace beltgrip::estimator {
+namespace {
+
+constexpr double kRate_hz = 200.0;
+constexpr double kTraction = 6.3;  // c, 1/m: overdrive
+// Derived: what keeps a division from zero in one and not in the other.
+constexpr double kDigits = 1e-5;
+
+struct Ramp {
+  double peak_percent = 2.0, fall = 0.02, mu_max = 0.1;
+  double torque_Nm = 30.0, torque_drift_Nm_per_s = 0.0, torque_noise_Nm = 0.1, wander_Nm = 0.0;
+  double slip_noise_percent = 0.02, force_noise_N = 5.0, speed_noise_rad_s = 0.02;
+  double inertia_kg_m2 = 0.0;
+  double ends_percent = 9.9;
+  double gains_percent_per_s = 0.25;
+};
+
+// Up to the top a parabola, behind it falling or level.
+double friction(const Ramp& ramp, double slip_percent) {
+  const double u = slip_percent / ramp.peak_percent;
+  if (u < 1.0) return ramp.mu_max * (0.25 + 0.75 * (2.0 * u - u * u));
+  return ramp.mu_max * (1.0 - ramp.fall * (u - 1.0));
+}
+
+Ramp draw(std::mt19937_64& random) {
+  const auto between = [&random](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  const double noise = std::pow(10.0, between(-1.0, 0.7));
+  Ramp out;
+  out.peak_percent = between(0.8, 9.0);
+  out.fall = between(0.0, 1.0) < 0.3 ? 0.0 : between(0.0, 0.1);
+  out.torque_Nm = between(15.0, 60.0);
+  out.torque_drift_Nm_per_s = between(-0.3, 0.3);
+  out.torque_noise_Nm = 0.3 * noise;
+  out.wander_Nm = between(0.0, 1.0) < 0.5 ? 0.0 : 0.1 * noise;
+  out.slip_noise_percent = 0.03 * noise;
+  out.force_noise_N = 8.0 * noise;
+  out.speed_noise_rad_s = 0.02 * noise;
+  out.inertia_kg_m2 = between(0.0, 1.0) < 0.5 ? 0.0 : 0.18;
+  out.gains_percent_per_s = between(0.15, 1.2);
+  return out;
+}
+
+struct Compared {
+  int cells = 0, rising = 0, level = 0;
+  StopReason stop = StopReason::kNone;
+  std::string differs;
+};
+
+Compared compare(const Ramp& ramp, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  ExperimentRecord record(kRate_hz);
+  StopDetector detector;
+  detector.reset(kTraction, ramp.inertia_kg_m2);
+  test::StopReference reference(kTraction, ramp.inertia_kg_m2);
+  Compared out;
+  const double faded = std::exp(-1.0 / (kRate_hz * 1.2));
+  double slip_percent = 0.1, wander = normal(random), omega = 110.0;
+  for (int i = 0; slip_percent < ramp.ends_percent && i < 40 * kRate_hz; ++i) {
+    const double t_s = i / kRate_hz;
+    // Slow at first; over the top slip gains pace.
+    const double pace = t_s < 1.5 ? 0.1 : slip_percent > ramp.peak_percent ? 6.0 : 1.0;
+    slip_percent += pace * ramp.gains_percent_per_s / kRate_hz;
+    wander = faded * wander + std::sqrt(1.0 - faded * faded) * normal(random);
+    const double torque = ramp.torque_Nm + ramp.torque_drift_Nm_per_s * t_s;
+    const double over = std::max(0.0, slip_percent - ramp.peak_percent);
+    const double acceleration = ramp.inertia_kg_m2 > 0.0 ? 2.0 * over : 0.0;
+    omega += acceleration / kRate_hz;
+    const double carried = torque - ramp.inertia_kg_m2 * acceleration;
+    const Cell sample{
+        .t_s = t_s,
+        .slip_percent = slip_percent + ramp.slip_noise_percent * normal(random),
+        .torque_Nm = torque + ramp.wander_Nm * wander + ramp.torque_noise_Nm * normal(random),
+        .clamp_force_N = kTraction * carried / friction(ramp, slip_percent) +
+                         ramp.force_noise_N * normal(random),
+        .omega_p_rad_s = omega + ramp.speed_noise_rad_s * normal(random)};
+    if (!record.step(sample)) continue;
+    ++out.cells;
+    const StopReason stop = detector.step(record), expected = reference.step(record);
+    const std::string at = " at " + std::to_string(t_s) + " s";
+    if (stop != expected) out.differs = "stop" + at;
+    if (detector.level() != reference.level()) out.differs = "level" + at;
+    if (detector.rising() != reference.rising()) out.differs = "rising" + at;
+    if (detector.smallest_slip_percent() != reference.smallest_slip_percent()) {
+      out.differs = "smallest slip" + at;
+    }
+    if (std::abs(detector.slope() - reference.slope()) >
+        kDigits * std::abs(reference.slope()) + 1e-9) {
+      out.differs = "slope" + at + ": " + std::to_string(detector.slope()) + " for " +
+                    std::to_string(reference.slope());
+    }
+    out.rising += reference.rising() ? 1 : 0;
+    out.level += reference.level() ? 1 : 0;
+    out.stop = expected;
+    if (expected != StopReason::kNone || !out.differs.empty()) break;
+  }
+  return out;
+}
+
+TEST(StopReference, SaysTheSameAfterEveryCell) {
+  std::mt19937_64 random(20);
+  int slopes = 0, backups = 0, none = 0, level = 0, rising = 0;
+  for (int i = 0; i < 150; ++i) {
+    const Compared found = compare(draw(random), random);
+    EXPECT_EQ(found.differs, "") << "ramp " << i;
+    slopes += found.stop == StopReason::kSlope;
+    backups += found.stop == StopReason::kSlip || found.stop == StopReason::kSlipRate;
+    none += found.stop == StopReason::kNone;
+    level += found.level > 0;
+    rising += found.rising > 0;
+  }
+  // What they agree on is worth something only where all of it happened.
+  EXPECT_GT(slopes, 60);
+  EXPECT_GT(backups + none, 5);
+  EXPECT_GT(level, 60);
+  EXPECT_GT(rising, 100);
+}
+
+// A detector that is used again begins anew.
+TEST(StopReference, ASecondExperimentOwesNothingToTheFirst) {
+  std::mt19937_64 random(21);
+  StopDetector used, fresh;
+  ExperimentRecord record(kRate_hz);
+  const auto drive = [&](StopDetector& detector) {
+    record.reset();
+    double slope = 0.0;
+    for (int i = 0; i < 2000; ++i) {
+      const double slip_percent = 0.1 + 0.002 * i;
+      const Cell sample{.t_s = i / kRate_hz,
+                        .slip_percent = slip_percent,
+                        .torque_Nm = 30.0,
+                        .clamp_force_N = kTraction * 30.0 / friction({}, slip_percent),
+                        .omega_p_rad_s = 110.0};
+      if (record.step(sample) && detector.step(record) == StopReason::kNone) {
+        slope += detector.slope() * i;
+      }
+    }
+    return slope + detector.smallest_slip_percent();
+  };
+  used.reset(kTraction, 0.0);
+  drive(used);
+  used.reset(kTraction, 0.0);
+  fresh.reset(kTraction, 0.0);
+  EXPECT_EQ(drive(used), drive(fresh));
+}
+
+}  // namespace
+}  // namespace beltgrip::estimator
