@@ -163,6 +163,44 @@ TEST(Saturation, IsNotWhereAPressureIsHeldOnOneOfItsSteps) {
   EXPECT_GT(data.valid_count, 150);  // of 200, less the ends and the steps
 }
 
+// A ramp at whose end the belt runs away, and the pressure that catches it 0.2 s later.
+SignalTable run_away(double doubles_in_s) {
+  constexpr double kCaught_s = 14.2;
+  SignalTable table;
+  Noise noise;
+  for (int i = 0; i < 2000; ++i) {
+    const double t_s = 0.01 * i;
+    const auto add = [&](Role role, double value) {
+      table[role].t_s.push_back(t_s);
+      table[role].value.push_back(value);
+    };
+    const double caught_s = std::max(0.0, t_s - kCaught_s);
+    const double grown = std::exp2((std::min(t_s, kCaught_s) - 14.0) / doubles_in_s);
+    const double slip_share = (0.01 + 0.01 * grown) * std::exp(-5.0 * caught_s);
+    add(Role::kPrimarySpeed, 100.0 + 0.005 * noise());
+    add(Role::kSecondarySpeed, 225.0 * (1.0 - slip_share) + 0.005 * noise());
+    add(Role::kSecondaryPressure, 6e5 - 2e4 * t_s + std::min(5e5 * caught_s, 2e5) + 1e3 * noise());
+    add(Role::kPrimaryTorque, 50.0);
+  }
+  return table;
+}
+
+TEST(RunAway, IsUsedUntilItIsFastAndUntilThePressureSteps) {
+  const auto last_s = [](const ExperimentData& data) {
+    double out = 0.0;
+    for (int k = 0; k < 142; ++k) {
+      if (data.valid[static_cast<std::size_t>(k)]) out = data.t_s[k];
+    }
+    return out;
+  };
+  // Slow enough all the time: up to the samples beside the step.
+  EXPECT_GE(last_s(prepare(run_away(1.0), {})), 13.85);
+  // 0.012 per second at 13.8 s, 0.03 at 14.1 s.
+  const double fast_s = last_s(prepare(run_away(0.25), {}));
+  EXPECT_GE(fast_s, 13.55);
+  EXPECT_LE(fast_s, 13.95);
+}
+
 // A pressure that comes down in steps, each a tenth of a second long.
 TEST(Staircase, KeepsThePlateausAndNotTheSteps) {
   constexpr double kPlateau_s = 1.3, kHeight_Pa = 5e4;

@@ -22,6 +22,8 @@ constexpr double kSlowSigma_s = 0.25;
 constexpr double kTrim_s = 0.3;            // either end of a gapless stretch
 constexpr double kSlipMax_share = 0.06;    // beyond: damage, not friction to be explained
 constexpr double kSlipRateMax_1_s = 0.03;  // the run-away: ratios of derivatives, no statics
+// Derived, at a peak at 1.5 %: there the friction of a mean slip is a mean friction but for 0.2 %.
+constexpr double kSlipRateCalm_1_s = 0.012;
 constexpr double kRatioTolerance = 0.085;  // ln; around an end stop
 constexpr double kSoftness_1_N = 5e-6;     // and below it, as pulleys give way to the clamp force
 constexpr double kSpeedMin_rad_s = 10.0;
@@ -29,6 +31,7 @@ constexpr double kForceMin_N = 200.0;
 // Of the clamp force: where its slow copy departs further from it, the pressure moves too fast for
 // what a lag, a shift or play is computed from.
 constexpr double kForceStepMax = 0.02;
+constexpr double kForceStepSeen = 0.01;  // half of it: the step itself has begun
 
 // One sigma of the weights that a sample of the grid is the mean by.
 double kernel_s(double dt_s) {
@@ -248,9 +251,22 @@ int stop_of(double speed_ratio, double force_N, const estimator::VariatorParamet
 }
 
 // Drops the ends of gapless stretches, where the local fits have no neighbours, and short ones.
-void trim(ExperimentData& data) {
+// Where the belt alone ends one, running away or coming back, the channels go on, and the last
+// samples before are where friction has its peak: of these only what is too fast goes.
+void trim(const std::vector<bool>& runs_away, ExperimentData& data) {
   const int n = data.size();
   const int ends = static_cast<int>(std::lround(kTrim_s / data.dt_s));
+  const double calm_share = kernel_s(data.dt_s) * kSlipRateCalm_1_s;
+  // end: the first or last sample of a stretch; inwards: 1 or -1.
+  const auto cut = [&](int end, int inwards) {
+    const int beyond = end - inwards;
+    if (beyond < 0 || beyond >= n || !runs_away[static_cast<std::size_t>(beyond)]) return ends;
+    int out = 1;
+    while (out < ends && data.slip_spread_share2[end + inwards * out] > calm_share * calm_share) {
+      ++out;
+    }
+    return out;
+  };
   std::vector<bool> kept(data.valid.size(), false);
   for (int k = 0; k < n;) {
     if (!data.valid[static_cast<std::size_t>(k)]) {
@@ -263,11 +279,33 @@ void trim(ExperimentData& data) {
       ++end;
     }
     if (end - k > 2 * ends + 10) {
-      for (int i = k + ends; i < end - ends; ++i) kept[static_cast<std::size_t>(i)] = true;
+      const int last = end - cut(end - 1, -1);
+      for (int i = k + cut(k, 1); i < last; ++i) kept[static_cast<std::size_t>(i)] = true;
     }
     k = end;
   }
   data.valid = kept;
+}
+
+// The slow copy sees a step of the pressure before it comes, and the samples before it, where the
+// belt has just passed its peak, are whole: what still goes on as it went is not too fast.
+void keep_until_it_steps(const ArrayXd& force_N, double dt_s, std::vector<bool>& too_fast) {
+  constexpr double kBefore_s = 0.8;
+  const auto n = static_cast<int>(too_fast.size());
+  const int before = static_cast<int>(std::lround(kBefore_s / dt_s));
+  for (int begin = 1; begin < n; ++begin) {
+    const auto i = static_cast<std::size_t>(begin);
+    if (!too_fast[i] || too_fast[i - 1] || begin < before) continue;
+    const auto course = force_N.segment(begin - before, before);
+    const ArrayXd t = ArrayXd::LinSpaced(before, 1.0 - before, 0.0);  // samples
+    const ArrayXd off = t - t.mean();
+    const double slope = (off * course).sum() / off.square().sum();
+    for (int k = begin; k < n && too_fast[static_cast<std::size_t>(k)]; ++k) {
+      const double as_it_went_N = course.mean() + slope * (k - begin + 1 - t.mean());
+      if (!(std::abs(force_N[k] - as_it_went_N) < kForceStepSeen * force_N[k])) break;
+      too_fast[static_cast<std::size_t>(k)] = false;
+    }
+  }
 }
 
 // Takes out the samples where the pressure moves too fast, and those beside them: a delay moves the
@@ -501,6 +539,7 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
   data.valid.assign(static_cast<std::size_t>(n), false);
   data.slip_spread_share2 = ArrayXd::Zero(n);
   std::vector<bool> too_fast(static_cast<std::size_t>(n), false);
+  std::vector<bool> runs_away(static_cast<std::size_t>(n), false);
   const auto usable = [](const GridSignal& signal, int k) {
     return !signal.present || std::isfinite(signal.value[k]);
   };
@@ -521,14 +560,20 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
     data.slip_spread_share2[k] = std::pow(kernel_s(data.dt_s) * slip_rate_1_s, 2.0);
     const double step_N =
         variator.secondary_piston_area_m2 * (data.pressure.value[k] - data.pressure.slow[k]);
-    data.valid[i] = std::abs(slip_share) < kSlipMax_share + kSoftness_1_N * force_N &&
-                    std::abs(slip_rate_1_s) < kSlipRateMax_1_s && data.pressure.present &&
-                    force_N > kForceMin_N && data.torque.present && usable(data.pressure, k) &&
-                    usable(data.torque, k) && usable(data.torque_s, k) && usable(data.command, k) &&
+    const bool grips = std::abs(slip_share) < kSlipMax_share + kSoftness_1_N * force_N &&
+                       std::abs(slip_rate_1_s) < kSlipRateMax_1_s;
+    data.valid[i] = data.pressure.present && force_N > kForceMin_N && data.torque.present &&
+                    usable(data.pressure, k) && usable(data.torque, k) &&
+                    usable(data.torque_s, k) && usable(data.command, k) &&
                     usable(data.temperature, k) && usable(data.pressure_p, k) && !saturated[i];
+    runs_away[i] = data.valid[i] && !grips;
+    data.valid[i] = data.valid[i] && grips;
     too_fast[i] = !(std::abs(step_N) < kForceStepMax * force_N);
   }
-  trim(data);
+  keep_until_it_steps(
+      variator.secondary_piston_area_m2 * data.pressure.value + variator.secondary_spring_force_N,
+      data.dt_s, too_fast);
+  trim(runs_away, data);
   mask_and_segment(too_fast, data);
   widen_slow(data.pressure, data.dt_s);
   if (data.saturated_pressure) {

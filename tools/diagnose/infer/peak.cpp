@@ -82,7 +82,11 @@ FittedPeak fitted_peak(const Engine& engine, const Hypothesis& hypothesis, int s
   const auto sigma = [&](const Eigen::VectorXd& lever, double form) {
     return std::sqrt(std::max(lever.dot(covariance * lever), 0.0) + form * form);
   };
-  return {state.nuisance[kLnMuMax] + std::log(value), sigma(height, kMuForm),
+  // Of what lies above the last samples the form alone tells.
+  const double beyond =
+      end < x ? std::log(value / std::max(curve.evaluate(end).value, 0.1 * value)) : 0.0;
+  return {state.nuisance[kLnMuMax] + std::log(value),
+          sigma(height, std::hypot(kMuForm, kBeyondForm * beyond)),
           state.nuisance[slip] + std::log(x), sigma(place, kSlipForm)};
 }
 
