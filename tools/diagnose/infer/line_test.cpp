@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <functional>
 #include <numbers>
 #include <vector>
 
@@ -23,6 +24,8 @@ constexpr double kClip = 4.0;    // sigmas
 // Chosen, of the level about it: noise comes so far in 1 of 400. Tried on four healthy campaigns
 // and a ripple: at 4 the same answers, at 9 the answer to the drive is a line again in one of them.
 constexpr double kDriven = 6.0;
+// Chosen, deviation over mean: four times what the noise of a torque comes to on the grid.
+constexpr double kDrives = 0.01;
 
 // The residual's valid stretches without their slow course, outliers clipped; zero elsewhere.
 ArrayXd fast_part(const ExperimentData& run, const ArrayXd& residual, int every) {
@@ -78,8 +81,10 @@ std::vector<double> levelled(const std::vector<double>& power) {
   return out;
 }
 
-// Of a signal, over the valid samples: its fast part, with a variance of one.
-ArrayXd swing(const ExperimentData& run, const ArrayXd& signal) {
+struct Moments {
+  double mean = 0.0, deviation = 0.0;
+};
+Moments moments(const ExperimentData& run, const ArrayXd& signal) {
   double sum = 0.0, squares = 0.0, count = 0.0;
   for (int k = 0; k < run.size(); ++k) {
     if (!run.valid[static_cast<std::size_t>(k)] || !std::isfinite(signal[k])) continue;
@@ -88,16 +93,31 @@ ArrayXd swing(const ExperimentData& run, const ArrayXd& signal) {
     count += 1.0;
   }
   const double mean = sum / std::max(count, 1.0);
-  const double deviation = std::sqrt(squares / std::max(count, 1.0) - mean * mean);
+  return {mean, std::sqrt(std::max(squares / std::max(count, 1.0) - mean * mean, 0.0))};
+}
+
+// Of a signal, over the valid samples: with a mean of zero and a variance of one.
+ArrayXd swing(const ExperimentData& run, const ArrayXd& signal) {
+  const auto [mean, deviation] = moments(run, signal);
   if (!(deviation > 0.0)) return ArrayXd::Zero(signal.size());
   return signal.isFinite().select((signal - mean) / deviation, 0.0);
+}
+
+// The pressure is driven always; a torque or a speed that hardly moves is not, and what it has of a
+// line is its answer to one.
+std::vector<ArrayXd> drives_of(const ExperimentData& run) {
+  std::vector<ArrayXd> out{swing(run, run.pressure.value)};
+  for (const ArrayXd& each : {std::cref(run.torque.value), std::cref(run.omega_p.value)}) {
+    const auto [mean, deviation] = moments(run, each);
+    if (deviation > kDrives * std::abs(mean)) out.push_back(swing(run, each));
+  }
+  return out;
 }
 
 // Where sums and differences of the frequencies that drive the machine lie. A bent curve, of which
 // the model knows the bend only so far, answers there too.
 std::vector<bool> driven(const ExperimentData& run, std::size_t bins, double highest_Hz) {
-  const std::array<ArrayXd, 3> drives{swing(run, run.torque.value), swing(run, run.omega_p.value),
-                                      swing(run, run.pressure.value)};
+  const std::vector<ArrayXd> drives = drives_of(run);
   std::vector<bool> out(bins, false);
   const auto look = [&](const ArrayXd& product) {
     const ArrayXd fast = fast_part(run, product, 1);
@@ -120,37 +140,70 @@ std::vector<bool> driven(const ExperimentData& run, std::size_t bins, double hig
 
 }  // namespace
 
+namespace {
+
+// A look at a residual. What swings in the friction, the ratio or the torque shows in it by as much
+// as the sample answers to that: most of a ramp answers little, so each sample counts by its
+// answer.
+struct Look {
+  const char* acts_on;
+  ResidualKind kind;
+  ArrayXd QuantityChange::*into;  // none: each sample counts alike
+};
+constexpr std::array<Look, 4> kLooks{{{"friction", kFrictionResidual, &QuantityChange::ln_capacity},
+                                      {"ratio", kFrictionResidual, &QuantityChange::slip_share},
+                                      {"torque", kFrictionResidual, &QuantityChange::torque},
+                                      {"torque", kBalanceResidual, nullptr}}};
+
+ArrayXd answer_to(const Campaign& campaign, const Residuals& at, const Look& look) {
+  if (look.into == nullptr) return ArrayXd::Ones(at.foot.size());
+  QuantityChange unit;
+  unit.*look.into = ArrayXd::Ones(at.foot.size());
+  const ArrayXd answer = propagate(campaign, at, unit)[static_cast<std::size_t>(look.kind)];
+  // None for more than those of a fifth of the samples: what runs away in half a second is no line.
+  std::vector<double> sizes;
+  for (const double each : answer) {
+    if (each != 0.0) sizes.push_back(std::abs(each));
+  }
+  if (sizes.empty()) return answer;
+  const double most = estimator::at_rank(sizes, sizes.size() * 4 / 5);
+  return answer.max(-most).min(most);
+}
+
+}  // namespace
+
 SpectralLine strongest_line(const Campaign& campaign, const ModelState& state) {
   struct Pool {
     std::vector<double> sum;
-    double total = 0.0;
     int runs = 0;
   };
-  std::array<Pool, 2> pools;  // friction, balance
+  std::array<Pool, kLooks.size()> pools;
   for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
     const ExperimentData& run = campaign.runs[e];
     if (run.valid_count < kSamplesMin) continue;
-    const Residuals at = residuals_of(campaign, static_cast<int>(e), state);
-    for (const ResidualKind kind : {kFrictionResidual, kBalanceResidual}) {
-      const auto q = static_cast<std::size_t>(kind);
-      if (at.value[q].size() == 0) continue;
-      const int every = kind == kBalanceResidual ? kBalanceStep : 1;
-      const ArrayXd fast = fast_part(run, at.value[q], every);
+    Residuals at = residuals_of(campaign, static_cast<int>(e), state);
+    move_to_foot(campaign, static_cast<int>(e), at);
+    std::array<std::vector<bool>, kResidualKinds> is_driven;
+    for (std::size_t l = 0; l < kLooks.size(); ++l) {
+      const auto kind = static_cast<std::size_t>(kLooks[l].kind);
+      if (at.value[kind].size() == 0) continue;
+      const int every = kLooks[l].kind == kBalanceResidual ? kBalanceStep : 1;
+      const ArrayXd fast = fast_part(run, at.value[kind], every);
       if (fast.size() == 0) continue;
       const double highest_Hz = std::min(kHighest_Hz, 0.45 / (run.dt_s * every));
-      std::vector<double> own = levelled(spectrum(fast, run.dt_s, highest_Hz));
-      const std::vector<bool> is_driven = driven(run, own.size(), highest_Hz);
+      std::vector<double> own =
+          levelled(spectrum(fast * answer_to(campaign, at, kLooks[l]), run.dt_s, highest_Hz));
+      if (is_driven[kind].empty()) is_driven[kind] = driven(run, own.size(), highest_Hz);
       for (std::size_t i = 0; i < own.size(); ++i) {
-        if (is_driven[i]) own[i] = std::min(own[i], 1.0);  // as noise has it
+        if (is_driven[kind][i]) own[i] = std::min(own[i], 1.0);  // as noise has it
       }
-      Pool& pool = pools[q];
+      Pool& pool = pools[l];
       pool.sum.resize(std::max(pool.sum.size(), own.size()), 0.0);
       for (std::size_t i = 0; i < own.size(); ++i) pool.sum[i] += own[i];
       ++pool.runs;
     }
   }
   SpectralLine out;
-  constexpr std::array kActsOn{"friction", "torque"};
   for (std::size_t q = 0; q < pools.size(); ++q) {
     const Pool& pool = pools[q];
     if (pool.runs == 0 || pool.sum.size() < 10) continue;
@@ -166,7 +219,8 @@ SpectralLine strongest_line(const Campaign& campaign, const ModelState& state) {
       for (std::size_t j = i > 1 ? i - 1 : 0; j <= std::min(i + 1, pool.sum.size() - 1); ++j) {
         line += pool.sum[j];
       }
-      out = {kActsOn[q], kLowest_Hz + kStep_Hz * static_cast<double>(i), excess, line / whole};
+      out = {kLooks[q].acts_on, kLowest_Hz + kStep_Hz * static_cast<double>(i), excess,
+             line / whole};
     }
   }
   return out;
