@@ -118,6 +118,7 @@ Criticism criticise(const Engine& engine, Steps steps) {
       {"scatter_torque", ratio.torque, kScatterTorque},
       {"unusual_scatter", std::max({unusual.friction, unusual.ratio, unusual.torque}),
        kUnusualScatter},
+      {"unusual_friction", unusual.friction, kUnusualFriction},
   };
   return out;
 }
@@ -135,12 +136,13 @@ bool may_be_scatter(const Cell& cell, const Criticism& criticism, bool has_balan
   if (cell.gain() <= thresholds::kCellBesideScatter) return false;
   const auto fails = [&](const char* name) { return !criticism.test(name).passed(); };
   const bool any = fails("unusual_scatter");  // does not say of what
+  const bool friction = fails("scatter_friction") || fails("unusual_friction");
   switch (cell.injection->injection) {
     case Injection::kFriction:
     case Injection::kClampForce:
-      return any || fails("scatter_friction");
+      return any || friction;
     case Injection::kTorqueGain:
-      return any || fails("scatter_torque") || (!has_balance && fails("scatter_friction"));
+      return any || fails("scatter_torque") || (!has_balance && friction);
     case Injection::kTorque:
       return any || fails("scatter_torque");
     case Injection::kRatio:
@@ -180,7 +182,8 @@ Unexplained what_is_left(const Criticism& criticism, bool has_balance) {
     return out;
   }
   const bool scatters = fails("scatter_friction") || fails("scatter_ratio") ||
-                        fails("scatter_torque") || fails("unusual_scatter");
+                        fails("scatter_torque") || fails("unusual_scatter") ||
+                        fails("unusual_friction");
   const bool stands_out = fails("law_cell") || fails("smooth_cell");
   if (!stands_out) {
     const auto found = std::find_if(
@@ -196,13 +199,15 @@ Unexplained what_is_left(const Criticism& criticism, bool has_balance) {
     const auto over = [&](const char* name) {
       return criticism.test(name).value / criticism.test(name).limit;
     };
-    const double friction = over("scatter_friction"), ratio = over("scatter_ratio"),
-                 torque = over("scatter_torque");
+    const double friction = std::max(over("scatter_friction"), over("unusual_friction"));
+    const double ratio = over("scatter_ratio"), torque = over("scatter_torque");
     out.acts_on = friction >= std::max(ratio, torque) ? "friction"
                   : ratio >= torque                   ? "ratio"
                                                       : "torque";
     out.kind = MisfitKind::kBetweenRuns;
-    const double times = criticism.test("scatter_" + out.acts_on).value;
+    double times = criticism.test("scatter_" + out.acts_on).value;
+    if (out.acts_on == "friction")
+      times = std::max(times, criticism.test("unusual_friction").value);
     out.share = std::max(0.0, 1.0 - 1.0 / std::max(times * times, 1.0));
   } else {
     out.acts_on = "friction";

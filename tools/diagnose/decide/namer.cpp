@@ -108,6 +108,20 @@ double sample_period_s(const Campaign& campaign, const Slot& slot) {
   return period_s;
 }
 
+// Half a step that the pressure rests on, in the unit of a slot that acts on pressure or force; 0:
+// in another unit, or it rests on none. For as long as it rests, that is how far off the reading
+// is.
+double half_step(const Campaign& campaign, const Slot& slot) {
+  double sigma_Pa = 0.0;
+  for (const ExperimentData& run : campaign.runs) {
+    sigma_Pa = std::max(sigma_Pa, run.rounding_pressure_Pa);
+  }
+  const double half_Pa = std::numbers::sqrt3 * sigma_Pa;
+  return slot.row->unit == "Pa"  ? half_Pa
+         : slot.row->unit == "N" ? campaign.variator.secondary_piston_area_m2 * half_Pa
+                                 : 0.0;
+}
+
 // What bends the machine out of its range only to make up for itself: a gain of the torque and a
 // drag below zero, where the torque was never varied.
 bool bends_machine(const Engine& engine, const Hypothesis& h) {
@@ -125,12 +139,14 @@ bool bends_machine(const Engine& engine, const Hypothesis& h) {
 
 // A size that no machine has is one where the data do not hold the fit; one far below the usual is
 // of no consequence, however sure; a value that is held from one sample to the next is late by half
-// the time between them; no tilt shows at one torque.
+// the time between them, and one held from one step to the next is off by half a step; no tilt
+// shows at one torque.
 bool credible(const Engine& engine, int slot, double size) {
   const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
   const EffectRow& row = *which.row;
   const double share = std::abs(size) / row.typical;
   if (std::abs(size) < kHeld * sample_period_s(engine.campaign(), which)) return false;
+  if (std::abs(size) < half_step(engine.campaign(), which)) return false;
   if (row.id == "radius_tilt" && !engine.campaign().torque_varies) return false;
   const double whole = engine.campaign().switched_on[slot] + size;
   return share > kOfConsequence && share < kBelievable && whole < row.high &&
