@@ -10,9 +10,8 @@ namespace beltgrip::diagnose {
 // logarithms. Measured: rms beyond the fit's own sigma in 50 healthy campaigns of five foreign
 // forms, whose runs end at 1.1 to 1.35 of the slip at the peak.
 inline constexpr double kMuForm = 0.008, kSlipForm = 0.25;
-// The same where the runs end before the peak, of what the friction still grows by. Chosen: two cars'
-// healthy campaigns that end at two thirds of their peak were off by 8 and 10 % where it grows by a
-// fifth.
+// The same where the runs end before the peak, of what the friction still grows by. Chosen; a car's
+// healthy campaign where that is an eighth is off by a tenth.
 inline constexpr double kBeyondForm = 0.5;
 
 struct FittedPeak {
