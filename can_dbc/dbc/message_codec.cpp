@@ -34,6 +34,19 @@ std::uint64_t word_of(std::span<const std::uint8_t> payload) noexcept {
   return word;
 }
 
+// One or two words mostly: a call would take as long as two signals.
+void clear(std::vector<std::uint64_t>& words) noexcept {
+  constexpr std::size_t kFew = 2;
+  std::uint64_t* const first = words.data();
+  const std::size_t count = words.size();
+  if (count > kFew) {
+    std::memset(first, 0, count * kWord);
+    return;
+  }
+  if (count > 0) first[0] = 0;
+  if (count > 1) first[1] = 0;
+}
+
 // Where a signal lies.
 struct Place {
   explicit Place(const SignalDef& signal)
@@ -241,9 +254,12 @@ class MessageCodec::Builder {
 
 MessageCodec::MessageCodec(const MessageDef& definition) { Builder(*this, definition).build(); }
 
+// What follows is inline, and without the library's assertions on an index where it is the
+// Builder's own: they took as long as the signals of a frame.
+
 // All signals of the block lie in the payload, which has at most eight bytes.
-void MessageCodec::decode_flat(const Block& block, const Words& words,
-                               DecodedSignal* out) const noexcept {
+[[gnu::always_inline]] inline void MessageCodec::decode_flat(const Block& block, const Words& words,
+                                                             DecodedSignal* out) const noexcept {
   const auto decode_all = [&](std::uint32_t begin, std::uint32_t end, std::uint64_t word) {
     const Step* const last = steps_.data() + end;
     for (const Step* step = steps_.data() + begin; step != last; ++step) {
@@ -256,8 +272,8 @@ void MessageCodec::decode_flat(const Block& block, const Words& words,
 
 // The same in a longer payload: each signal's word begins where the signal does, or as near to it
 // as the payload's end leaves eight bytes.
-void MessageCodec::decode_long(const Block& block, const Words& words,
-                               DecodedSignal* out) const noexcept {
+[[gnu::noinline]] void MessageCodec::decode_long(const Block& block, const Words& words,
+                                                 DecodedSignal* out) const noexcept {
   const auto last = static_cast<std::uint32_t>(words.payload.size() - kWord);
   for (std::uint32_t i = block.little; i != block.big_end; ++i) {
     const Step& step = steps_[i];
@@ -270,8 +286,8 @@ void MessageCodec::decode_long(const Block& block, const Words& words,
   }
 }
 
-void MessageCodec::decode_one(std::uint32_t signal, const Words& words,
-                              DecodedMessage& out) const noexcept {
+[[gnu::noinline]] void MessageCodec::decode_one(std::uint32_t signal, const Words& words,
+                                                DecodedMessage& out) const noexcept {
   const SignalCodec& codec = signals_[signal];
   if (!codec.fits(words.payload.size())) return;
   const std::uint64_t raw = codec.raw(words.payload);
@@ -279,8 +295,9 @@ void MessageCodec::decode_one(std::uint32_t signal, const Words& words,
   out.present_[signal / DecodedMessage::kBits] |= DecodedMessage::bit(signal);
 }
 
-void MessageCodec::decode_block(const Block& block, const Words& words,
-                                DecodedMessage& out) const noexcept {
+[[gnu::always_inline]] inline void MessageCodec::decode_block(const Block& block,
+                                                              const Words& words,
+                                                              DecodedMessage& out) const noexcept {
   if (block.bytes > words.payload.size()) {
     for (std::uint32_t i = block.little; i != block.big_end; ++i) {
       decode_one(steps_[i].signal, words, out);
@@ -291,8 +308,9 @@ void MessageCodec::decode_block(const Block& block, const Words& words,
     } else {
       decode_long(block, words, out.signals_.data());
     }
-    for (std::uint32_t i = block.presence; i != block.presence_end; ++i) {
-      out.present_[presences_[i].word] |= presences_[i].bits;
+    const Presence* const last = presences_.data() + block.presence_end;
+    for (const Presence* each = presences_.data() + block.presence; each != last; ++each) {
+      out.present_.data()[each->word] |= each->bits;
     }
   }
   for (std::uint32_t i = block.other; i != block.other_end; ++i) {
@@ -300,10 +318,10 @@ void MessageCodec::decode_block(const Block& block, const Words& words,
   }
 }
 
-void MessageCodec::decode_selected(const Selector& selector, const Words& words,
-                                   DecodedMessage& out) const noexcept {
+[[gnu::always_inline]] inline void MessageCodec::decode_selected(
+    const Selector& selector, const Words& words, DecodedMessage& out) const noexcept {
   // The file's numbers are those of the bits: 255 selects in an 8-bit signal, signed or not.
-  const std::uint64_t value = out.signals_[selector.signal].raw & selector.mask;
+  const std::uint64_t value = out.signals_.data()[selector.signal].raw & selector.mask;
   for (std::uint32_t i = selector.ranges; i != selector.ranges_end; ++i) {
     const Range& range = ranges_[i];
     if (value >= range.low && value <= range.high) decode_one(range.signal, words, out);
@@ -317,7 +335,7 @@ void MessageCodec::decode_selected(const Selector& selector, const Words& words,
     };
     found = std::upper_bound(begin, cases_.data() + selector.cases_end, value, is_before) - 1;
   }
-  decode_block(blocks_[found->block], words, out);
+  decode_block(blocks_.data()[found->block], words, out);
 }
 
 void MessageCodec::bring_near() const noexcept {
@@ -330,7 +348,7 @@ void MessageCodec::bring_near() const noexcept {
 void MessageCodec::decode(std::span<const std::uint8_t> payload,
                           DecodedMessage& out) const noexcept {
   assert(out.size() >= signals_.size());
-  for (std::uint64_t& word : out.present_) word = 0;
+  clear(out.present_);
   Words words{.payload = payload};
   if (payload.size() <= kWord) {
     words.little = word_of(payload);
@@ -338,7 +356,9 @@ void MessageCodec::decode(std::span<const std::uint8_t> payload,
   }
   decode_block(always_, words, out);
   for (const Selector& selector : selectors_) {
-    if (out.has(selector.signal)) decode_selected(selector, words, out);
+    const std::uint64_t present = out.present_.data()[selector.signal / DecodedMessage::kBits];
+    if ((present & DecodedMessage::bit(selector.signal)) != 0)
+      decode_selected(selector, words, out);
   }
 }
 

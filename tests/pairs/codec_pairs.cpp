@@ -8,6 +8,7 @@
 #include "can_dbc/dbc/parser.h"
 #include "tests/pairs/bench_pairs.h"
 #include "tests/pairs/plain_decoder.h"
+#include "tests/pairs/signal_by_signal.h"
 
 namespace beltgrip::test {
 
@@ -101,7 +102,19 @@ Work plain(const std::shared_ptr<Coded>& message, void (*decode)(const Payload&,
   });
 }
 
-// Both decode the same, or the comparison says nothing.
+Work signal_by_signal(const std::shared_ptr<Coded>& message) {
+  return timed([=, decoder = SignalBySignal(message->definition)] {
+    std::vector<double> values(message->definition.signals.size());
+    for (int round = 0; round < kRounds; ++round) {
+      for (const Payload& payload : message->frames) {
+        decoder.decode(payload, values);
+        message->sum += values[0];
+      }
+    }
+  });
+}
+
+// All decode the same, or the comparison says nothing.
 void demand_equal(const Coded& message, std::size_t index, double value) {
   if (message.values[index].physical == value) return;
   throw std::runtime_error(message.definition.signals[index].name + ": decoded differently");
@@ -109,9 +122,14 @@ void demand_equal(const Coded& message, std::size_t index, double value) {
 
 void check(Coded& message, void (*decode)(const Payload&, Values&)) {
   Values values{};
+  const SignalBySignal decoder(message.definition);
+  std::vector<double> by_signal(message.definition.signals.size());
   for (const Payload& payload : message.frames) {
     message.codec.decode(payload, message.values);
     decode(payload, values);
+    decoder.decode(payload, by_signal);
+    message.values.for_each_present(
+        [&](std::size_t signal) { demand_equal(message, signal, by_signal[signal]); });
     demand_equal(message, 0, values[0]);
     const bool cases = message.definition.id.value == kCasesId;
     const std::size_t first = cases ? 1U + payload[0] * 6U : 1U;
@@ -146,8 +164,12 @@ std::vector<Pair> codec_pairs() {
   constexpr double kFrames = static_cast<double>(kPayloads) * kRounds;
   return {{"decode a plain message", "generated C", kFrames * 8, "signal", ours(plain_message),
            plain(plain_message, plain_decode)},
+          {"decode a plain message", "signal by signal", kFrames * 8, "signal", ours(plain_message),
+           signal_by_signal(plain_message)},
           {"decode a multiplexed message", "generated C", kFrames, "frame", ours(cases),
            plain(cases, plain_decode_cases)},
+          {"decode a multiplexed message", "signal by signal", kFrames, "frame", ours(cases),
+           signal_by_signal(cases)},
           {"load a DBC file", "counting its lines", static_cast<double>(dbc.size()), "byte",
            timed([dbc] { load(dbc); }), timed([dbc] { count_lines(dbc); })}};
 }
