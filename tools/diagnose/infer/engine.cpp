@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 
 #include "estimator/statistics/order.h"
@@ -65,6 +66,25 @@ void reweigh(const Campaign& campaign, const ModelState& state, Whitening& white
             size[i] > bound ? std::sqrt(bound / size[i]) : 1.0;
       }
     }
+  }
+}
+
+// Of what only equality is asked.
+int next_version() {
+  static std::atomic<int> versions{0};
+  return ++versions;
+}
+
+// As numbers, all that a fit takes from a state.
+void append(const ModelState& state, std::vector<double>& to) {
+  to.insert(to.end(), state.nuisance.begin(), state.nuisance.end());
+  to.insert(to.end(), state.effects.begin(), state.effects.end());
+  for (const estimator::LearnedTerm& each : state.learned) {
+    to.push_back(static_cast<double>(each.point));
+    to.push_back(static_cast<double>(each.variable));
+    to.push_back(static_cast<double>(each.count));
+    to.insert(to.end(), each.knot.begin(), each.knot.end());
+    to.insert(to.end(), each.value.begin(), each.value.end());
   }
 }
 
@@ -229,10 +249,9 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
   // Log likelihood of staying at a state.
   const auto standing = [&](const ModelState& state, const std::vector<Summary>& summaries,
                             const Scatter& with) {
-    const Fit none =
-        fit_linear(summaries, {}, Prior{VectorXd(0), VectorXd(0)}, with, 0, Wanted::kStep);
     const Prior here = prior(parameters, state);
-    return none.log_likelihood - 0.5 * here.pull.cwiseAbs2().dot(here.precision);
+    return log_likelihood(normal_equations(summaries, {}, with), with) -
+           0.5 * here.pull.cwiseAbs2().dot(here.precision);
   };
   Optimum best;
   best.state = start;
@@ -252,6 +271,7 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
       diagonal += each.aa.diagonal().head(scales.size());
     }
     const Prior here = prior(parameters, best.state);
+    const NormalEquations equations = normal_equations(best.summaries, columns, best.fit.scatter);
     double gained = 0.0;
     bool moved = false;
     VectorXd failed = VectorXd::Zero(scales.size());  // the last step that did
@@ -259,8 +279,7 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
       Prior damped = here;
       damped.precision += damping * diagonal;
       damped.pull = here.pull.cwiseProduct(here.precision).cwiseQuotient(damped.precision);
-      const Fit step =
-          fit_linear(best.summaries, columns, damped, best.fit.scatter, 0, Wanted::kStep);
+      const Fit step = fit_linear(equations, damped, best.fit.scatter);
       if ((step.step - failed).norm() < kSameStep * failed.norm()) {
         damping = std::clamp(10.0 * damping, 1e-5, 1e6);
         continue;
@@ -358,6 +377,7 @@ void Engine::fit_machine() {
   first_ = best.first;
   way_ = best.way;
   whitening_ = best.whitening;
+  noise_version_ = next_version();
 }
 
 Nominal Engine::nominal_from(const ModelState& sharp) const {
@@ -375,14 +395,23 @@ Nominal Engine::nominal_from(const ModelState& sharp) const {
 }
 
 Hypothesis Engine::refine_from_afar(const std::vector<int>& slots) const {
-  const std::vector<int> parameters = with_nuisances(slots);
-  ModelState state = first_;
-  state.learned = state_.learned;
-  const Whitening whitening = identity_whitening(campaign_);
-  for (const Campaign& coarse : coarse_) {
-    state = minimise(coarse, parameters, state, whitening, default_scatter(), 8, 0).state;
-  }
-  return refine_from(state, slots, 8);
+  ModelState first = first_;
+  first.learned = state_.learned;
+  std::vector<double> question(slots.begin(), slots.end());
+  append(first, question);
+  return refine_from(
+      far_states_.of(
+          question,
+          [&] {
+            const std::vector<int> parameters = with_nuisances(slots);
+            const Whitening whitening = identity_whitening(campaign_);
+            ModelState state = first;
+            for (const Campaign& coarse : coarse_) {
+              state = minimise(coarse, parameters, state, whitening, default_scatter(), 8, 0).state;
+            }
+            return state;
+          }),
+      slots, 8);
 }
 
 // Friction that the data reach: what is left above belongs to single samples.
@@ -439,6 +468,7 @@ void Engine::update_noise() {
   for (int pass = 0; pass < 2; ++pass) {
     whitening_ = fit_whitening(campaign_, raw, all, whitening_, jobs_);
   }
+  noise_version_ = next_version();
   summaries_.resize(used_.size());
   in_parallel(jobs_, summaries_.size(), [&](std::size_t i) {
     const int run = used_[i];
@@ -679,6 +709,16 @@ Hypothesis Engine::refine(const std::vector<int>& slots, int iterations) const {
 
 Hypothesis Engine::refine_from(const ModelState& from, const std::vector<int>& slots,
                                int iterations) const {
+  std::vector<double> question{static_cast<double>(noise_version_), static_cast<double>(iterations),
+                               static_cast<double>(accepted_.size())};
+  question.insert(question.end(), base_.scatter.variance.begin(), base_.scatter.variance.end());
+  question.insert(question.end(), slots.begin(), slots.end());
+  append(from, question);
+  return hypotheses_.of(question, [&] { return fit_from(from, slots, iterations); });
+}
+
+Hypothesis Engine::fit_from(const ModelState& from, const std::vector<int>& slots,
+                            int iterations) const {
   Hypothesis out;
   out.slots = slots;
   ModelState start = from;

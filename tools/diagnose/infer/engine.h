@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tools/diagnose/infer/infer.h"
+#include "tools/diagnose/infer/remembered.h"
 #include "tools/diagnose/model/model_file.h"
 
 namespace beltgrip::diagnose {
@@ -148,6 +149,7 @@ class Engine {
   // The matrices with the sizes of some accepted effects put back to zero.
   std::vector<Summary> summaries_without(const std::vector<int>& slots) const;
   double ln_mu_reached() const;
+  Hypothesis fit_from(const ModelState& from, const std::vector<int>& slots, int iterations) const;
 
   int jobs_;
   Campaign campaign_;
@@ -163,6 +165,11 @@ class Engine {
   std::vector<FarSize> far_sizes_;  // their columns stand behind those of the parameters
   std::vector<Summary> summaries_;
   Fit base_;
+  int noise_version_ = 0;  // another one wherever the whitening is another
+  // What is asked again is asked soon (from afar: in every round).
+  static constexpr std::size_t kHypothesesKept = 64, kFarStatesKept = 256;
+  Remembered<Hypothesis> hypotheses_{kHypothesesKept};
+  Remembered<ModelState> far_states_{kFarStatesKept};
 };
 
 Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model);

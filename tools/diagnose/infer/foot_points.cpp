@@ -124,6 +124,12 @@ class FootSearch {
     std::memcpy(to.data() + i, &value, sizeof value);
   }
 
+  BELTGRIP_LANES static bool any(Mask lanes) {
+    std::int64_t all = 0;
+    for (std::size_t lane = 0; lane < kCount; ++lane) all |= lanes[lane];
+    return all != 0;
+  }
+
   // Behind the last sample: lanes that are counted nowhere.
   BELTGRIP_LANES void fill_up(std::size_t i) {
     batch_.slip_[i] = batch_.torque_Nm_[i] = batch_.slip_spread_[i] = 0.0;
@@ -165,10 +171,12 @@ class FootSearch {
                   1.0 / load(batch_.torque_variance_, i)};
     const Value x = sample.slip * batch_.per_peak_;
     const Value above = x + kBendStep, below = x - kBendStep;
-    const Value bend =
-        (curve_.evaluate(above).slope - curve_.evaluate(below).slope) / (2.0 * kBendStep);
-    const Value bend_Nm = 0.5 * capacity_Nm * bend * spread * batch_.per_peak_ * batch_.per_peak_;
-    sample.torque_Nm -= spread < kSpreadLeast ? Value{} : bend_Nm;
+    if (any(~(spread < kSpreadLeast))) {
+      const Value bend =
+          (curve_.evaluate(above).slope - curve_.evaluate(below).slope) / (2.0 * kBendStep);
+      const Value bend_Nm = 0.5 * capacity_Nm * bend * spread * batch_.per_peak_ * batch_.per_peak_;
+      sample.torque_Nm -= spread < kSpreadLeast ? Value{} : bend_Nm;
+    }
     const Place here = at(sample, x);
     const Value height = sample.torque_Nm / capacity_Nm;
     const Value rising = curve_.nominal_inverse(height);
@@ -257,13 +265,7 @@ class FootSearch {
 
 namespace {
 void find_by_two(FootBatch& batch) { FootSearch<LanesOf<2>>(batch).run(); }
-#if defined(__x86_64__)
-[[gnu::target("avx2")]] void find_by_four(FootBatch& batch) { FootSearch<LanesOf<4>>(batch).run(); }
-bool has_four() { return __builtin_cpu_supports("avx2") != 0; }
-#else
-void find_by_four(FootBatch& batch) { find_by_two(batch); }
-bool has_four() { return false; }
-#endif
+BELTGRIP_FOUR void find_by_four(FootBatch& batch) { FootSearch<LanesOf<4>>(batch).run(); }
 }  // namespace
 
 void FootBatch::find() {

@@ -8,7 +8,9 @@
 
 #include "estimator/statistics/distributions.h"
 #include "estimator/statistics/order.h"
+#include "tools/diagnose/infer/column_work.h"
 #include "tools/diagnose/infer/parallel.h"
+#include "tools/diagnose/model/curve_family.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -57,10 +59,12 @@ std::array<ResidualColumns, kRandomEffects> random_columns(const Campaign& campa
   return out;
 }
 
-// The prediction errors of the valid samples, stretch by stretch, in units of their sigma.
+// The prediction errors of the valid samples, stretch by stretch, in units of their sigma,
+// weighted.
 void whiten(const ExperimentData& data, const Whitening::Filter& filter, const ArrayXd& in,
-            Eigen::Ref<VectorXd> out) {
+            const ArrayXd& weight, double* out) {
   const int full = static_cast<int>(filter.coefficient.size()) - 1;
+  static_assert(Whitening::kOrder == kFilterOrder);
   Index row = 0;
   for (const auto& [begin, end] : data.stretches) {
     const Index k = row;  // the stretch's first in the rows
@@ -69,22 +73,19 @@ void whiten(const ExperimentData& data, const Whitening::Filter& filter, const A
       const VectorXd& a = filter.coefficient[static_cast<std::size_t>(order)];
       double e = in[k + order];
       for (int i = 0; i < order; ++i) e -= a[i] * in[k + order - 1 - i];
-      out[row++] = e / filter.sigma[static_cast<std::size_t>(order)];
+      out[row] = e / filter.sigma[static_cast<std::size_t>(order)] * weight[row];
+      ++row;
     }
-    if (const Index rest = end - begin - warm; rest > 0) {
-      auto block = out.segment(row, rest);
-      const VectorXd& a = filter.coefficient.back();
-      const auto delayed = [&](int by) { return in.segment(k + warm - by, rest).matrix(); };
-      static_assert(Whitening::kOrder == 6);  // one pass over the samples
-      if (full == Whitening::kOrder) {
-        block = (delayed(0) - a[0] * delayed(1) - a[1] * delayed(2) - a[2] * delayed(3) -
-                 a[3] * delayed(4) - a[4] * delayed(5) - a[5] * delayed(6)) /
-                filter.sigma.back();
-      } else {  // not fitted yet: order 0
-        block = delayed(0) / filter.sigma.back();
-      }
-      row += rest;
+    const Index rest = end - begin - warm;
+    if (rest == 0) continue;
+    if (full == Whitening::kOrder) {
+      predict({filter.coefficient.back().data(), filter.sigma.back()}, in.data() + row,
+              weight.data() + row, rest, out + row);
+    } else {  // not fitted yet: order 0
+      Eigen::Map<ArrayXd>(out + row, rest) =
+          in.segment(row, rest) / filter.sigma.back() * weight.segment(row, rest);
     }
+    row += rest;
   }
 }
 
@@ -210,8 +211,7 @@ std::vector<WhiteBlock> whitened(const Campaign& campaign, int run, const RawCol
       if (in.size() == 0) {
         to.setZero();
       } else {
-        whiten(data, whitening.filter[kind], in, to);
-        to.array() *= weight[kind];
+        whiten(data, whitening.filter[kind], in, weight[kind], to.data());
       }
       if (beside == nullptr) continue;
       if (next < beside->size() && (*beside)[next] == column) {
@@ -252,8 +252,13 @@ RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& stat
   out.columns.reserve(parameters.size() + 1 + kRandomEffects);
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   for (std::size_t j = 0; j < parameters.size(); ++j) {
-    out.columns.push_back(valid_rows(data, derivative(campaign, run, state, at, parameters[j]),
-                                     scale[static_cast<Index>(j)]));
+    const double unit = scale[static_cast<Index>(j)];
+    if (first_knot(parameters[j]) >= 0) {
+      out.columns.emplace_back()[kFrictionResidual] = mode_rows(data, at, parameters[j], unit);
+    } else {
+      out.columns.push_back(
+          valid_rows(data, derivative(campaign, run, state, at, parameters[j]), unit));
+    }
   }
   if (extra) {
     for (const ResidualColumns& column : extra(run, at)) {
@@ -293,23 +298,21 @@ Summary summary_of(const Campaign& campaign, int run, const RawColumns& raw,
                                  ? holder.columns.begin() + static_cast<std::ptrdiff_t>(count)
                                  : holder.columns.begin(),
                              holder.columns.end());
-    const auto random = holder.rows.rightCols(static_cast<Index>(effects.size()));
+    const Columns random = holder.rows.rightCols(static_cast<Index>(effects.size()));
     if (raw.with_random) {
       for (int& effect : effects) effect -= n;
     }
-    const auto rows = block.rows.leftCols(count);
+    const Columns rows = block.rows.leftCols(count);
     out.samples += static_cast<int>(block.rows.rows());
     // A signal that never moves leaves a block without columns: nothing to add.
     if (!effects.empty() && raw.with_random) {
-      out.uu(effects, effects) += random.transpose() * random;
+      out.uu(effects, effects) += products(random);
     } else if (!effects.empty()) {
       out.uu(effects, effects) += whitening.random_products[static_cast<std::size_t>(run)][i];
     }
     if (columns.empty()) continue;
-    MatrixXd aa = MatrixXd::Zero(count, count);
-    aa.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
-    out.aa(columns, columns) += MatrixXd(aa.selfadjointView<Eigen::Lower>());
-    if (!effects.empty()) out.ua(effects, columns) += random.transpose() * rows;
+    out.aa(columns, columns) += products(rows);
+    if (!effects.empty()) out.ua(effects, columns) += products(random, rows);
   }
   return out;
 }
@@ -350,76 +353,117 @@ std::array<VectorXd, kResidualKinds> white_residuals(const Campaign& campaign, i
   return out;
 }
 
+namespace {
+using RandomRows = Eigen::Matrix<double, kRandomEffects, Eigen::Dynamic>;
+using RandomSquare = Eigen::Matrix<double, kRandomEffects, kRandomEffects>;
+
+double log_likelihood_of(double quadratic, double ln_det, const Scatter& scatter) {
+  return -0.5 * (quadratic + ln_det + scatter_penalty(scatter.variance));
+}
+
+// What no scatter changes, of the columns asked for.
+struct Picked {
+  MatrixXd aa;                 // of all experiments together
+  std::vector<RandomRows> ua;  // per experiment
+};
+
+Picked pick(const std::vector<Summary>& summaries, const std::vector<int>& columns) {
+  std::vector<int> picked = columns;
+  picked.push_back(static_cast<int>(summaries.empty() ? 0 : summaries[0].aa.rows() - 1));
+  const auto count = static_cast<Index>(picked.size());
+  Picked out;
+  out.aa = MatrixXd::Zero(count, count);
+  for (const Summary& each : summaries) {
+    out.aa += each.aa(picked, picked);
+    out.ua.emplace_back(each.ua(Eigen::all, picked));
+  }
+  return out;
+}
+
+// posterior: covariance of the random effects given the parameters, per experiment; may be null.
+NormalEquations reduce(const std::vector<Summary>& summaries, const Picked& picked,
+                       const Scatter& scatter, std::vector<RandomSquare>* posterior) {
+  NormalEquations out;
+  const RandomSquare inverse = (1.0 / scatter.variance).matrix().asDiagonal();
+  const double ln_scatter = scatter.variance.log().sum();
+  MatrixXd roots(kRandomEffects * static_cast<Index>(summaries.size()), picked.aa.cols());
+  for (std::size_t e = 0; e < summaries.size(); ++e) {
+    const Eigen::LLT<RandomSquare> llt(summaries[e].uu + inverse);
+    if (posterior != nullptr) (*posterior)[e] = llt.solve(RandomSquare::Identity());
+    roots.middleRows<kRandomEffects>(kRandomEffects * static_cast<Index>(e)) =
+        llt.matrixL().solve(picked.ua[e]);
+    out.ln_det += 2.0 * llt.matrixLLT().diagonal().array().log().sum() + ln_scatter;
+  }
+  out.total = picked.aa - products(roots);
+  return out;
+}
+
+Fit solve(const NormalEquations& equations, const Prior& prior, const Scatter& scatter,
+          Wanted wanted) {
+  const MatrixXd& total = equations.total;
+  const Index n = total.cols() - 1;
+  MatrixXd information = total.topLeftCorner(n, n);
+  VectorXd right = -total.topRightCorner(n, 1);
+  information.diagonal() += prior.precision;
+  right += prior.precision.cwiseProduct(prior.pull);
+  const Eigen::LDLT<MatrixXd> ldlt(information);
+  Fit fit;
+  fit.scatter = scatter;
+  fit.step = ldlt.solve(right);
+  if (wanted == Wanted::kCovariance) fit.covariance = ldlt.solve(MatrixXd::Identity(n, n));
+  const VectorXd off = fit.step - prior.pull;
+  VectorXd full(n + 1);
+  full << fit.step, 1.0;
+  fit.misfit = full.dot(total * full);
+  fit.log_likelihood = log_likelihood_of(fit.misfit + off.dot(prior.precision.cwiseProduct(off)),
+                                         equations.ln_det, scatter);
+  return fit;
+}
+}  // namespace
+
+NormalEquations normal_equations(const std::vector<Summary>& summaries,
+                                 const std::vector<int>& columns, const Scatter& scatter) {
+  return reduce(summaries, pick(summaries, columns), scatter, nullptr);
+}
+
+Fit fit_linear(const NormalEquations& equations, const Prior& prior, const Scatter& scatter) {
+  return solve(equations, prior, scatter, Wanted::kStep);
+}
+
+double log_likelihood(const NormalEquations& equations, const Scatter& scatter) {
+  const Index last = equations.total.cols() - 1;
+  return log_likelihood_of(equations.total(last, last), equations.ln_det, scatter);
+}
+
 Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& columns,
                const Prior& prior, const Scatter& start, int scatter_iterations, Wanted wanted) {
   const auto n = static_cast<Index>(columns.size());
   const auto runs = summaries.size();
-  const Index last = summaries.empty() ? 0 : summaries[0].aa.rows() - 1;
-  std::vector<int> picked = columns;
-  picked.push_back(static_cast<int>(last));
-  using RandomRows = Eigen::Matrix<double, kRandomEffects, Eigen::Dynamic>;
-  using RandomSquare = Eigen::Matrix<double, kRandomEffects, kRandomEffects>;
-  struct Part {
-    MatrixXd aa;
-    RandomRows ua;
-  };
-  std::vector<Part> parts(runs);
-  for (std::size_t e = 0; e < runs; ++e) {
-    parts[e].aa = summaries[e].aa(picked, picked);
-    parts[e].ua = summaries[e].ua(Eigen::all, picked);
-  }
+  const Picked picked = pick(summaries, columns);
   const Scatter usual = default_scatter();
-  Fit fit;
-  fit.scatter = start;
+  Scatter scatter = start;
   for (int iteration = 0;; ++iteration) {
-    MatrixXd total = MatrixXd::Zero(n + 1, n + 1);
-    double ln_det = 0.0;
-    std::vector<RandomSquare> posterior(
-        runs);  // covariance of the random effects given the parameters
-    const RandomSquare inverse = (1.0 / fit.scatter.variance).matrix().asDiagonal();
-    for (std::size_t e = 0; e < runs; ++e) {
-      const Eigen::LLT<RandomSquare> llt(summaries[e].uu + inverse);
-      if (iteration < scatter_iterations) posterior[e] = llt.solve(RandomSquare::Identity());
-      const RandomRows root = llt.matrixL().solve(parts[e].ua);
-      total += parts[e].aa;
-      total.selfadjointView<Eigen::Lower>().rankUpdate(root.transpose(), -1.0);
-      ln_det +=
-          2.0 * llt.matrixLLT().diagonal().array().log().sum() + fit.scatter.variance.log().sum();
-    }
-    total.triangularView<Eigen::StrictlyUpper>() = total.transpose();
-    MatrixXd information = total.topLeftCorner(n, n);
-    VectorXd right = -total.topRightCorner(n, 1);
-    for (Index j = 0; j < n; ++j) {
-      information(j, j) += prior.precision[j];
-      right[j] += prior.precision[j] * prior.pull[j];
-    }
-    const Eigen::LDLT<MatrixXd> ldlt(information);
-    fit.step = ldlt.solve(right);
     const bool is_last = iteration >= scatter_iterations;
-    if (!is_last || wanted == Wanted::kCovariance) {
-      fit.covariance = ldlt.solve(MatrixXd::Identity(n, n));
-    }
-    const VectorXd off = fit.step - prior.pull;
+    std::vector<RandomSquare> posterior(is_last ? 0 : runs);
+    const NormalEquations equations =
+        reduce(summaries, picked, scatter, is_last ? nullptr : &posterior);
+    Fit fit = solve(equations, prior, scatter, is_last ? wanted : Wanted::kCovariance);
+    if (is_last) return fit;
     VectorXd full(n + 1);
     full << fit.step, 1.0;
-    fit.misfit = full.dot(total * full);
-    const double quadratic = fit.misfit + off.dot(prior.precision.cwiseProduct(off));
-    fit.log_likelihood = -0.5 * (quadratic + ln_det + scatter_penalty(fit.scatter.variance));
-    if (is_last) break;
     Eigen::Array<double, kRandomEffects, 1> square =
         Eigen::Array<double, kRandomEffects, 1>::Zero();
     for (std::size_t e = 0; e < runs; ++e) {
-      const Eigen::Matrix<double, kRandomEffects, 1> u = -posterior[e] * (parts[e].ua * full);
-      const RandomRows lever = posterior[e] * parts[e].ua.leftCols(n);
+      const Eigen::Matrix<double, kRandomEffects, 1> u = -posterior[e] * (picked.ua[e] * full);
+      const RandomRows lever = posterior[e] * picked.ua[e].leftCols(n);
       const RandomRows spread = lever * fit.covariance;
       square += u.array().square() + posterior[e].diagonal().array() +
                 spread.cwiseProduct(lever).rowwise().sum().array();
     }
     const double count = std::max(1.0, static_cast<double>(runs));
-    fit.scatter.variance = scatter_variance(square / count, static_cast<double>(runs));
-    fit.scatter.variance = fit.scatter.variance.min(kScatterCap * kScatterCap * usual.variance);
+    scatter.variance = scatter_variance(square / count, static_cast<double>(runs));
+    scatter.variance = scatter.variance.min(kScatterCap * kScatterCap * usual.variance);
   }
-  return fit;
 }
 
 std::vector<double> left_out_densities(const std::vector<Summary>& summaries,
@@ -556,7 +600,8 @@ Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>&
     for (const int kind : kinds) {
       const auto q = static_cast<std::size_t>(kind);
       white[q].resize(data.valid_count);
-      whiten(data, out.filter[q], ArrayXd::Map(rest[q][e].data(), data.valid_count), white[q]);
+      whiten(data, out.filter[q], ArrayXd::Map(rest[q][e].data(), data.valid_count),
+             ArrayXd::Ones(data.valid_count), white[q].data());
       for (Index i = 0; i < white[q].size(); ++i) {
         const double size = std::abs(white[q][i]);
         out.weight[e][q][i] = size > kHuber ? std::sqrt(kHuber / size) : 1.0;
@@ -577,9 +622,9 @@ Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>&
     RawColumns random;
     random.columns.assign(raw[e].columns.end() - kRandomEffects, raw[e].columns.end());
     out.random.push_back(whitened(campaign, static_cast<int>(e), random, out));
-    std::vector<MatrixXd>& products = out.random_products.emplace_back();
+    std::vector<MatrixXd>& of_run = out.random_products.emplace_back();
     for (const WhiteBlock& block : out.random.back()) {
-      products.push_back(block.rows.transpose() * block.rows);
+      of_run.push_back(products(block.rows));
     }
   }
   return out;

@@ -78,6 +78,18 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
                const Prior& prior, const Scatter& start, int scatter_iterations,
                Wanted wanted = Wanted::kCovariance);
 
+// The same in two steps, where one scatter serves for several priors: the matrices of all
+// experiments together, the random effects taken out; then the step alone.
+struct NormalEquations {
+  Eigen::MatrixXd total;  // (n + 1) x (n + 1)
+  double ln_det = 0.0;    // of the random effects
+};
+NormalEquations normal_equations(const std::vector<Summary>& summaries,
+                                 const std::vector<int>& columns, const Scatter& scatter);
+Fit fit_linear(const NormalEquations& equations, const Prior& prior, const Scatter& scatter);
+// Where no step is made, without the prior.
+double log_likelihood(const NormalEquations& equations, const Scatter& scatter);
+
 // Log predictive density of each experiment, by a fit to the others; their scatter too.
 std::vector<double> left_out_densities(const std::vector<Summary>& summaries,
                                        const std::vector<int>& columns, const Prior& prior);

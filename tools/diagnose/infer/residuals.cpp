@@ -154,11 +154,13 @@ void prepare_derivatives(const Campaign& campaign, int run, const ModelState& st
   move_to_foot(campaign, run, at);
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   at.there = quantities(campaign, data, {at.clean_pressure_Pa, at.clean_reading_Nm}, run, state);
+  int row = -1;
   for (const auto& [begin, end] : data.stretches) {
     for (int k = begin; k < end; ++k) {
+      ++row;
       if (!(at.weight[k] > 0.0)) continue;
       at.on_curve[static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)])].push_back(
-          {k, place_on_curve(std::abs(at.foot[k])), at.measured.capacity[k],
+          {k, row, place_on_curve(std::abs(at.foot[k])), at.measured.capacity[k],
            -std::copysign(at.weight[k], at.foot[k])});
     }
   }
@@ -189,15 +191,29 @@ ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
 }
 
 namespace {
-// Of one mode of the friction curve of one stop.
-void add_mode(const std::vector<CurveSample>& samples, int mode, int size, ResidualColumns& out) {
-  if (samples.empty()) return;
-  ArrayXd& column = out[kFrictionResidual];
-  if (column.size() == 0) column = ArrayXd::Zero(size);
+// Of one mode of the friction curve of one stop; the place of a sample in the column is one of its
+// numbers.
+void add_mode(const std::vector<CurveSample>& samples, int mode, double scale,
+              int CurveSample::*place, ArrayXd& column) {
   const CurveShape& shape = mode_shape(mode);
+  double* const to = column.data();
   for (const CurveSample& each : samples) {
-    column[each.k] = each.capacity_Nm * shape.departure(each.place) * each.weight;
+    to[each.*place] = each.capacity_Nm * shape.departure(each.place) * each.weight * scale;
   }
+}
+
+// The form in overdrive is that of both end stops; the other is what the low one differs by.
+ArrayXd mode_column(const Residuals& at, int parameter, double scale, int CurveSample::*place,
+                    int size) {
+  const int first = first_knot(parameter);
+  const std::vector<CurveSample>& low = at.on_curve[kLowStop];
+  const std::vector<CurveSample>& overdrive = at.on_curve[kOverdriveStop];
+  const bool is_of_both = first == kShapeOverdrive;
+  if (low.empty() && (overdrive.empty() || !is_of_both)) return {};
+  ArrayXd out = ArrayXd::Zero(size);
+  add_mode(low, parameter - first, scale, place, out);
+  if (is_of_both) add_mode(overdrive, parameter - first, scale, place, out);
+  return out;
 }
 
 bool energy_acts(const Campaign& campaign, const ModelState& state) {
@@ -296,11 +312,9 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
     default:
       break;
   }
-  // The form in overdrive is that of both end stops; the other is what the low one differs by.
-  if (const int first = first_knot(parameter); first >= 0) {
+  if (first_knot(parameter) >= 0) {
     ResidualColumns out;
-    add_mode(at.on_curve[kLowStop], parameter - first, n, out);
-    if (first == kShapeOverdrive) add_mode(at.on_curve[kOverdriveStop], parameter - first, n, out);
+    out[kFrictionResidual] = mode_column(at, parameter, 1.0, &CurveSample::k, n);
     return out;
   }
   // The rest by central differences of the quantities.
@@ -336,6 +350,10 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
     }
   }
   return propagate(campaign, at, change);
+}
+
+ArrayXd mode_rows(const ExperimentData& data, const Residuals& at, int parameter, double scale) {
+  return mode_column(at, parameter, scale, &CurveSample::row, data.valid_count);
 }
 
 ResidualColumns secant(const Campaign& campaign, int run, const ModelState& state,

@@ -88,6 +88,7 @@ struct Campaign {
 // A sample that counts, as the departure of its stop's friction curve sees it.
 struct CurveSample {
   int k = 0;
+  int row = 0;       // of the valid samples
   CurvePlace place;  // of |foot|
   double capacity_Nm = 0.0;
   double weight = 0.0;  // of a change of the curve in the residual, with its sign
@@ -128,6 +129,9 @@ void prepare_derivatives(const Campaign& campaign, int run, const ModelState& st
 using ResidualColumns = std::array<Eigen::ArrayXd, kResidualKinds>;
 ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& state,
                            const Residuals& at, int parameter);
+// The same of a mode of the friction curve (first_knot), a row per valid sample, times scale.
+Eigen::ArrayXd mode_rows(const ExperimentData& data, const Residuals& at, int parameter,
+                         double scale);
 
 // The change of the residual from the state's size of a slot to another one, per unit of it.
 ResidualColumns secant(const Campaign& campaign, int run, const ModelState& state,

@@ -8,21 +8,10 @@
 #include <limits>
 #include <utility>
 
+#include "tools/diagnose/model/lanes.h"
 #include "tools/diagnose/model/variator_model.h"
 
 namespace beltgrip::diagnose {
-
-// Registers of the compiler's vector extension; a comparison gives all bits of a lane or none.
-template <int kCount>
-struct LanesOf {
-  using Value [[gnu::vector_size(kCount * sizeof(double))]] = double;
-  using Mask [[gnu::vector_size(kCount * sizeof(double))]] = std::int64_t;
-  using Index [[gnu::vector_size(kCount * sizeof(std::int32_t))]] = std::int32_t;
-};
-
-// In a function for another processor all of it has to be inline.
-#define BELTGRIP_INLINE __attribute__((always_inline))
-#define BELTGRIP_LANES [[gnu::always_inline]] inline
 
 template <typename Lanes>
 class CurveLanes {
