@@ -3,8 +3,7 @@
 // frames, all before what is promised. SI; slip as a fraction.
 //
 // Not here: the floor of the clamp force, which is the configuration's
-// (experiment.secondary_pressure_floor_Pa; made a force in experiment/arming and, on their own, for
-// guard/safety_monitor and guard/tx_gate).
+// (experiment.secondary_pressure_floor_Pa; made a force in experiment/force_floor).
 //
 // Who judges keeps its own code; only the numbers are shared. "Origin" says where one comes from:
 // promised (the promise G1), measured (tests/FIGURES.md, tests/campaign), chosen (why).

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "daemon/core/experiment/force_floor.h"
 #include "daemon/core/experiment/ramp_rate.h"
 #include "estimator/physics/slip.h"
 #include "estimator/signal/signal_chain.h"
@@ -77,9 +78,7 @@ Arming::Arming(const Config& config)
       force_step_N_(config.variator.secondary_piston_area_m2 * config.estimator.pressure_step_Pa) {}
 
 double Arming::floor_N(double omega_s_rad_s) const noexcept {
-  return variator_.secondary_spring_force_N +
-         variator_.secondary_piston_area_m2 * settings_.secondary_pressure_floor_Pa +
-         variator_.secondary_centrifugal_N_s2 * omega_s_rad_s * omega_s_rad_s;
+  return force_floor_N(variator_, settings_.secondary_pressure_floor_Pa, omega_s_rad_s);
 }
 
 // The force bends the pulleys open: below its end stop, not above it, the ratio may stand further
