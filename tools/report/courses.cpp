@@ -18,7 +18,7 @@ constexpr double kSteps = kMissing - 1;
 constexpr double kEarliestDate_s = 315'532'800.0;  // 1980: a stamp before it has no date
 constexpr std::array<std::string_view, 6> kStyles{"line",   "dashed",   "steps",
                                                   "points", "whiskers", "hidden"};
-constexpr std::array<int, 3> kLaneColours{2, 4, 1};  // of page.js, by LaneKind
+constexpr std::array<int, 3> kLaneColours{2, 4, 1};  // of plots.js, by LaneKind
 
 void append_base64(std::string& out, const std::vector<std::uint8_t>& bytes) {
   constexpr std::string_view kDigits =

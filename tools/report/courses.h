@@ -61,7 +61,7 @@ struct Courses {
   std::vector<Interval> spans_s;  // shaded in all panels
 };
 
-// As an object for page.js.
+// As an object for plots.js.
 std::string courses_script(const std::string& id, const Courses& courses);
 
 }  // namespace beltgrip::report

@@ -79,7 +79,7 @@ std::string HtmlPage::text() const {
   if (count_ > 0) {
     out += script(chart_js()) + script(dygraphs_js()) +
            script("\nconst curves = [\n" + curves_ + "];\nconst courses = [\n" + courses_ + "];\n" +
-                  std::string(page_js()));
+                  std::string(plots_js()));
   }
   return out + "</body></html>\n";
 }
