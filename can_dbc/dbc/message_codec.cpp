@@ -48,8 +48,8 @@ void clear(std::vector<std::uint64_t>& words) noexcept {
 }
 
 // Where a signal lies.
-struct Place {
-  explicit Place(const SignalDef& signal)
+struct BitLayout {
+  explicit BitLayout(const SignalDef& signal)
       : little(signal.byte_order == ByteOrder::kLittle),
         first_byte(signal.start_bit / 8),
         // Of the payload's bits, counted from the start of its first byte.
@@ -198,7 +198,7 @@ class MessageCodec::Builder {
     Block block;
     const auto add_steps = [&](bool little) {
       for (const std::uint32_t signal : signals) {
-        if (is_flat(signal) && Place(definition_.signals[signal]).little == little) {
+        if (is_flat(signal) && BitLayout(definition_.signals[signal]).little == little) {
           codec_.steps_.push_back(step_of(signal));
         }
       }
@@ -210,7 +210,7 @@ class MessageCodec::Builder {
     block.other = size_of(codec_.others_);
     block.presence = size_of(codec_.presences_);
     for (const std::uint32_t signal : signals) {
-      block.bytes = std::max(block.bytes, Place(definition_.signals[signal]).end_byte);
+      block.bytes = std::max(block.bytes, BitLayout(definition_.signals[signal]).end_byte);
       if (!is_flat(signal)) codec_.others_.push_back(signal);
       const auto word = static_cast<std::uint32_t>(signal / DecodedMessage::kBits);
       const bool is_new =
@@ -226,23 +226,23 @@ class MessageCodec::Builder {
   // Not so: floats, 64 bits without a sign, nine bytes.
   bool is_flat(std::uint32_t signal) const {
     const SignalDef& definition = definition_.signals[signal];
-    const Place place(definition);
+    const BitLayout layout(definition);
     const bool too_large = definition.type != ValueType::kSigned && definition.length == 64;
     return !codec_.signals_[signal].is_float() && !too_large &&
-           place.end_byte - place.first_byte <= kWord;
+           layout.end_byte - layout.first_byte <= kWord;
   }
 
   Step step_of(std::uint32_t signal) const {
     const SignalDef& definition = definition_.signals[signal];
-    const Place place(definition);
+    const BitLayout layout(definition);
     const bool is_signed = definition.type == ValueType::kSigned;
     return {.mask = codec_.signals_[signal].mask(),
             .sign = is_signed ? std::uint64_t{1} << (definition.length - 1) : 0,
             .scale = definition.scale,
             .offset = definition.offset,
             .signal = signal,
-            .first_byte = place.first_byte,
-            .shift = place.shift};
+            .first_byte = layout.first_byte,
+            .shift = layout.shift};
   }
 
   static std::uint32_t size_of(const auto& list) { return static_cast<std::uint32_t>(list.size()); }

@@ -23,44 +23,44 @@ MessageIndex::MessageIndex(std::span<const Database* const> databases)
   for (std::uint32_t database = 0; database < databases.size(); ++database) {
     const std::vector<MessageDef>& messages = databases[database]->messages;
     for (std::uint32_t message = 0; message < messages.size(); ++message) {
-      places_.push_back({database, message});
-      insert_message(messages[message], static_cast<std::uint32_t>(places_.size() - 1));
+      entries_.push_back({database, message});
+      insert_message(messages[message], static_cast<std::uint32_t>(entries_.size() - 1));
     }
   }
   // The group alone: a message from the null address stands for every source, before all others.
   for (const bool null_source : {true, false}) {
-    for (std::uint32_t place = 0; place < places_.size(); ++place) {
+    for (std::uint32_t entry = 0; entry < entries_.size(); ++entry) {
       const MessageDef& message =
-          databases[places_[place].database]->messages[places_[place].message];
+          databases[entries_[entry].database]->messages[entries_[entry].message];
       if (!message.j1939 || !message.id.extended) continue;
       if (((message.id.value & kSourceMask) == kNullSource) != null_source) continue;
-      insert(key_of(Kind::kGroup, parameter_group(message.id.value)), place);
+      insert(key_of(Kind::kGroup, parameter_group(message.id.value)), entry);
     }
   }
 }
 
-void MessageIndex::insert_message(const MessageDef& message, std::uint32_t place) {
-  const auto conflict_with = [&](const Place& used) {
+void MessageIndex::insert_message(const MessageDef& message, std::uint32_t entry) {
+  const auto conflict_with = [&](const Entry& used) {
     // Within one file it is a warning of that file.
-    if (used.database != places_[place].database) conflicts_.push_back({used, places_[place]});
+    if (used.database != entries_[entry].database) conflicts_.push_back({used, entries_[entry]});
   };
   const std::uint32_t id = message.id.value;
   if (!message.id.extended) {
     if (id > kStandardIdMax) return;
     if (standard_[id] == kEmpty) {
-      standard_[id] = place;
+      standard_[id] = entry;
     } else {
-      conflict_with(places_[standard_[id]]);
+      conflict_with(entries_[standard_[id]]);
     }
     return;
   }
   const std::uint64_t exact = key_of(Kind::kIdentifier, id);
-  const bool is_new = insert(exact, place);
+  const bool is_new = insert(exact, entry);
   if (!is_new) conflict_with(*find(exact));
   if (!message.j1939) return;
   const std::uint64_t group =
       key_of(Kind::kGroupAndSource, (parameter_group(id) << 8) | (id & kSourceMask));
-  if (!insert(group, place) && is_new) conflict_with(*find(group));
+  if (!insert(group, entry) && is_new) conflict_with(*find(group));
 }
 
 std::size_t MessageIndex::first_slot_of(std::uint64_t key) const noexcept {
@@ -72,39 +72,39 @@ std::size_t MessageIndex::first_slot_of(std::uint64_t key) const noexcept {
 
 std::size_t MessageIndex::slot_of(std::uint64_t key) const noexcept {
   std::size_t slot = first_slot_of(key);
-  while (slots_[slot].place != kEmpty && slots_[slot].key != key) {
+  while (slots_[slot].entry != kEmpty && slots_[slot].key != key) {
     slot = (slot + 1) & (slots_.size() - 1);
   }
   return slot;
 }
 
-const MessageIndex::Place* MessageIndex::find(std::uint64_t key) const noexcept {
+const MessageIndex::Entry* MessageIndex::find(std::uint64_t key) const noexcept {
   const Slot& slot = slots_[slot_of(key)];
-  return slot.place == kEmpty ? nullptr : &places_[slot.place];
+  return slot.entry == kEmpty ? nullptr : &entries_[slot.entry];
 }
 
-bool MessageIndex::insert(std::uint64_t key, std::uint32_t place) {
+bool MessageIndex::insert(std::uint64_t key, std::uint32_t entry) {
   Slot& slot = slots_[slot_of(key)];
-  if (slot.place != kEmpty) return false;
-  slot = {key, place};
+  if (slot.entry != kEmpty) return false;
+  slot = {key, entry};
   return true;
 }
 
 void MessageIndex::bring_near(CanId id) const noexcept {
-  if (!id.extended || places_.empty()) return;  // of 11 bits they are few
+  if (!id.extended || entries_.empty()) return;  // of 11 bits they are few
   can::bring_near(&slots_[first_slot_of(key_of(Kind::kIdentifier, id.value))], sizeof(Slot));
 }
 
-const MessageIndex::Place* MessageIndex::lookup(CanId id) const noexcept {
-  if (places_.empty()) return nullptr;
+const MessageIndex::Entry* MessageIndex::lookup(CanId id) const noexcept {
+  if (entries_.empty()) return nullptr;
   if (!id.extended) {
     if (id.value > kStandardIdMax || standard_[id.value] == kEmpty) return nullptr;
-    return &places_[standard_[id.value]];
+    return &entries_[standard_[id.value]];
   }
-  if (const Place* place = find(key_of(Kind::kIdentifier, id.value))) return place;
+  if (const Entry* entry = find(key_of(Kind::kIdentifier, id.value))) return entry;
   const std::uint32_t group = parameter_group(id.value);
   const std::uint32_t group_and_source = (group << 8) | (id.value & kSourceMask);
-  if (const Place* place = find(key_of(Kind::kGroupAndSource, group_and_source))) return place;
+  if (const Entry* entry = find(key_of(Kind::kGroupAndSource, group_and_source))) return entry;
   return find(key_of(Kind::kGroup, group));
 }
 

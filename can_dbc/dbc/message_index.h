@@ -37,15 +37,15 @@ constexpr bool is_of_message(CanId received, CanId message, bool j1939) noexcept
 
 class MessageIndex {
  public:
-  struct Place {
+  struct Entry {
     std::uint32_t database = 0;  // index of the file
     std::uint32_t message = 0;   // index of the message in it
-    friend bool operator==(const Place&, const Place&) = default;
+    friend bool operator==(const Entry&, const Entry&) = default;
   };
   // Two files that define the same identifier, or the same parameter group from the same source.
   struct Conflict {
-    Place used;
-    Place ignored;
+    Entry used;
+    Entry ignored;
   };
 
   MessageIndex() = default;
@@ -54,7 +54,7 @@ class MessageIndex {
 
   // The message of a frame with this identifier; nullptr if there is none. An exact identifier
   // wins, then the parameter group from the same source address, then the group from any source.
-  const Place* lookup(CanId id) const noexcept;
+  const Entry* lookup(CanId id) const noexcept;
   // Before it is looked up.
   void bring_near(CanId id) const noexcept;
   const std::vector<Conflict>& conflicts() const noexcept { return conflicts_; }
@@ -64,7 +64,7 @@ class MessageIndex {
   static constexpr std::uint32_t kEmpty = ~std::uint32_t{0};
   struct Slot {
     std::uint64_t key = 0;
-    std::uint32_t place = kEmpty;  // in places_
+    std::uint32_t entry = kEmpty;  // in entries_
   };
 
   static std::uint64_t key_of(Kind kind, std::uint32_t value) noexcept {
@@ -72,13 +72,13 @@ class MessageIndex {
   }
   std::size_t first_slot_of(std::uint64_t key) const noexcept;
   std::size_t slot_of(std::uint64_t key) const noexcept;
-  const Place* find(std::uint64_t key) const noexcept;
-  // False if the key was taken; the place that has it stays.
-  bool insert(std::uint64_t key, std::uint32_t place);
-  void insert_message(const MessageDef& message, std::uint32_t place);
+  const Entry* find(std::uint64_t key) const noexcept;
+  // False if the key was taken; the entry that has it stays.
+  bool insert(std::uint64_t key, std::uint32_t entry);
+  void insert_message(const MessageDef& message, std::uint32_t entry);
 
-  std::vector<Place> places_;
-  std::vector<std::uint32_t> standard_;  // place of each 11-bit identifier
+  std::vector<Entry> entries_;
+  std::vector<std::uint32_t> standard_;  // entry of each 11-bit identifier
   std::vector<Slot> slots_;              // a power of two, at most half full
   std::vector<Conflict> conflicts_;
 };

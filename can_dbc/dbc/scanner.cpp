@@ -89,7 +89,7 @@ std::string clip(std::string_view text) {
   return is_utf8(out) ? out : utf8_from_windows_1252(out);
 }
 
-LineCounter::Place LineCounter::at(std::size_t offset) {
+LineCounter::Position LineCounter::at(std::size_t offset) {
   offset = std::min(offset, text_.size());
   for (; scanned_ < offset; ++scanned_) {
     const char c = text_[scanned_];
@@ -114,8 +114,9 @@ std::vector<Problem> ProblemList::finish(std::string_view text) {
     const bool again = i > 0 && item.offset == items_[i - 1].offset &&
                        std::strcmp(item.code, items_[i - 1].code) == 0;
     if (again) continue;
-    const LineCounter::Place place = lines.at(item.offset);
-    problems.push_back({item.severity, place.line, place.column, item.code, std::move(item.text)});
+    const LineCounter::Position position = lines.at(item.offset);
+    problems.push_back(
+        {item.severity, position.line, position.column, item.code, std::move(item.text)});
   }
   items_.clear();
   return problems;

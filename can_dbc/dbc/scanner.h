@@ -46,11 +46,11 @@ std::string clip(std::string_view text);
 class LineCounter {
  public:
   explicit LineCounter(std::string_view text) : text_(text) {}
-  struct Place {
+  struct Position {
     std::uint32_t line;    // 1-based
     std::uint32_t column;  // 1-based, bytes
   };
-  Place at(std::size_t offset);  // offsets must not fall
+  Position at(std::size_t offset);  // offsets must not fall
 
  private:
   std::string_view text_;

@@ -79,8 +79,8 @@ class Decoder {
   // nullptr: no DBC names the frame.
   const ChosenMessage* message_of(const can::CanFrame& frame) const {
     if (frame.remote || frame.error) return nullptr;
-    const can::MessageIndex::Place* place = index_.lookup(frame.id);
-    return place == nullptr ? nullptr : &messages_[place->database][place->message];
+    const can::MessageIndex::Entry* entry = index_.lookup(frame.id);
+    return entry == nullptr ? nullptr : &messages_[entry->database][entry->message];
   }
   // False: nothing of it is wanted.
   bool decode(const can::CanFrame& frame, const ChosenMessage& message) {
@@ -93,8 +93,8 @@ class Decoder {
   const can::DecodedMessage& values() const { return values_; }
 
  private:
-  const can::MessageDef& message_at(can::MessageIndex::Place place) const {
-    return databases_[place.database]->messages[place.message];
+  const can::MessageDef& message_at(can::MessageIndex::Entry entry) const {
+    return databases_[entry.database]->messages[entry.message];
   }
 
   void mention_conflicts(const std::vector<std::string>& paths) const {

@@ -1094,8 +1094,8 @@ TEST(DbcParser, AHundredThousandMessages) {
   const Database* database = &result.database;
   const MessageIndex index(std::span<const Database* const>(&database, 1));
   for (std::uint32_t i = 0; i < kMessages; ++i) {
-    const MessageIndex::Place* place = index.lookup({i, true});
-    ASSERT_TRUE(place != nullptr && place->message == i);
+    const MessageIndex::Entry* entry = index.lookup({i, true});
+    ASSERT_TRUE(entry != nullptr && entry->message == i);
   }
 }
 

@@ -17,8 +17,8 @@ MessageDef message(const char* name, std::uint32_t id, bool extended, bool j1939
 }
 
 std::string name_of(const MessageIndex& index, std::vector<const Database*> databases, CanId id) {
-  const MessageIndex::Place* place = index.lookup(id);
-  return place == nullptr ? "" : databases[place->database]->messages[place->message].name;
+  const MessageIndex::Entry* entry = index.lookup(id);
+  return entry == nullptr ? "" : databases[entry->database]->messages[entry->message].name;
 }
 
 TEST(ParameterGroup, LeavesOutTheDestinationOfPdu1) {
@@ -99,9 +99,9 @@ TEST(MessageIndex, TwoFilesWithOneIdentifierAreReportedAndTheFirstIsUsed) {
   EXPECT_EQ(name_of(index, both, {0x200, false}), "c");
   EXPECT_EQ(name_of(index, both, {0x18FEF110, true}), "b");
   ASSERT_EQ(index.conflicts().size(), 2U);
-  EXPECT_EQ(index.conflicts()[0].used, (MessageIndex::Place{0, 0}));
-  EXPECT_EQ(index.conflicts()[0].ignored, (MessageIndex::Place{1, 1}));
-  EXPECT_EQ(index.conflicts()[1].ignored, (MessageIndex::Place{1, 2}));
+  EXPECT_EQ(index.conflicts()[0].used, (MessageIndex::Entry{0, 0}));
+  EXPECT_EQ(index.conflicts()[0].ignored, (MessageIndex::Entry{1, 1}));
+  EXPECT_EQ(index.conflicts()[1].ignored, (MessageIndex::Entry{1, 2}));
 }
 
 TEST(MessageIndex, EqualsAMapForManyIdentifiers) {

@@ -61,7 +61,7 @@ TEST(CurveFamily, ModesAndTheirInverseAreOne) {
   for (int mode = 0; mode < kShapeKnots; ++mode) {
     for (int i = 0; i < kShapeKnots; ++i) {
       EXPECT_NEAR(
-          mode_shape(mode).departure(place_on_curve(kShapeKnot[static_cast<std::size_t>(i)])),
+          mode_shape(mode).departure(spline_position(kShapeKnot[static_cast<std::size_t>(i)])),
           curve_modes()(i, mode), 1e-12);
     }
   }

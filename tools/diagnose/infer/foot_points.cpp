@@ -32,10 +32,10 @@ void FootBatch::find_one(std::size_t i) {
     bend_Nm = 0.5 * capacity_Nm * bend * slip_spread_[i] * per_peak_ * per_peak_;
   }
   const double torque_Nm = torque_Nm_[i] - bend_Nm;
-  struct Place {
+  struct CurvePoint {
     double x = 0.0, model_Nm = 0.0, slope = 0.0, distance = 0.0;
   };
-  const auto at = [&](double x) -> Place {
+  const auto at = [&](double x) -> CurvePoint {
     const CurveShape::Point point = curve_.evaluate(x);
     const double model_Nm = capacity_Nm * point.value;
     const double gap_slip = slip - x * peak_;
@@ -43,11 +43,11 @@ void FootBatch::find_one(std::size_t i) {
     return {x, model_Nm, capacity_Nm * point.slope * per_peak_,
             gap_slip * gap_slip * slip_weight_ + gap_Nm * gap_Nm * torque_weight};
   };
-  Place foot = at(slip * per_peak_);
+  CurvePoint foot = at(slip * per_peak_);
   // Right of the rising branch the next point of the curve may lie on it, at the same torque:
   // from beyond the peak no small steps lead there.
   if (const double rising = nominal_inverse(torque_Nm / capacity_Nm); std::isfinite(rising)) {
-    if (const Place there = at(rising); there.distance < foot.distance) foot = there;
+    if (const CurvePoint there = at(rising); there.distance < foot.distance) foot = there;
   }
   // Gauss-Newton, the step shortened while the distance would grow.
   for (int iteration = 0; iteration < kIterations; ++iteration) {
@@ -58,7 +58,7 @@ void FootBatch::find_one(std::size_t i) {
     step = std::clamp(step, -kStepMost, kStepMost);
     const double before = foot.x;
     for (int halving = 0; halving < kHalvings; ++halving, step *= kShorter) {
-      if (const Place there = at(before + step); there.distance <= foot.distance) {
+      if (const CurvePoint there = at(before + step); there.distance <= foot.distance) {
         foot = there;
         break;
       }
@@ -140,10 +140,10 @@ class FootSearch {
   struct Sample {
     Value slip, torque_Nm, capacity_Nm, torque_weight;
   };
-  struct Place {
+  struct CurvePoint {
     Value x, model_Nm, slope, distance;
   };
-  BELTGRIP_LANES Place at(const Sample& sample, Value x) const {
+  BELTGRIP_LANES CurvePoint at(const Sample& sample, Value x) const {
     const typename Curve::Point point = curve_.evaluate(x);
     const Value model_Nm = sample.capacity_Nm * point.value;
     const Value gap_slip = sample.slip - x * batch_.peak_;
@@ -151,11 +151,11 @@ class FootSearch {
     return {x, model_Nm, sample.capacity_Nm * point.slope * batch_.per_peak_,
             gap_slip * gap_slip * batch_.slip_weight_ + gap_Nm * gap_Nm * sample.torque_weight};
   }
-  BELTGRIP_LANES static Place chosen(Mask first, const Place& a, const Place& b) {
+  BELTGRIP_LANES static CurvePoint chosen(Mask first, const CurvePoint& a, const CurvePoint& b) {
     return {first ? a.x : b.x, first ? a.model_Nm : b.model_Nm, first ? a.slope : b.slope,
             first ? a.distance : b.distance};
   }
-  BELTGRIP_LANES Value step_from(const Sample& sample, const Place& foot) const {
+  BELTGRIP_LANES Value step_from(const Sample& sample, const CurvePoint& foot) const {
     const double weight = batch_.slip_weight_;
     const Value gap_slip = sample.slip - foot.x * batch_.peak_;
     const Value gap_Nm = sample.torque_Nm - foot.model_Nm;
@@ -177,12 +177,12 @@ class FootSearch {
       const Value bend_Nm = 0.5 * capacity_Nm * bend * spread * batch_.per_peak_ * batch_.per_peak_;
       sample.torque_Nm -= spread < kSpreadLeast ? Value{} : bend_Nm;
     }
-    const Place here = at(sample, x);
+    const CurvePoint here = at(sample, x);
     const Value height = sample.torque_Nm / capacity_Nm;
     const Value rising = curve_.nominal_inverse(height);
-    const Place there = at(sample, rising);
+    const CurvePoint there = at(sample, rising);
     const Mask is_nearer = Curve::has_inverse(height) & (there.distance < here.distance);
-    const Place foot = chosen(is_nearer, there, here);
+    const CurvePoint foot = chosen(is_nearer, there, here);
     store(Curve::is_beyond(x) | Curve::is_beyond(above) | Curve::is_beyond(below), is_odd_, i);
     store(sample.slip, slip_, i);
     store(sample.torque_Nm, torque_Nm_, i);
@@ -195,7 +195,7 @@ class FootSearch {
     store(Value{}, iterations_, i);
   }
 
-  BELTGRIP_LANES void keep(const Place& foot, std::size_t i) {
+  BELTGRIP_LANES void keep(const CurvePoint& foot, std::size_t i) {
     store(foot.x, x_, i);
     store(foot.model_Nm, model_Nm_, i);
     store(foot.slope, slope_, i);
@@ -205,11 +205,11 @@ class FootSearch {
   BELTGRIP_LANES void step(std::size_t i) {
     const Sample sample{load(slip_, i), load(torque_Nm_, i), load(capacity_Nm_, i),
                         load(torque_weight_, i)};
-    const Place before{load(x_, i), load(model_Nm_, i), load(slope_, i), load(distance_, i)};
+    const CurvePoint before{load(x_, i), load(model_Nm_, i), load(slope_, i), load(distance_, i)};
     const Value tried = load(step_, i);
-    const Place there = at(sample, before.x + tried);
+    const CurvePoint there = at(sample, before.x + tried);
     const Mask is_nearer = there.distance <= before.distance;
-    const Place foot = chosen(is_nearer, there, before);
+    const CurvePoint foot = chosen(is_nearer, there, before);
     const Value halvings = load(halvings_, i) + 1.0;
     const Mask turns = is_nearer | (halvings == static_cast<double>(kHalvings));
     const Value iterations = load(iterations_, i) + (turns ? Value{} + 1.0 : Value{});

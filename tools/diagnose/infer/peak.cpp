@@ -72,9 +72,9 @@ FittedPeak fitted_peak(const Engine& engine, const Hypothesis& hypothesis, int s
       const Eigen::Index column = column_of(engine, of + mode);
       const CurveShape& shape = mode_shape(mode);
       const double unit = engine.scale(of + mode);
-      height[column] = unit * shape.departure(place_on_curve(x)) / value;
-      const double slope = (shape.departure(place_on_curve(x + kStep)) -
-                            shape.departure(place_on_curve(x - kStep))) /
+      height[column] = unit * shape.departure(spline_position(x)) / value;
+      const double slope = (shape.departure(spline_position(x + kStep)) -
+                            shape.departure(spline_position(x - kStep))) /
                            (2.0 * kStep);
       if (is_inside) place[column] = -unit * slope / (bend * x);
     }

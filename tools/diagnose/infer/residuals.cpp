@@ -160,7 +160,7 @@ void prepare_derivatives(const Campaign& campaign, int run, const ModelState& st
       ++row;
       if (!(at.weight[k] > 0.0)) continue;
       at.on_curve[static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)])].push_back(
-          {k, row, place_on_curve(std::abs(at.foot[k])), at.measured.capacity[k],
+          {k, row, spline_position(std::abs(at.foot[k])), at.measured.capacity[k],
            -std::copysign(at.weight[k], at.foot[k])});
     }
   }
@@ -198,7 +198,7 @@ void add_mode(const std::vector<CurveSample>& samples, int mode, double scale,
   const CurveShape& shape = mode_shape(mode);
   double* const to = column.data();
   for (const CurveSample& each : samples) {
-    to[each.*place] = each.capacity_Nm * shape.departure(each.place) * each.weight * scale;
+    to[each.*place] = each.capacity_Nm * shape.departure(each.position) * each.weight * scale;
   }
 }
 

@@ -89,7 +89,7 @@ struct Campaign {
 struct CurveSample {
   int k = 0;
   int row = 0;       // of the valid samples
-  CurvePlace place;  // of |foot|
+  SplinePosition position;  // of |foot|
   double capacity_Nm = 0.0;
   double weight = 0.0;  // of a change of the curve in the residual, with its sign
 };

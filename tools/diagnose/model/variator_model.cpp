@@ -163,7 +163,7 @@ CurveShape::CurveShape(std::span<const double, kShapeKnots> departure, double fa
   cubic_ = cubics(y);
 }
 
-CurvePlace place_on_curve(double x) {
+SplinePosition spline_position(double x) {
   using Curve = CurveShape;
   if (!(x < Curve::kEnd.back())) {
     return {Curve::kEnds - 2, Curve::kEnd.back() - Curve::kEnd[Curve::kEnds - 2]};
@@ -176,7 +176,7 @@ CurvePlace place_on_curve(double x) {
 
 CurveShape::Point CurveShape::far(double size) const {
   Point out = nominal_formula(size);
-  out.value += departure(place_on_curve(size));
+  out.value += departure(spline_position(size));
   return out;
 }
 

@@ -106,12 +106,12 @@ Quantities evaluate(const ExperimentData& run, int experiment,
                     const estimator::VariatorParameters& variator, const Eigen::VectorXd& nuisance,
                     const Effects& effects);
 
-// Where on the departure's cubics x = slip / slip at the peak, x >= 0, lies.
-struct CurvePlace {
+// The departure's cubic in which x = slip / slip at the peak, x >= 0, lies, and where in it.
+struct SplinePosition {
   std::size_t interval = 0;
   double u = 0.0;  // from the interval's left end
 };
-CurvePlace place_on_curve(double x);
+SplinePosition spline_position(double x);
 
 // Which end of an interval of the departure a knot is: the peak stands between them.
 constexpr int end_of_knot(int knot) { return knot < kKnotsBelowPeak ? knot + 1 : knot + 2; }
@@ -151,14 +151,14 @@ class CurveShape {
     out.value *= std::copysign(1.0, x);
     return out;
   }
-  double departure(const CurvePlace& place) const {  // of the value, without the fall
-    const auto& c = cubic_[place.interval];
-    const double u = place.u;
+  double departure(const SplinePosition& at) const {  // of the value, without the fall
+    const auto& c = cubic_[at.interval];
+    const double u = at.u;
     return c[0] + u * (c[1] + u * (c[2] + u * c[3]));
   }
 
  private:
-  friend CurvePlace place_on_curve(double x);
+  friend SplinePosition spline_position(double x);
   template <typename Lanes>
   friend class CurveLanes;
   // Ends of the intervals of the cubic: 0, the knots below the peak, the peak, the knots beyond it.

@@ -126,9 +126,9 @@ std::bitset<256> SignalCatalogue::sources_of(const can::MessageDef& message) con
   const can::MessageIndex index(databases);
   for (std::uint32_t source = 0; source < sources.size(); ++source) {
     const std::uint32_t id = (message.id.value & ~kSourceMask) | source;
-    const can::MessageIndex::Place* place = index.lookup({id, true});
+    const can::MessageIndex::Entry* entry = index.lookup({id, true});
     sources[source] =
-        place != nullptr && &files_[place->database].database.messages[place->message] == &message;
+        entry != nullptr && &files_[entry->database].database.messages[entry->message] == &message;
   }
   sources.set(message.id.value & kSourceMask);  // of two messages of one identifier, either
   return sources;
