@@ -1,5 +1,9 @@
 // The last values of one signal with their stamps, and the value at an instant near the newest.
 // Stamps strictly increase. Fixed size, no allocation. Real-time thread.
+//
+// No ring is shared with its neighbours, since none holds the same values: here are those that were
+// taken; value_course has what was received, spikes too, but of equal ones the first alone, 32 of
+// them, which may reach back over minutes; spike_gate has five, those left out replaced by a line.
 #pragma once
 
 #include <array>
