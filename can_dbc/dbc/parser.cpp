@@ -47,7 +47,16 @@ class StatementReader {
   bool nodes();
   bool value_table();
   bool message();
+  bool message_name(std::string_view& name, std::size_t name_offset);
+  void message_tail(MessageDef& message);
+  void set_id(std::uint32_t raw_id, std::string_view name, std::size_t id_offset,
+              MessageDef& message);
   bool signal();
+  bool multiplexing(std::string_view indicator, std::size_t indicator_offset, SignalDef& signal,
+                    std::optional<std::uint64_t>& selector);
+  bool signal_name(std::string_view& name, std::size_t name_offset, SignalDef& signal,
+                   std::optional<std::uint64_t>& selector);
+  bool signal_layout(SignalDef& signal);
   bool usual_signal();
   bool environment_variable();
   bool environment_data();
@@ -489,41 +498,27 @@ bool StatementReader::nodes() {
   }
 }
 
-bool StatementReader::message() {
-  within_ = Within::kRefusedMessage;
-  MessageSource source;
-  source.offset = start_;
-  MessageDef message;
-  scan_.skip_blank();
-  const std::size_t id_offset = scan_.position();
-  if (!expect_id(source.raw_id)) return false;
-
-  // The name, the colon, and the length; names with blanks in them are joined as they are.
-  scan_.skip_blank();
-  const std::size_t name_offset = scan_.position();
-  std::string_view name;
+// The name of a message up to its colon; names with blanks in them are joined as they are.
+bool StatementReader::message_name(std::string_view& name, std::size_t name_offset) {
   if (!expect_name(name, "a message name")) return false;
   scan_.skip_blank();
-  if (scan_.peek() != ':') {
-    const std::string_view line = scan_.line_rest(name_offset, kNameLengthMax);
-    const std::size_t colon = line.find(':');
-    const bool on_line = colon != std::string_view::npos;
-    if (!on_line && !is_digit(scan_.peek())) return fail("\":\" after the message name");
-    if (on_line) {
-      name = line.substr(0, colon);
-      while (static_cast<unsigned char>(name.back()) <= ' ') name.remove_suffix(1);
-      scan_.seek(name_offset + colon);
-    } else {
-      draft_.problems.warn(scan_.position(), "colon", "expected \":\" after the message name");
-    }
+  if (scan_.peek() == ':') return true;
+  const std::string_view line = scan_.line_rest(name_offset, kNameLengthMax);
+  const std::size_t colon = line.find(':');
+  const bool on_line = colon != std::string_view::npos;
+  if (!on_line && !is_digit(scan_.peek())) return fail("\":\" after the message name");
+  if (on_line) {
+    name = line.substr(0, colon);
+    while (static_cast<unsigned char>(name.back()) <= ' ') name.remove_suffix(1);
+    scan_.seek(name_offset + colon);
+  } else {
+    draft_.problems.warn(scan_.position(), "colon", "expected \":\" after the message name");
   }
-  scan_.accept(':');
-  check_name(name, name_offset);
-  message.name = draft_.utf8(name);
-  std::uint64_t length = 0;
-  if (!expect_unsigned(length, 0x7FFF'FFFF, "the message length in bytes")) return false;
-  message.length = static_cast<std::uint32_t>(length);
+  return true;
+}
 
+// What follows the length: the transmitter, and text that has no business there.
+void StatementReader::message_tail(MessageDef& message) {
   scan_.skip_spaces();
   const std::string_view transmitter = scan_.name();
   if (transmitter.empty()) {
@@ -545,10 +540,13 @@ bool StatementReader::message() {
     draft_.keep(start_, end);
     scan_.seek(end);
   }
+}
 
-  const bool independent = name == kIndependentMessage || source.raw_id == kIndependentId;
-  const std::uint32_t without_flag = source.raw_id & ~kExtendedFlag;
-  message.id.extended = without_flag != source.raw_id;
+void StatementReader::set_id(std::uint32_t raw_id, std::string_view name, std::size_t id_offset,
+                             MessageDef& message) {
+  const bool independent = name == kIndependentMessage || raw_id == kIndependentId;
+  const std::uint32_t without_flag = raw_id & ~kExtendedFlag;
+  message.id.extended = without_flag != raw_id;
   message.id.value = without_flag & kExtendedIdMax;
   if (!independent) {
     const bool flag_missing = !message.id.extended && without_flag > kStandardIdMax;
@@ -557,12 +555,36 @@ bool StatementReader::message() {
     if (flag_missing || too_large) {
       draft_.problems.warn(
           id_offset, flag_missing ? "id-extended" : "id-range",
-          "identifier " + std::to_string(source.raw_id) +
+          "identifier " + std::to_string(raw_id) +
               (flag_missing ? " is above 0x7FF without bit 31" : "") +
               (flag_missing && too_large ? " and" : "") +
               (too_large ? " has more than 29 bits; the lower 29 are used" : "; read as 29 bits"));
     }
   }
+}
+
+bool StatementReader::message() {
+  within_ = Within::kRefusedMessage;
+  MessageSource source;
+  source.offset = start_;
+  MessageDef message;
+  scan_.skip_blank();
+  const std::size_t id_offset = scan_.position();
+  if (!expect_id(source.raw_id)) return false;
+
+  scan_.skip_blank();
+  const std::size_t name_offset = scan_.position();
+  std::string_view name;
+  if (!message_name(name, name_offset)) return false;
+  scan_.accept(':');
+  check_name(name, name_offset);
+  message.name = draft_.utf8(name);
+  std::uint64_t length = 0;
+  if (!expect_unsigned(length, 0x7FFF'FFFF, "the message length in bytes")) return false;
+  message.length = static_cast<std::uint32_t>(length);
+
+  message_tail(message);
+  set_id(source.raw_id, name, id_offset, message);
   within_ = Within::kMessage;
   end_message();
   make_room(draft_.messages);
@@ -572,66 +594,62 @@ bool StatementReader::message() {
   return true;
 }
 
-bool StatementReader::signal() {
-  if (within_ == Within::kNothing) {
-    draft_.problems.error(start_, "signal-without-message", "SG_ without a BO_ before it");
+// "M", "m3", "m3M"; whatever else stands there belongs to the name: false.
+bool StatementReader::multiplexing(std::string_view indicator, std::size_t indicator_offset,
+                                   SignalDef& signal, std::optional<std::uint64_t>& selector) {
+  if (indicator == "M") {
+    signal.is_multiplexer = true;
+    return true;
+  }
+  std::string_view digits = indicator;
+  if (digits[0] != 'm') return false;
+  digits.remove_prefix(1);
+  const bool both = !digits.empty() && digits.back() == 'M';
+  if (both) digits.remove_suffix(1);
+  std::uint64_t value = 0;
+  const auto [end, status] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (digits.empty()) {
+    draft_.problems.warn(indicator_offset, "mux-number",
+                         "multiplexer indicator \"" + clip(indicator) +
+                             "\" without a number; the signal is read in every frame");
+  } else if (end == digits.data() + digits.size() && status == std::errc{}) {
+    selector = value;
+  } else {
     return false;
   }
-  if (within_ == Within::kRefusedMessage) return false;
-  if (usual_signal()) return true;
+  signal.is_multiplexer = both;
+  return true;
+}
 
-  SignalDef signal;
-  scan_.skip_blank();
-  const std::size_t name_offset = scan_.position();
-  std::optional<std::uint64_t> selector;
-  std::string_view name;
+// The name of a signal up to its colon, and what says how it is multiplexed.
+bool StatementReader::signal_name(std::string_view& name, std::size_t name_offset,
+                                  SignalDef& signal, std::optional<std::uint64_t>& selector) {
   if (!expect_name(name, "a signal name")) return false;
   scan_.skip_blank();
-  if (scan_.peek() != ':') {
-    // "name m3 :"; whatever else stands there belongs to the name.
-    std::size_t name_end = name_offset + name.size();
-    std::string_view indicator;
-    std::size_t indicator_offset = 0;
-    while (scan_.peek() != ':') {
-      if (!indicator.empty()) name_end = indicator_offset + indicator.size();
-      indicator_offset = scan_.position();
-      if (scan_.keyword_at(indicator_offset)) return fail("\":\" after the signal name");
-      indicator = scan_.name();
-      if (indicator.empty() || name_end - name_offset > kNameLengthMax) {
-        return fail("\":\" after the signal name");
-      }
-      scan_.skip_blank();
+  if (scan_.peek() == ':') return true;
+  // "name m3 :"; whatever else stands there belongs to the name.
+  std::size_t name_end = name_offset + name.size();
+  std::string_view indicator;
+  std::size_t indicator_offset = 0;
+  while (scan_.peek() != ':') {
+    if (!indicator.empty()) name_end = indicator_offset + indicator.size();
+    indicator_offset = scan_.position();
+    if (scan_.keyword_at(indicator_offset)) return fail("\":\" after the signal name");
+    indicator = scan_.name();
+    if (indicator.empty() || name_end - name_offset > kNameLengthMax) {
+      return fail("\":\" after the signal name");
     }
-    std::string_view digits = indicator;
-    std::uint64_t selector_value = 0;
-    bool is_indicator = digits.size() == 1 && digits[0] == 'M';
-    if (is_indicator) signal.is_multiplexer = true;
-    if (!is_indicator && digits[0] == 'm') {
-      digits.remove_prefix(1);
-      const bool both = !digits.empty() && digits.back() == 'M';
-      if (both) digits.remove_suffix(1);
-      const auto [end, status] =
-          std::from_chars(digits.data(), digits.data() + digits.size(), selector_value);
-      const bool whole = end == digits.data() + digits.size();
-      if (digits.empty()) {
-        draft_.problems.warn(indicator_offset, "mux-number",
-                             "multiplexer indicator \"" + clip(indicator) +
-                                 "\" without a number; the signal is read in every frame");
-        is_indicator = true;
-        signal.is_multiplexer = both;
-      } else if (whole && status == std::errc{}) {
-        is_indicator = true;
-        selector = selector_value;
-        signal.is_multiplexer = both;
-      }
-    }
-    if (!is_indicator) name_end = indicator_offset + indicator.size();
-    name = scan_.slice(name_offset, name_end);
+    scan_.skip_blank();
   }
-  scan_.accept(':');
-  check_name(name, name_offset);
-  signal.name = draft_.utf8(name);
+  if (!multiplexing(indicator, indicator_offset, signal, selector)) {
+    name_end = indicator_offset + indicator.size();
+  }
+  name = scan_.slice(name_offset, name_end);
+  return true;
+}
 
+// "0|8@1+ (1,0)"
+bool StatementReader::signal_layout(SignalDef& signal) {
   std::uint64_t start = 0;
   std::uint64_t length = 0;
   NumberToken scale;
@@ -661,6 +679,28 @@ bool StatementReader::signal() {
   }
   signal.scale = scale.value;
   signal.offset = offset.value;
+  return true;
+}
+
+bool StatementReader::signal() {
+  if (within_ == Within::kNothing) {
+    draft_.problems.error(start_, "signal-without-message", "SG_ without a BO_ before it");
+    return false;
+  }
+  if (within_ == Within::kRefusedMessage) return false;
+  if (usual_signal()) return true;
+
+  SignalDef signal;
+  scan_.skip_blank();
+  const std::size_t name_offset = scan_.position();
+  std::optional<std::uint64_t> selector;
+  std::string_view name;
+  if (!signal_name(name, name_offset, signal, selector)) return false;
+  scan_.accept(':');
+  check_name(name, name_offset);
+  signal.name = draft_.utf8(name);
+
+  if (!signal_layout(signal)) return false;
   receivers_.clear();
   SignalUsage usage;
   signal_tail(signal, usage);
