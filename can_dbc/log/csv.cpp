@@ -376,83 +376,128 @@ class CsvParser : public LineParser {
     return 1'000'000'000;
   }
 
-  LineKind read_row(LogRecord& record) {
-    record.frame = CanFrame{};
-    record.interface = "1";
-    CanFrame& frame = record.frame;
+  // Of a row, beside what its record takes at once.
+  struct Payload {
     std::optional<std::size_t> wanted_length;
     std::size_t length = 0;
     std::string_view data;
     bool bytes_read = true;
-    for (std::size_t i = 0; i < std::min(field_count_, column_count_); ++i) {
-      const std::string_view field = fields_[i];
-      switch (columns_[i]) {
-        case Column::kTime:
-        case Column::kTime_ms:
-        case Column::kTime_us:
-        case Column::kTime_ns: {
-          static constexpr std::array<std::int64_t, 4> kUnits_ns{0, 1'000'000, 1'000, 1};
-          std::int64_t unit_ns = kUnits_ns[static_cast<std::size_t>(columns_[i]) -
-                                           static_cast<std::size_t>(Column::kTime)];
-          if (unit_ns == 0) unit_ns = plain_unit_ns_ == 0 ? 1'000'000'000 : plain_unit_ns_;
-          auto t_ns = time_ns(field, unit_ns);
-          if (!t_ns) t_ns = date_ns(field);
-          if (!t_ns) t_ns = clock_ns(field);
-          if (!t_ns) return bad("unreadable time");
-          record.t_ns = *t_ns;
-          break;
-        }
-        case Column::kId: {
-          std::string_view digits = field;
-          const bool marked = digits.size() > 1 && (digits.back() == 'x' || digits.back() == 'X');
-          if (marked) digits.remove_suffix(1);
-          const auto id = with_prefix_or(digits, id_base_);
-          if (!id || *id > kExtendedIdMax) return bad("unreadable identifier");
-          frame.id.value = *id;
-          frame.id.extended |= marked || *id > kStandardIdMax;
-          break;
-        }
-        case Column::kExtended:
-          frame.id.extended |= is_true(field);
-          break;
-        case Column::kLength:
-          if (const auto value = decimal(field)) wanted_length = *value;
-          break;
-        case Column::kData:
-          data = field;
-          break;
-        case Column::kDataByte: {
-          if (field.empty()) break;
-          const auto byte = with_prefix_or(field, byte_base_);
-          if (!byte || *byte > 0xFF || length == kMaxPayload) {
-            bytes_read = false;
-            break;
-          }
-          frame.data[length++] = static_cast<std::uint8_t>(*byte);
-          break;
-        }
-        case Column::kBus:
-          if (!field.empty()) record.interface = field;
-          break;
-        case Column::kRemote:
-          frame.remote = is_true(field);
-          break;
-        case Column::kError:
-          frame.error = is_true(field);
-          break;
-        case Column::kFd:
-          frame.fd = is_true(field);
-          break;
-        case Column::kBitRateSwitch:
-          frame.bit_rate_switch = is_true(field);
-          break;
-        case Column::kErrorState:
-          frame.error_state_indicator = is_true(field);
-          break;
-        case Column::kOther:
-          break;
-      }
+  };
+
+  std::optional<std::int64_t> time_of(Column column, std::string_view field) {
+    static constexpr std::array<std::int64_t, 4> kUnits_ns{0, 1'000'000, 1'000, 1};
+    std::int64_t unit_ns =
+        kUnits_ns[static_cast<std::size_t>(column) - static_cast<std::size_t>(Column::kTime)];
+    if (unit_ns == 0) unit_ns = plain_unit_ns_ == 0 ? 1'000'000'000 : plain_unit_ns_;
+    auto t_ns = time_ns(field, unit_ns);
+    if (!t_ns) t_ns = date_ns(field);
+    if (!t_ns) t_ns = clock_ns(field);
+    return t_ns;
+  }
+
+  bool read_id(std::string_view digits, CanFrame& frame) const {
+    const bool marked = digits.size() > 1 && (digits.back() == 'x' || digits.back() == 'X');
+    if (marked) digits.remove_suffix(1);
+    const auto id = with_prefix_or(digits, id_base_);
+    if (!id || *id > kExtendedIdMax) return false;
+    frame.id.value = *id;
+    frame.id.extended |= marked || *id > kStandardIdMax;
+    return true;
+  }
+
+  void read_byte(std::string_view field, CanFrame& frame, Payload& payload) const {
+    if (field.empty()) return;
+    const auto byte = with_prefix_or(field, byte_base_);
+    if (!byte || *byte > 0xFF || payload.length == kMaxPayload) {
+      payload.bytes_read = false;
+      return;
     }
+    frame.data[payload.length++] = static_cast<std::uint8_t>(*byte);
+  }
+
+  // nullptr, or what is wrong.
+  const char* read_field(Column column, std::string_view field, LogRecord& record,
+                         Payload& payload) {
+    CanFrame& frame = record.frame;
+    switch (column) {
+      case Column::kTime:
+      case Column::kTime_ms:
+      case Column::kTime_us:
+      case Column::kTime_ns: {
+        const auto t_ns = time_of(column, field);
+        if (!t_ns) return "unreadable time";
+        record.t_ns = *t_ns;
+        break;
+      }
+      case Column::kId:
+        if (!read_id(field, frame)) return "unreadable identifier";
+        break;
+      case Column::kExtended:
+        frame.id.extended |= is_true(field);
+        break;
+      case Column::kLength:
+        if (const auto value = decimal(field)) payload.wanted_length = *value;
+        break;
+      case Column::kData:
+        payload.data = field;
+        break;
+      case Column::kDataByte:
+        read_byte(field, frame, payload);
+        break;
+      case Column::kBus:
+        if (!field.empty()) record.interface = field;
+        break;
+      case Column::kRemote:
+        frame.remote = is_true(field);
+        break;
+      case Column::kError:
+        frame.error = is_true(field);
+        break;
+      case Column::kFd:
+        frame.fd = is_true(field);
+        break;
+      case Column::kBitRateSwitch:
+        frame.bit_rate_switch = is_true(field);
+        break;
+      case Column::kErrorState:
+        frame.error_state_indicator = is_true(field);
+        break;
+      case Column::kOther:
+        break;
+    }
+    return nullptr;
+  }
+
+  // The whole payload in one column wins over columns of single bytes. False: it does not fit the
+  // length that the row says.
+  static bool read_data(CanFrame& frame, Payload& payload) {
+    frame.data.fill(0);
+    auto& wanted_length = payload.wanted_length;
+    // python-can writes base64, everybody else hexadecimal digits: the length decides.
+    auto count = read_hex(payload.data, frame);
+    // A length code instead of a length.
+    const bool is_code = count && wanted_length && *wanted_length > 8 && *wanted_length < 16 &&
+                         kFdLengths[*wanted_length] == *count;
+    if (is_code) wanted_length = count;
+    if (!count || (wanted_length && *count != *wanted_length)) {
+      frame.data.fill(0);
+      count = read_base64(payload.data, frame);
+      if (!count || !wanted_length || *count != *wanted_length) return false;
+    }
+    payload.length = *count;
+    return true;
+  }
+
+  LineKind read_row(LogRecord& record) {
+    record.frame = CanFrame{};
+    record.interface = "1";
+    CanFrame& frame = record.frame;
+    Payload payload;
+    for (std::size_t i = 0; i < std::min(field_count_, column_count_); ++i) {
+      const char* const wrong = read_field(columns_[i], fields_[i], record, payload);
+      if (wrong != nullptr) return bad(wrong);
+    }
+    const auto& wanted_length = payload.wanted_length;
     if (frame.error) {
       frame = CanFrame{.id = {kBusError, false}, .error = true, .length = 8};
       return LineKind::kFrame;
@@ -463,25 +508,11 @@ class CsvParser : public LineParser {
       frame.fd = frame.bit_rate_switch = frame.error_state_indicator = false;
       return LineKind::kFrame;
     }
-    if (!bytes_read) return bad("unreadable data byte");
-    if (!data.empty()) {
-      frame.data.fill(0);  // the whole payload wins over columns of single bytes
-      // python-can writes base64, everybody else hexadecimal digits: the length decides.
-      auto count = read_hex(data, frame);
-      // A length code instead of a length.
-      const bool is_code = count && wanted_length && *wanted_length > 8 && *wanted_length < 16 &&
-                           kFdLengths[*wanted_length] == *count;
-      if (is_code) wanted_length = count;
-      if (!count || (wanted_length && *count != *wanted_length)) {
-        frame.data.fill(0);
-        const auto other = read_base64(data, frame);
-        if (!other || !wanted_length || *other != *wanted_length) {
-          return bad("data do not fit the length");
-        }
-        count = other;
-      }
-      length = *count;
+    if (!payload.bytes_read) return bad("unreadable data byte");
+    if (!payload.data.empty() && !read_data(frame, payload)) {
+      return bad("data do not fit the length");
     }
+    std::size_t length = payload.length;
     if (wanted_length && length > *wanted_length) {
       std::fill(frame.data.begin() + static_cast<std::ptrdiff_t>(*wanted_length),
                 frame.data.begin() + static_cast<std::ptrdiff_t>(length), std::uint8_t{0});

@@ -104,10 +104,7 @@ class TrcParser : public LineParser {
     }
     if (direction == "Warng") return LineKind::kNothing;
     if (direction == "Error") return error_frame(frame);
-    frame.fd = type == "FD" || type == "FB" || type == "FE" || type == "BI";
-    frame.bit_rate_switch = type == "FB" || type == "BI";
-    frame.error_state_indicator = type == "FE" || type == "BI";
-    frame.remote = type == "RR";
+    set_kind(type, frame);
     if (frame.fd && !code_is_length) {
       if (code > 15) return bad("unreadable length");
       code = kFdLengths[code];
@@ -132,6 +129,13 @@ class TrcParser : public LineParser {
   }
 
  private:
+  static void set_kind(std::string_view type, CanFrame& frame) {
+    frame.fd = type == "FD" || type == "FB" || type == "FE" || type == "BI";
+    frame.bit_rate_switch = type == "FB" || type == "BI";
+    frame.error_state_indicator = type == "FE" || type == "BI";
+    frame.remote = type == "RR";
+  }
+
   static bool is_frame_type(std::string_view type) {
     static constexpr std::array<std::string_view, 6> kFrames{"DT", "FD", "FB", "FE", "BI", "RR"};
     return std::find(kFrames.begin(), kFrames.end(), type) != kFrames.end();
