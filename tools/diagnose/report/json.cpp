@@ -115,6 +115,129 @@ void write_learned(text::JsonWriter& json, const LearnedFinding& learned) {
   json.end_array().end_object();
 }
 
+void write_baseline(text::JsonWriter& json, const Diagnosis& d) {
+  json.key("baseline").begin_object();
+  for (const auto& [name, signal] : d.baseline) {
+    json.key(name).begin_object();
+    json.field("rmse", signal.rmse).field("noise_floor", signal.noise_floor);
+    json.field("unexplained_share", signal.unexplained_share);
+    json.key("tests").begin_object();
+    for (const auto& [test, p] : signal.tests) json.field(test, p);
+    json.end_object().end_object();
+  }
+  json.end_object();
+  json.key("remaining").begin_object();
+  for (const auto& [name, test] : d.left) {
+    json.key(name).begin_object().field("value", test.value).field("limit", test.limit);
+    json.end_object();
+  }
+  json.end_object();
+}
+
+void write_simulation(text::JsonWriter& json, const Diagnosis& d) {
+  json.key("simulation").begin_object();
+  for (const auto& [name, signal] : d.simulation) {
+    json.key(name).begin_object();
+    json.field("rmse", signal.rmse).field("noise_floor", signal.noise_floor);
+    json.key("held_out");
+    if (signal.left_out) {
+      json.begin_object();
+      json.field("rmse_before", signal.left_out->before);
+      json.field("rmse_after", signal.left_out->after);
+      interval(json, signal.left_out->low, signal.left_out->high);
+      json.end_object();
+    } else {
+      json.null();
+    }
+    json.end_object();
+  }
+  json.end_object();
+}
+
+void write_finding(text::JsonWriter& json, const Finding& finding) {
+  json.begin_object();
+  json.field("effect", finding.effect);
+  json.key("parameters").begin_object();
+  for (const auto& [name, value] : finding.parameters) {
+    json.key(name).begin_object().field("value", value.value);
+    interval(json, value.low, value.high);
+    json.end_object();
+  }
+  for (const auto& [name, value] : finding.fixed) {
+    json.key(name).begin_object().field("value", value);
+    interval(json, value, value);
+    json.end_object();
+  }
+  json.end_object();
+  if (!finding.role.empty()) json.field("role", finding.role);
+  json.field("probability", finding.probability);
+  if (finding.stability) json.field("stability", *finding.stability);
+  write_words(json, "aliases", finding.aliases);
+  json.key("separate_by");
+  finding.separate_by.empty() ? json.null() : json.value(finding.separate_by);
+  json.key("gain").begin_object();
+  for (const auto& [name, gain] : finding.gain) {
+    write_change(json.key(name).begin_object(), gain);
+    json.end_object();
+  }
+  json.end_object().end_object();
+}
+
+void write_not_identifiable(text::JsonWriter& json, const std::vector<NotIdentifiable>& effects) {
+  json.key("not_identifiable").begin_array();
+  for (const NotIdentifiable& each : effects) {
+    json.begin_object().field("effect", each.effect);
+    json.key("smallest_detectable").begin_object();
+    for (const auto& [name, value] : each.smallest_detectable) json.field(name, value);
+    json.end_object().field("reason", each.reason).end_object();
+  }
+  json.end_array();
+}
+
+void write_held_out(text::JsonWriter& json, const Diagnosis& d) {
+  json.key("held_out").begin_object();
+  for (const auto& [name, gain] : d.held_out) {
+    json.key(name).begin_object();
+    json.field("rmse_before", gain.before).field("rmse_after", gain.after);
+    interval(json, gain.low, gain.high);
+    json.end_object();
+  }
+  if (d.mu_max) {
+    json.key("mu_max").begin_object();
+    json.field("error_before", d.mu_max->before).field("error_after", d.mu_max->after);
+    interval(json, d.mu_max->low, d.mu_max->high);
+    json.end_object();
+  }
+  json.end_object();
+}
+
+void write_reruns(text::JsonWriter& json, const std::vector<Rerun>& reruns) {
+  json.key("reruns").begin_array();
+  for (const Rerun& each : reruns) {
+    json.begin_object().field("log", each.log).field("start_s", each.start_s);
+    for (const RerunFigure& figure : kRerunFigures) {
+      json.key(figure.key).begin_object();
+      for (const auto& [when, side] : {std::pair{"before", &each.before}, {"after", &each.after}}) {
+        json.key(when);
+        *side ? json.value((**side).*figure.value) : json.null();
+      }
+      json.end_object();
+    }
+    json.end_object();
+  }
+  json.end_array();
+}
+
+void write_machine(text::JsonWriter& json, const Diagnosis& d) {
+  json.key("machine").begin_object();
+  for (const auto& [name, value] : d.machine) {
+    json.key(name).begin_object().field("value", value.value);
+    interval(json, value.low, value.high);
+    json.end_object();
+  }
+  json.end_object();
+}
+
 std::string joined(const std::vector<std::string>& words) {
   std::string out;
   for (const std::string& each : words) out += (out.empty() ? "" : ", ") + each;
@@ -177,124 +300,22 @@ std::string json_text(const Diagnosis& d) {
   json.field("complete", d.complete);
   json.field("experiments", d.experiments);
   json.field("usable_s", 0.1 * d.samples);
-  json.key("baseline").begin_object();
-  for (const auto& [name, signal] : d.baseline) {
-    json.key(name).begin_object();
-    json.field("rmse", signal.rmse).field("noise_floor", signal.noise_floor);
-    json.field("unexplained_share", signal.unexplained_share);
-    json.key("tests").begin_object();
-    for (const auto& [test, p] : signal.tests) json.field(test, p);
-    json.end_object().end_object();
-  }
-  json.end_object();
-  json.key("remaining").begin_object();
-  for (const auto& [name, test] : d.left) {
-    json.key(name).begin_object().field("value", test.value).field("limit", test.limit);
-    json.end_object();
-  }
-  json.end_object();
-  json.key("simulation").begin_object();
-  for (const auto& [name, signal] : d.simulation) {
-    json.key(name).begin_object();
-    json.field("rmse", signal.rmse).field("noise_floor", signal.noise_floor);
-    json.key("held_out");
-    if (signal.left_out) {
-      json.begin_object();
-      json.field("rmse_before", signal.left_out->before);
-      json.field("rmse_after", signal.left_out->after);
-      interval(json, signal.left_out->low, signal.left_out->high);
-      json.end_object();
-    } else {
-      json.null();
-    }
-    json.end_object();
-  }
-  json.end_object();
+  write_baseline(json, d);
+  write_simulation(json, d);
   json.key("findings").begin_array();
-  for (const Finding& finding : d.findings) {
-    json.begin_object();
-    json.field("effect", finding.effect);
-    json.key("parameters").begin_object();
-    for (const auto& [name, value] : finding.parameters) {
-      json.key(name).begin_object().field("value", value.value);
-      interval(json, value.low, value.high);
-      json.end_object();
-    }
-    for (const auto& [name, value] : finding.fixed) {
-      json.key(name).begin_object().field("value", value);
-      interval(json, value, value);
-      json.end_object();
-    }
-    json.end_object();
-    if (!finding.role.empty()) json.field("role", finding.role);
-    json.field("probability", finding.probability);
-    if (finding.stability) json.field("stability", *finding.stability);
-    json.key("aliases").begin_array();
-    for (const std::string& alias : finding.aliases) json.value(alias);
-    json.end_array();
-    json.key("separate_by");
-    finding.separate_by.empty() ? json.null() : json.value(finding.separate_by);
-    json.key("gain").begin_object();
-    for (const auto& [name, gain] : finding.gain) {
-      json.key(name).begin_object().field("before", gain.before).field("after", gain.after);
-      interval(json, gain.low, gain.high);
-      json.end_object();
-    }
-    json.end_object().end_object();
-  }
+  for (const Finding& finding : d.findings) write_finding(json, finding);
   json.end_array();
   write_unexplained(json, d.unexplained);
   json.field("scatter_base", d.scatter_from_replicates ? "replicates" : "prior");
   json.key("learned").begin_array();
   for (const LearnedFinding& each : d.learned) write_learned(json, each);
   json.end_array();
-  json.key("not_identifiable").begin_array();
-  for (const NotIdentifiable& each : d.not_identifiable) {
-    json.begin_object().field("effect", each.effect);
-    json.key("smallest_detectable").begin_object();
-    for (const auto& [name, value] : each.smallest_detectable) json.field(name, value);
-    json.end_object().field("reason", each.reason).end_object();
-  }
-  json.end_array();
-  json.key("held_out").begin_object();
-  for (const auto& [name, gain] : d.held_out) {
-    json.key(name).begin_object();
-    json.field("rmse_before", gain.before).field("rmse_after", gain.after);
-    interval(json, gain.low, gain.high);
-    json.end_object();
-  }
-  if (d.mu_max) {
-    json.key("mu_max").begin_object();
-    json.field("error_before", d.mu_max->before).field("error_after", d.mu_max->after);
-    interval(json, d.mu_max->low, d.mu_max->high);
-    json.end_object();
-  }
-  json.end_object();
-  json.key("reruns").begin_array();
-  for (const Rerun& each : d.reruns) {
-    json.begin_object().field("log", each.log).field("start_s", each.start_s);
-    for (const RerunFigure& figure : kRerunFigures) {
-      json.key(figure.key).begin_object();
-      for (const auto& [when, side] : {std::pair{"before", &each.before}, {"after", &each.after}}) {
-        json.key(when);
-        *side ? json.value((**side).*figure.value) : json.null();
-      }
-      json.end_object();
-    }
-    json.end_object();
-  }
-  json.end_array();
+  write_not_identifiable(json, d.not_identifiable);
+  write_held_out(json, d);
+  write_reruns(json, d.reruns);
   write_next(json, d.next_experiment);
-  json.key("machine").begin_object();
-  for (const auto& [name, value] : d.machine) {
-    json.key(name).begin_object().field("value", value.value);
-    interval(json, value.low, value.high);
-    json.end_object();
-  }
-  json.end_object();
-  json.key("notes").begin_array();
-  for (const std::string& note : d.notes) json.value(note);
-  json.end_array();
+  write_machine(json, d);
+  write_words(json, "notes", d.notes);
   json.end_object();
   return json.take() + "\n";
 }
