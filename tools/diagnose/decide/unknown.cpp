@@ -3,8 +3,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <functional>
+#include <numeric>
 #include <optional>
+#include <utility>
 
 #include "tools/diagnose/infer/index_variables.h"
 #include "tools/diagnose/infer/parallel.h"
@@ -61,151 +62,229 @@ bool scaled_variable(const Campaign& campaign, const IndexVariable& variable,
   return true;
 }
 
-}  // namespace
+// The index variables that vary, scaled: of each its values, run by run.
+struct VariedIndex {
+  std::vector<const IndexVariable*> variables;
+  std::vector<std::vector<ArrayXd>> values;
+};
 
-std::vector<UnknownGroup> score_groups(const Engine& engine) {
-  const Campaign& campaign = engine.campaign();
-  const std::vector<int> parameters = engine.with_nuisances(engine.accepted());
-  const auto n = static_cast<Index>(parameters.size());
-  std::vector<UnknownGroup> out;
-  std::vector<std::vector<ArrayXd>> index;
-  std::vector<const IndexVariable*> used;
+VariedIndex varied_index(const Campaign& campaign) {
+  VariedIndex out;
   for (const IndexVariable& variable : index_variables()) {
     if (variable.name == std::string_view("torque") && !campaign.torque_varies) continue;
     std::vector<ArrayXd> values;
-    if (scaled_variable(campaign, variable, values)) {
-      index.push_back(std::move(values));
-      used.push_back(&variable);
+    if (!scaled_variable(campaign, variable, values)) continue;
+    out.values.push_back(std::move(values));
+    out.variables.push_back(&variable);
+  }
+  return out;
+}
+
+// What a group changes along one of its polynomials p.
+QuantityChange injected(std::size_t injection, const ArrayXd& p, const Residuals& at) {
+  QuantityChange change;
+  if (injection == 0) change.ln_capacity = p * kUnit[0];
+  if (injection == 1) change.slip_share = p * kUnit[1];
+  if (injection == 2) {
+    change.torque = p * kUnit[2];
+    change.balance = p * kUnit[2];
+  }
+  if (injection == 3) {
+    change.torque = p * kUnit[3] * at.clean_reading_Nm;
+    change.balance = change.torque;
+  }
+  if (injection == 4) change.ln_capacity = p * kUnit[4] / at.there.force_N.max(50.0);
+  return change;
+}
+
+// Extra columns of a run: variable x injection x degree.
+std::vector<ResidualColumns> group_columns(const Campaign& campaign, const VariedIndex& index,
+                                           int run, const Residuals& at) {
+  std::vector<ResidualColumns> columns;
+  for (std::size_t v = 0; v < index.variables.size(); ++v) {
+    const ArrayXd& x = index.values[v][static_cast<std::size_t>(run)];
+    const std::array<ArrayXd, 3> legendre{x, 1.5 * x.square() - 0.5, 2.5 * x.cube() - 1.5 * x};
+    for (std::size_t injection = 0; injection < kActsOn.size(); ++injection) {
+      const bool counts = sensible(campaign, index.variables[v]->name, injection);
+      for (const ArrayXd& p : legendre) {
+        // A column all the same, its place is counted.
+        columns.push_back(counts ? propagate(campaign, at, injected(injection, p, at))
+                                 : ResidualColumns{});
+      }
     }
   }
-  if (used.empty()) return out;
-  // Extra columns: variable x injection x degree.
-  const ExtraColumns extra = [&](int run, const Residuals& at) {
-    std::vector<ResidualColumns> columns;
-    for (const auto& values : index) {
-      const ArrayXd& x = values[static_cast<std::size_t>(run)];
-      const std::array<ArrayXd, 3> legendre{x, 1.5 * x.square() - 0.5, 2.5 * x.cube() - 1.5 * x};
-      const std::string name = used[static_cast<std::size_t>(&values - index.data())]->name;
-      for (std::size_t injection = 0; injection < kActsOn.size(); ++injection) {
-        for (const ArrayXd& p : legendre) {
-          QuantityChange change;
-          if (!sensible(campaign, name,
-                        injection)) {  // a column all the same, its place is counted
-            columns.emplace_back();
-            continue;
-          }
-          if (injection == 0) change.ln_capacity = p * kUnit[0];
-          if (injection == 1) change.slip_share = p * kUnit[1];
-          if (injection == 2) {
-            change.torque = p * kUnit[2];
-            change.balance = p * kUnit[2];
-          }
-          if (injection == 3) {
-            change.torque = p * kUnit[3] * at.clean_reading_Nm;
-            change.balance = change.torque;
-          }
-          if (injection == 4) change.ln_capacity = p * kUnit[4] / at.there.force_N.max(50.0);
-          columns.push_back(propagate(campaign, at, change));
-        }
-      }
+  return columns;
+}
+
+// Root mean square of the fitted polynomial over all valid samples.
+double size_of(const Campaign& campaign, const std::vector<ArrayXd>& values,
+               const Eigen::Vector3d& step) {
+  double squares = 0.0, samples = 0.0;
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    const ExperimentData& run = campaign.runs[e];
+    for (int k = 0; k < run.size(); ++k) {
+      if (!run.valid[static_cast<std::size_t>(k)]) continue;
+      const double x = values[e][k];
+      const double y =
+          step[0] * x + step[1] * (1.5 * x * x - 0.5) + step[2] * (2.5 * x * x * x - 1.5 * x);
+      squares += y * y;
+      samples += 1.0;
     }
-    return columns;
+  }
+  return std::sqrt(squares / std::max(samples, 1.0));
+}
+
+// The three columns of a group beside the parameters: which of all columns, and their prior.
+struct GroupColumns {
+  std::vector<int> columns;
+  Prior prior;
+};
+
+class GroupScores {
+ public:
+  GroupScores(const Engine& engine, const VariedIndex& index);
+  // Nothing where the machine's constants could as well be it.
+  std::optional<UnknownGroup> score(std::size_t v, std::size_t injection);
+
+ private:
+  GroupColumns group(std::size_t v, std::size_t injection) const;
+  // What is known of the group's three by themselves, with the scatter between experiments counted
+  // or not.
+  MatrixXd information(const GroupColumns& group, const Fit& fit, bool is_scatter_counted) const;
+  // The share of a direction of the group that the machine's constants, whatever their usual
+  // values, could not as well be.
+  double own_share(const GroupColumns& group, const VectorXd& direction) const;
+  std::vector<double> accepted_chi2(const Fit& fit) const;
+
+  const Engine& engine_;
+  const VariedIndex& index_;
+  std::vector<int> parameters_;
+  Index n_;
+  std::vector<Summary> summaries_;
+  std::vector<int> base_;
+  Prior base_prior_;
+  Fit none_;
+  std::optional<double> none_left_out_;
+};
+
+GroupScores::GroupScores(const Engine& engine, const VariedIndex& index)
+    : engine_(engine),
+      index_(index),
+      parameters_(engine.with_nuisances(engine.accepted())),
+      n_(static_cast<Index>(parameters_.size())),
+      summaries_(engine.used().size()),
+      base_(parameters_.size()) {
+  const Campaign& campaign = engine.campaign();
+  const ExtraColumns extra = [&](int run, const Residuals& at) {
+    return group_columns(campaign, index, run, at);
   };
-  VectorXd scales(n);
-  for (Index j = 0; j < n; ++j) scales[j] = engine.scale(parameters[static_cast<std::size_t>(j)]);
-  std::vector<Summary> summaries(engine.used().size());
-  in_parallel(engine.jobs(), summaries.size(), [&](std::size_t i) {
-    summaries[i] = summarise(campaign, engine.used()[i], engine.state(), parameters, scales,
-                             engine.whitening(), extra);
+  VectorXd scales(n_);
+  for (Index j = 0; j < n_; ++j) scales[j] = engine.scale(parameters_[static_cast<std::size_t>(j)]);
+  in_parallel(engine.jobs(), summaries_.size(), [&](std::size_t i) {
+    summaries_[i] = summarise(campaign, engine.used()[i], engine.state(), parameters_, scales,
+                              engine.whitening(), extra);
   });
-  engine.add_curve_bounds(engine.state(), parameters, summaries);
-  std::vector<int> base(static_cast<std::size_t>(n));
-  for (std::size_t i = 0; i < base.size(); ++i) base[i] = static_cast<int>(i);
-  const Prior base_prior = engine.prior(parameters, engine.state());
-  const Fit none = fit_linear(summaries, base, base_prior, default_scatter(), 15);
-  std::optional<double> none_left_out;
-  for (std::size_t v = 0; v < used.size(); ++v) {
+  engine.add_curve_bounds(engine.state(), parameters_, summaries_);
+  std::iota(base_.begin(), base_.end(), 0);
+  base_prior_ = engine.prior(parameters_, engine.state());
+  none_ = fit_linear(summaries_, base_, base_prior_, default_scatter(), 15);
+}
+
+GroupColumns GroupScores::group(std::size_t v, std::size_t injection) const {
+  const int first = static_cast<int>(n_) + static_cast<int>(v * kPerVariable + injection * 3);
+  GroupColumns out{base_, base_prior_};
+  out.prior.pull.conservativeResize(n_ + 3);
+  out.prior.precision.conservativeResize(n_ + 3);
+  for (int i = 0; i < 3; ++i) {
+    out.columns.push_back(first + i);
+    out.prior.pull[n_ + i] = 0.0;
+    out.prior.precision[n_ + i] = 1.0 / 9.0;
+  }
+  return out;
+}
+
+MatrixXd GroupScores::information(const GroupColumns& group, const Fit& fit,
+                                  bool is_scatter_counted) const {
+  MatrixXd total = MatrixXd::Zero(n_ + 3, n_ + 3);
+  for (const Summary& each : summaries_) {
+    total += each.aa(group.columns, group.columns);
+    if (!is_scatter_counted) continue;
+    const MatrixXd ua = each.ua(Eigen::all, group.columns);
+    const MatrixXd inverse = (1.0 / fit.scatter.variance).matrix().asDiagonal();
+    total -= ua.transpose() * (each.uu + inverse).llt().solve(ua);
+  }
+  for (Index j = 0; j < n_; ++j) total(j, j) += base_prior_.precision[j];
+  const MatrixXd cross = total.topRightCorner(n_, 3);
+  return total.bottomRightCorner(3, 3) -
+         cross.transpose() * total.topLeftCorner(n_, n_).ldlt().solve(cross);
+}
+
+double GroupScores::own_share(const GroupColumns& group, const VectorXd& direction) const {
+  MatrixXd plain = MatrixXd::Zero(n_ + 3, n_ + 3);
+  for (const Summary& each : summaries_) plain += each.aa(group.columns, group.columns);
+  for (Index j = 0; j < n_; ++j) plain(j, j) += kAnyConstant;
+  const VectorXd mixed = plain.topRightCorner(n_, 3) * direction;
+  const double energy = direction.dot(plain.bottomRightCorner(3, 3) * direction);
+  return (energy - mixed.dot(plain.topLeftCorner(n_, n_).ldlt().solve(mixed))) / energy;
+}
+
+std::vector<double> GroupScores::accepted_chi2(const Fit& fit) const {
+  std::vector<double> out;
+  for (std::size_t i = 0; i < engine_.accepted().size(); ++i) {
+    const auto j = static_cast<Index>(engine_.active_nuisances().size() + i);
+    const int slot = engine_.accepted()[i];
+    const double size =
+        engine_.state().effects[slot] / engine_.scale(kNuisanceCount + slot) + fit.step[j];
+    out.push_back(size * size / std::max(fit.covariance(j, j), 1e-300));
+  }
+  return out;
+}
+
+std::optional<UnknownGroup> GroupScores::score(std::size_t v, std::size_t injection) {
+  const GroupColumns columns = group(v, injection);
+  const Fit fit = fit_linear(summaries_, columns.columns, columns.prior, none_.scatter, 8);
+  UnknownGroup out;
+  out.acts_on = kActsOn[injection];
+  out.depends_on = index_.variables[v]->name;
+  out.gain = 2.0 * (fit.log_likelihood - none_.log_likelihood);
+  out.share = none_.misfit > 0.0 ? (none_.misfit - fit.misfit) / none_.misfit : 0.0;
+  const VectorXd value = fit.step.tail(3);
+  const MatrixXd covariance = fit.covariance.bottomRightCorner(3, 3);
+  const double wald = value.dot(covariance.ldlt().solve(value));
+  const VectorXd direction = value / std::max(value.norm(), 1e-30);
+  const double own = own_share(columns, direction);
+  if (own < kOwnShareMin) return std::nullopt;
+  // What fits no better and only spares the machine's constants their way explains nothing.
+  if (out.share <= 0.0 || parts_experiments(none_.scatter, fit.scatter)) return std::nullopt;
+  // Its rest alone is seen; what they imitate is whatever fits best.
+  out.size = size_of(engine_.campaign(), index_.values[v], value) * kUnit[injection] /
+             kMatters[injection] * std::sqrt(std::min(own, 1.0));
+  // Each direction of the group by its own mix of evidence within and between experiments.
+  const MatrixXd with = information(columns, fit, true);
+  const MatrixXd without = information(columns, fit, false);
+  const double degrees =
+      engine_.degrees(direction.dot(with * direction), direction.dot(without * direction));
+  out.chi2 = chi2_of_f(wald / 3.0, 3.0, degrees);
+  out.accepted_chi2 = accepted_chi2(fit);
+  if (out.chi2 > kLooked && out.gain > kLooked && out.size > 1.0) {
+    if (!none_left_out_) none_left_out_ = left_out_density(summaries_, base_, base_prior_);
+    out.left_out_gain =
+        left_out_density(summaries_, columns.columns, columns.prior) - none_left_out_.value_or(0.0);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<UnknownGroup> score_groups(const Engine& engine) {
+  const VariedIndex index = varied_index(engine.campaign());
+  std::vector<UnknownGroup> out;
+  if (index.variables.empty()) return out;
+  GroupScores scores(engine, index);
+  for (std::size_t v = 0; v < index.variables.size(); ++v) {
     for (std::size_t injection = 0; injection < kActsOn.size(); ++injection) {
-      if (!sensible(campaign, used[v]->name, injection)) continue;
-      const int first = static_cast<int>(n) + static_cast<int>(v * kPerVariable + injection * 3);
-      std::vector<int> columns = base;
-      Prior prior = base_prior;
-      prior.pull.conservativeResize(n + 3);
-      prior.precision.conservativeResize(n + 3);
-      for (int i = 0; i < 3; ++i) {
-        columns.push_back(first + i);
-        prior.pull[n + i] = 0.0;
-        prior.precision[n + i] = 1.0 / 9.0;
-      }
-      const Fit fit = fit_linear(summaries, columns, prior, none.scatter, 8);
-      UnknownGroup group;
-      group.acts_on = kActsOn[injection];
-      group.depends_on = used[v]->name;
-      group.gain = 2.0 * (fit.log_likelihood - none.log_likelihood);
-      group.share = none.misfit > 0.0 ? (none.misfit - fit.misfit) / none.misfit : 0.0;
-      double squares = 0.0, samples = 0.0;
-      for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
-        const ExperimentData& run = campaign.runs[e];
-        for (int k = 0; k < run.size(); ++k) {
-          if (!run.valid[static_cast<std::size_t>(k)]) continue;
-          const double x = index[v][e][k];
-          const double y = fit.step[n] * x + fit.step[n + 1] * (1.5 * x * x - 0.5) +
-                           fit.step[n + 2] * (2.5 * x * x * x - 1.5 * x);
-          squares += y * y;
-          samples += 1.0;
-        }
-      }
-      group.size =
-          std::sqrt(squares / std::max(samples, 1.0)) * kUnit[injection] / kMatters[injection];
-      // Each direction of the group by its own mix of evidence within and between experiments.
-      const VectorXd value = fit.step.tail(3);
-      const MatrixXd covariance = fit.covariance.bottomRightCorner(3, 3);
-      const double wald = value.dot(covariance.ldlt().solve(value));
-      const VectorXd direction = value / std::max(value.norm(), 1e-30);
-      MatrixXd with = MatrixXd::Zero(3, 3), without = MatrixXd::Zero(3, 3);
-      for (const bool counted : {true, false}) {
-        MatrixXd total = MatrixXd::Zero(n + 3, n + 3);
-        for (const Summary& each : summaries) {
-          total += each.aa(columns, columns);
-          if (!counted) continue;
-          const MatrixXd ua = each.ua(Eigen::all, columns);
-          const MatrixXd inverse = (1.0 / fit.scatter.variance).matrix().asDiagonal();
-          total -= ua.transpose() * (each.uu + inverse).llt().solve(ua);
-        }
-        for (Index j = 0; j < n; ++j) total(j, j) += base_prior.precision[j];
-        const MatrixXd cross = total.topRightCorner(n, 3);
-        (counted ? with : without) =
-            total.bottomRightCorner(3, 3) -
-            cross.transpose() * total.topLeftCorner(n, n).ldlt().solve(cross);
-      }
-      // What the machine's constants could as well be, whatever their usual values, is no cause.
-      MatrixXd plain = MatrixXd::Zero(n + 3, n + 3);
-      for (const Summary& each : summaries) plain += each.aa(columns, columns);
-      for (Index j = 0; j < n; ++j) plain(j, j) += kAnyConstant;
-      const VectorXd mixed = plain.topRightCorner(n, 3) * direction;
-      const double energy = direction.dot(plain.bottomRightCorner(3, 3) * direction);
-      const double own = energy - mixed.dot(plain.topLeftCorner(n, n).ldlt().solve(mixed));
-      if (own < kOwnShareMin * energy) continue;
-      // What fits no better and only spares the machine's constants their way explains nothing.
-      if (group.share <= 0.0 || parts_experiments(none.scatter, fit.scatter)) continue;
-      // Its rest alone is seen; what they imitate is whatever fits best.
-      group.size *= std::sqrt(std::min(own / energy, 1.0));
-      const double degrees =
-          engine.degrees(direction.dot(with * direction), direction.dot(without * direction));
-      group.chi2 = chi2_of_f(wald / 3.0, 3.0, degrees);
-      for (std::size_t i = 0; i < engine.accepted().size(); ++i) {
-        const auto j = static_cast<Index>(engine.active_nuisances().size() + i);
-        const int slot = engine.accepted()[i];
-        const double size =
-            engine.state().effects[slot] / engine.scale(kNuisanceCount + slot) + fit.step[j];
-        group.accepted_chi2.push_back(size * size / std::max(fit.covariance(j, j), 1e-300));
-      }
-      if (group.chi2 > kLooked && group.gain > kLooked && group.size > 1.0) {
-        if (!none_left_out) none_left_out = left_out_density(summaries, base, base_prior);
-        group.left_out_gain =
-            left_out_density(summaries, columns, prior) - none_left_out.value_or(0.0);
-      }
-      out.push_back(group);
+      if (!sensible(engine.campaign(), index.variables[v]->name, injection)) continue;
+      if (auto group = scores.score(v, injection)) out.push_back(std::move(*group));
     }
   }
   std::sort(out.begin(), out.end(),
