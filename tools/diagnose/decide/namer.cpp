@@ -412,6 +412,77 @@ void drop_superfluous(Engine& engine, double threshold) {
   }
 }
 
+// From the linear estimate, and where that leaves the range of the linear, from the present.
+Hypothesis fitted(Engine& engine, const std::vector<Score>& scores, const Hypothesis& base,
+                  const std::vector<int>& candidate, bool afar) {
+  const auto score = std::find_if(scores.begin(), scores.end(), [&](const Score& each) {
+    return each.slot == candidate.back() && each.far;
+  });
+  Hypothesis h = engine.refine_from(
+      score != scores.end() ? *score->far : engine.add(candidate).state, candidate);
+  const auto or_better = [&](Hypothesis other) {
+    if (other.log_likelihood > h.log_likelihood) h = std::move(other);
+  };
+  if (h.log_likelihood < base.log_likelihood) or_better(engine.refine(candidate));
+  if (afar) or_better(engine.refine_from_afar(candidate));
+  if (id_of(engine, candidate.back()) == "friction_ratio") {
+    or_better(engine.refine_from(with_one_curve(engine), candidate));
+  }
+  return h;
+}
+
+// What the new one, the last, makes superfluous goes out.
+Hypothesis without_superfluous(Engine& engine, Hypothesis fit, double threshold) {
+  std::vector<int> left;
+  for (std::size_t j = 0; j < fit.slots.size(); ++j) {
+    if (fit.chi2[j] > threshold) left.push_back(fit.slots[j]);
+  }
+  const bool swaps = fit.chi2.back() > threshold && left.size() < fit.slots.size();
+  return swaps ? engine.refine_from(fit.state, left, kSettling) : fit;
+}
+
+// What is refined at this step. scattered: experiments differ by more than replicates do.
+std::vector<int> candidates_of(Engine& engine, const std::vector<Score>& scores,
+                               double in_curve_max, bool scattered,
+                               const std::vector<int>& not_confirmed) {
+  std::vector<int> candidates = shortlist(scores, kRefined, in_curve_max, not_confirmed);
+  // Whatever its derivative says.
+  for (const Score& score : scores) {
+    const auto is_here = [&](const std::vector<int>& slots) {
+      return std::find(slots.begin(), slots.end(), score.slot) != slots.end();
+    };
+    if (id_of(engine, score.slot) == "friction_ratio" && !is_here(candidates) &&
+        !is_here(not_confirmed)) {
+      candidates.push_back(score.slot);
+    }
+  }
+  if (scattered) {
+    const std::vector<int> usual =
+        shortlist(engine.screen_with_usual_scatter(), static_cast<int>(kFromAfar), in_curve_max,
+                  not_confirmed);
+    std::erase_if(candidates, [&](int slot) {
+      return std::find(usual.begin(), usual.end(), slot) != usual.end();
+    });
+    candidates.insert(candidates.begin(), usual.begin(), usual.end());
+  }
+  return candidates;
+}
+
+// Pairs of different effects by their gain on the present matrices, the largest first.
+std::vector<std::pair<double, std::vector<int>>> pairs_of(Engine& engine,
+                                                          const std::vector<int>& candidates) {
+  std::vector<std::pair<double, std::vector<int>>> pairs;
+  for (std::size_t a = 0; a < candidates.size(); ++a) {
+    for (std::size_t b = a + 1; b < candidates.size(); ++b) {
+      if (id_of(engine, candidates[a]) == id_of(engine, candidates[b])) continue;
+      const std::vector<int> pair{candidates[a], candidates[b]};
+      pairs.emplace_back(engine.add(pair).gain, pair);
+    }
+  }
+  std::sort(pairs.rbegin(), pairs.rend());
+  return pairs;
+}
+
 // Adds to the accepted effects as long as any is there. first_gain: the largest so far.
 void add_effects(Engine& engine, Naming& out, double& first_gain,
                  const std::function<bool()>& stop) {
@@ -432,23 +503,6 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
                                  [](const Score& score) { return score.gain > kFar; });
     Hypothesis best;
     bool found = false;
-    // From the linear estimate, and where that leaves the range of the linear, from the present.
-    const auto fitted = [&](const std::vector<int>& candidate, bool afar) {
-      const auto score = std::find_if(scores.begin(), scores.end(), [&](const Score& each) {
-        return each.slot == candidate.back() && each.far;
-      });
-      Hypothesis h = engine.refine_from(
-          score != scores.end() ? *score->far : engine.add(candidate).state, candidate);
-      const auto or_better = [&](Hypothesis other) {
-        if (other.log_likelihood > h.log_likelihood) h = std::move(other);
-      };
-      if (h.log_likelihood < base.log_likelihood) or_better(engine.refine(candidate));
-      if (afar) or_better(engine.refine_from_afar(candidate));
-      if (id_of(engine, candidate.back()) == "friction_ratio") {
-        or_better(engine.refine_from(with_one_curve(engine), candidate));
-      }
-      return h;
-    };
     const auto consider = [&](Hypothesis h) {
       const double gain = 2.0 * (h.log_likelihood - base.log_likelihood);
       for (const double chi2 : h.chi2) {
@@ -463,40 +517,18 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
       }
     };
     const double in_curve_max = possible ? kInCurveMax : 2.0;
-    std::vector<int> candidates = shortlist(scores, kRefined, in_curve_max, out.not_confirmed);
-    // Whatever its derivative says.
-    for (const Score& score : scores) {
-      const auto is_here = [&](const std::vector<int>& slots) {
-        return std::find(slots.begin(), slots.end(), score.slot) != slots.end();
-      };
-      if (id_of(engine, score.slot) == "friction_ratio" && !is_here(candidates) &&
-          !is_here(out.not_confirmed)) {
-        candidates.push_back(score.slot);
-      }
-    }
-    if (scattered) {
-      const std::vector<int> usual =
-          shortlist(engine.screen_with_usual_scatter(), static_cast<int>(kFromAfar), in_curve_max,
-                    out.not_confirmed);
-      std::erase_if(candidates, [&](int slot) {
-        return std::find(usual.begin(), usual.end(), slot) != usual.end();
-      });
-      candidates.insert(candidates.begin(), usual.begin(), usual.end());
-    }
+    const std::vector<int> candidates =
+        candidates_of(engine, scores, in_curve_max, scattered, out.not_confirmed);
     const auto consider_all = [&](bool from_afar) {
       std::vector<std::optional<Hypothesis>> fits(candidates.size());
       in_parallel(engine.jobs(), candidates.size(), [&](std::size_t i) {
-        if (!stop()) fits[i] = fitted(plus(set, candidates[i]), from_afar && i < kFromAfar);
+        if (!stop())
+          fits[i] =
+              fitted(engine, scores, base, plus(set, candidates[i]), from_afar && i < kFromAfar);
       });
       for (std::optional<Hypothesis>& fit : fits) {
         if (!fit) continue;
-        // What the new one makes superfluous goes out.
-        std::vector<int> left;
-        for (std::size_t j = 0; j < fit->slots.size(); ++j) {
-          if (fit->chi2[j] > out.threshold) left.push_back(fit->slots[j]);
-        }
-        const bool swaps = fit->chi2.back() > out.threshold && left.size() < fit->slots.size();
-        consider(swaps ? engine.refine_from(fit->state, left, kSettling) : std::move(*fit));
+        consider(without_superfluous(engine, std::move(*fit), out.threshold));
       }
     };
     consider_all(far);
@@ -510,19 +542,11 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
     best = engine.refine_from(best.state, best.slots, kSettling);
     // A pair whose sum a third effect imitates: all pairs, linear, on the present matrices.
     if (set.empty()) {
-      std::vector<std::pair<double, std::vector<int>>> pairs;
-      for (std::size_t a = 0; a < candidates.size(); ++a) {
-        for (std::size_t b = a + 1; b < candidates.size(); ++b) {
-          if (id_of(engine, candidates[a]) == id_of(engine, candidates[b])) continue;
-          const std::vector<int> pair{candidates[a], candidates[b]};
-          pairs.emplace_back(engine.add(pair).gain, pair);
-        }
-      }
-      std::sort(pairs.rbegin(), pairs.rend());
+      const auto pairs = pairs_of(engine, candidates);
       const double single = 2.0 * (best.log_likelihood - base.log_likelihood);
       for (std::size_t i = 0; i < pairs.size() && i < 3 && !stop(); ++i) {
         if (pairs[i].first < single + out.threshold + worth_beside(single)) break;
-        consider(fitted(pairs[i].second, false));
+        consider(fitted(engine, scores, base, pairs[i].second, false));
       }
     }
     const double gain = 2.0 * (best.log_likelihood - base.log_likelihood);
