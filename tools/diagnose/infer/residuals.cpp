@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "estimator/statistics/order.h"
 #include "tools/diagnose/infer/foot_points.h"
@@ -228,52 +229,63 @@ bool energy_acts(const Campaign& campaign, const ModelState& state) {
 }
 }  // namespace
 
-ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& state,
-                           const Residuals& at, int parameter) {
-  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
-  const int n = data.size();
-  QuantityChange change;
-  // A change of the belt's torque at one stop, by sample; zero where the stop is never used.
-  const auto per_stop = [&](int stop, auto&& f) -> ResidualColumns {
-    if (std::find(data.stop.begin(), data.stop.end(), stop) == data.stop.end()) return {};
-    ResidualColumns out;
-    ArrayXd& column = out[kFrictionResidual];
-    column = ArrayXd::Zero(n);
-    for (int k = 0; k < n; ++k) {
-      if (data.stop[static_cast<std::size_t>(k)] == stop && at.weight[k] > 0.0) {
-        column[k] = -f(k) * at.weight[k];
-      }
+namespace {
+
+// A change of the belt's torque at one stop, by sample; zero where the stop is never used.
+template <typename Change>
+ResidualColumns at_stop(const ExperimentData& data, const Residuals& at, int stop, Change change) {
+  if (std::find(data.stop.begin(), data.stop.end(), stop) == data.stop.end()) return {};
+  ResidualColumns out;
+  ArrayXd& column = out[kFrictionResidual];
+  column = ArrayXd::Zero(data.size());
+  for (int k = 0; k < data.size(); ++k) {
+    if (data.stop[static_cast<std::size_t>(k)] == stop && at.weight[k] > 0.0) {
+      column[k] = -change(k) * at.weight[k];
     }
-    return out;
-  };
-  switch (parameter) {
-    case kLnMuMax:
-      change.ln_capacity = ArrayXd::Ones(n);
-      return propagate(campaign, at, change);
-    case kLnPeakSlipOverdrive:
-    case kLnPeakSlipLow: {
-      const int stop = parameter == kLnPeakSlipLow ? kLowStop : kOverdriveStop;
-      const double peak = std::exp(state.nuisance[parameter]);
-      return per_stop(stop, [&](int k) { return -at.slope[k] * at.foot[k] * peak; });
-    }
-    default:
-      break;
   }
-  // A change of ln(r_g): slip and, through the torque out, balance.
-  const auto ratio_change = [&](const ArrayXd& ln_ratio) {
-    change.slip_share = (1.0 - at.measured.slip_share) * ln_ratio;
-    if (at.output_torque.size() > 0) {
-      change.balance = -at.measured.ratio * at.output_torque * ln_ratio;
-    }
-    return propagate(campaign, at, change);
-  };
-  const auto torque_change = [&](const ArrayXd& torque) {
-    change.torque = torque;
-    change.balance = torque;
-    return propagate(campaign, at, change);
-  };
-  // With slip energy at work, whatever moves the slip moves the friction: by differences, below.
-  switch (energy_acts(campaign, state) ? -1 : parameter) {
+  return out;
+}
+
+QuantityChange torque_change(const ArrayXd& torque) {
+  QuantityChange change;
+  change.torque = torque;
+  change.balance = torque;
+  return change;
+}
+
+QuantityChange balance_change(const ArrayXd& balance) {
+  QuantityChange change;
+  change.balance = balance;
+  return change;
+}
+
+// A change of ln(r_g): slip and, through the torque out, balance.
+QuantityChange ratio_change(const Residuals& at, const ArrayXd& ln_ratio) {
+  QuantityChange change;
+  change.slip_share = (1.0 - at.measured.slip_share) * ln_ratio;
+  if (at.output_torque.size() > 0) {
+    change.balance = -at.measured.ratio * at.output_torque * ln_ratio;
+  }
+  return change;
+}
+
+QuantityChange deformation_change(const ExperimentData& data, const Residuals& at) {
+  const Quantities& q = at.there;
+  const ArrayXd ln_ratio = -1e-3 * q.force_N / (1.0 - q.deformation).max(0.05);
+  QuantityChange change;
+  change.slip_share = (1.0 - q.slip_share) * ln_ratio;
+  if (q.balance.size() > 0) {
+    change.balance =
+        (q.balance - q.belt_torque - data.torque.slow + at.clean_reading_Nm) * ln_ratio;
+  }
+  return change;
+}
+
+// In closed form; nothing: there is none for this parameter.
+std::optional<QuantityChange> known_change(const ExperimentData& data, const Residuals& at,
+                                           int parameter) {
+  const int n = data.size();
+  switch (parameter) {
     case kLossConstant_Nm:
       return torque_change(ArrayXd::Constant(n, -1.0));
     case kLossPerSpeed_Nms:
@@ -285,39 +297,30 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
       const int stop = parameter == kLnRatioLow ? kLowStop : kOverdriveStop;
       ArrayXd here(n);
       for (int k = 0; k < n; ++k) here[k] = data.stop[static_cast<std::size_t>(k)] == stop;
-      return ratio_change(here);
+      return ratio_change(at, here);
     }
-    case kDeformationPerkN: {
-      const Quantities& q = at.there;
-      const ArrayXd ln_ratio = -1e-3 * q.force_N / (1.0 - q.deformation).max(0.05);
-      change.slip_share = (1.0 - q.slip_share) * ln_ratio;
-      if (q.balance.size() > 0) {
-        change.balance =
-            (q.balance - q.belt_torque - data.torque.slow + at.clean_reading_Nm) * ln_ratio;
-      }
-      return propagate(campaign, at, change);
-    }
-    case kCommandOffset_Pa:
+    case kDeformationPerkN:
+      return deformation_change(data, at);
+    case kCommandOffset_Pa: {
+      QuantityChange change;
       change.tracking = ArrayXd::Constant(n, -1.0);
-      return propagate(campaign, at, change);
+      return change;
+    }
     case kSecondaryInertia_kgm2:
-      change.balance = -at.measured.ratio * at.measured.slope_s;
-      return propagate(campaign, at, change);
+      return balance_change(-at.measured.ratio * at.measured.slope_s);
     case kSecondaryLoss_Nm:
-      change.balance = -at.measured.ratio;
-      return propagate(campaign, at, change);
+      return balance_change(-at.measured.ratio);
     case kSecondaryLossPerSpeed_Nms:
-      change.balance = -at.measured.ratio * at.measured.omega_s;
-      return propagate(campaign, at, change);
+      return balance_change(-at.measured.ratio * at.measured.omega_s);
     default:
-      break;
+      return std::nullopt;
   }
-  if (first_knot(parameter) >= 0) {
-    ResidualColumns out;
-    out[kFrictionResidual] = mode_column(at, parameter, 1.0, &CurveSample::k, n);
-    return out;
-  }
-  // The rest by central differences of the quantities.
+}
+
+// By central differences of the quantities.
+QuantityChange difference(const Campaign& campaign, int run, const ModelState& state,
+                          const Residuals& at, int parameter) {
+  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   const bool slot = parameter >= kNuisanceCount;
   const int index = slot ? parameter - kNuisanceCount : parameter;
   const double step = slot ? campaign.slots[static_cast<std::size_t>(index)].step()
@@ -330,6 +333,7 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
   value -= 2.0 * step;
   const Quantities below = quantities(campaign, data, clean, run, moved);
   const double scale = 0.5 / step;
+  QuantityChange change;
   change.slip_share = (above.slip_share - below.slip_share) * scale;
   change.torque = (above.belt_torque - below.belt_torque) * scale;
   change.ln_capacity = (above.capacity / below.capacity).log() * scale;
@@ -341,7 +345,7 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
     const double d_fall = (above.fall[s] - below.fall[s]) * scale;
     if (d_ln_peak == 0.0 && d_fall == 0.0) continue;
     const double peak = std::exp(above.ln_peak_slip[s]);
-    for (int k = 0; k < n; ++k) {
+    for (int k = 0; k < data.size(); ++k) {
       if (data.stop[static_cast<std::size_t>(k)] == stop && at.weight[k] > 0.0) {
         change.torque[k] += at.slope[k] * at.foot[k] * peak * d_ln_peak -
                             at.measured.capacity[k] * fall_function(std::abs(at.foot[k])) *
@@ -349,7 +353,38 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
       }
     }
   }
-  return propagate(campaign, at, change);
+  return change;
+}
+
+}  // namespace
+
+ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& state,
+                           const Residuals& at, int parameter) {
+  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+  const int n = data.size();
+  if (parameter == kLnMuMax) {
+    QuantityChange change;
+    change.ln_capacity = ArrayXd::Ones(n);
+    return propagate(campaign, at, change);
+  }
+  if (parameter == kLnPeakSlipOverdrive || parameter == kLnPeakSlipLow) {
+    const int stop = parameter == kLnPeakSlipLow ? kLowStop : kOverdriveStop;
+    const double peak = std::exp(state.nuisance[parameter]);
+    return at_stop(data, at, stop, [&](int k) { return -at.slope[k] * at.foot[k] * peak; });
+  }
+  // With slip energy at work, whatever moves the slip moves the friction: by differences, below.
+  if (!energy_acts(campaign, state)) {
+    if (const auto change = known_change(data, at, parameter)) {
+      return propagate(campaign, at, *change);
+    }
+  }
+  // The form in overdrive is that of both end stops; the other is what the low one differs by.
+  if (first_knot(parameter) >= 0) {
+    ResidualColumns out;
+    out[kFrictionResidual] = mode_column(at, parameter, 1.0, &CurveSample::k, n);
+    return out;
+  }
+  return propagate(campaign, at, difference(campaign, run, state, at, parameter));
 }
 
 ArrayXd mode_rows(const ExperimentData& data, const Residuals& at, int parameter, double scale) {
