@@ -520,34 +520,66 @@ Information information_on(const std::vector<Summary>& summaries, const std::vec
   return {perpendicular(true), perpendicular(false)};
 }
 
-Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>& raw,
-                        const Prior& prior, const Whitening& before, int jobs) {
-  const auto runs = campaign.runs.size();
-  std::vector<Summary> summaries(runs);
-  in_parallel(jobs, runs, [&](std::size_t e) {
-    summaries[e] = summary_of(campaign, static_cast<int>(e), raw[e], before);
-  });
-  std::vector<int> all(static_cast<std::size_t>(prior.pull.size()));
-  for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
-  const Fit fit = fit_linear(summaries, all, prior, default_scatter(), 4);
-  VectorXd full(fit.step.size() + 1);
-  full << fit.step, 1.0;
-  const MatrixXd inverse = (1.0 / fit.scatter.variance).matrix().asDiagonal();
+namespace {
 
-  // What is left over, unwhitened and unweighted, in the grid's order.
-  Whitening out = identity_whitening(campaign);
+// What is left over, unwhitened and unweighted, in the grid's order: kind by kind, run by run; and
+// its covariance by lag, added up over the runs.
+struct LeftOver {
+  explicit LeftOver(std::size_t runs) {
+    for (std::size_t q = 0; q < kResidualKinds; ++q) {
+      rest[q].resize(runs);
+      covariance[q].assign(Whitening::kOrder + 1, 0.0);
+      count[q].assign(Whitening::kOrder + 1, 0.0);
+    }
+  }
+  void add(const ExperimentData& data, std::size_t e, std::size_t q, const VectorXd& block);
+
   std::array<std::vector<std::vector<double>>, kResidualKinds> rest;
   std::array<std::vector<double>, kResidualKinds> covariance;
   std::array<std::vector<double>, kResidualKinds> count;
-  for (int kind = 0; kind < kResidualKinds; ++kind) {
-    const auto q = static_cast<std::size_t>(kind);
-    rest[q].resize(runs);
-    covariance[q].assign(Whitening::kOrder + 1, 0.0);
-    count[q].assign(Whitening::kOrder + 1, 0.0);
+};
+
+// Clipped: a few outliers must not make the noise look white.
+double clip_bound(const std::vector<double>& values) {
+  std::vector<double> size;
+  for (const double v : values) {
+    if (v != 0.0) size.push_back(std::abs(v));
   }
+  return (size.empty() ? 0.0 : 4.0 * estimator::kSigmaPerMedian * estimator::median(size)) + 1e-12;
+}
+
+void LeftOver::add(const ExperimentData& data, std::size_t e, std::size_t q,
+                   const VectorXd& block) {
+  rest[q][e].assign(block.data(), block.data() + block.size());
+  const double bound = clip_bound(rest[q][e]);
+  Index row = 0;
+  std::vector<Index> row_of(static_cast<std::size_t>(data.size()), -1);
+  for (int k = 0; k < data.size(); ++k) {
+    if (data.valid[static_cast<std::size_t>(k)]) row_of[static_cast<std::size_t>(k)] = row++;
+  }
+  for (int k = 0; k < data.size(); ++k) {
+    const Index a = row_of[static_cast<std::size_t>(k)];
+    if (a < 0) continue;
+    for (int lag = 0; lag <= Whitening::kOrder && k - lag >= 0; ++lag) {
+      const Index b = row_of[static_cast<std::size_t>(k - lag)];
+      if (b < 0) break;
+      covariance[q][static_cast<std::size_t>(lag)] +=
+          std::clamp(block[a], -bound, bound) * std::clamp(block[b], -bound, bound);
+      // A sample that this residual does not use is exactly zero.
+      if (block[a] != 0.0) count[q][static_cast<std::size_t>(lag)] += 1.0;
+    }
+  }
+}
+
+LeftOver left_over(const Campaign& campaign, const std::vector<RawColumns>& raw,
+                   const std::vector<Summary>& summaries, const Fit& fit) {
+  VectorXd full(fit.step.size() + 1);
+  full << fit.step, 1.0;
+  const MatrixXd inverse = (1.0 / fit.scatter.variance).matrix().asDiagonal();
+  LeftOver out(campaign.runs.size());
   const std::vector<int> kinds = kinds_of(campaign);
-  const Whitening plain = out;
-  for (std::size_t e = 0; e < runs; ++e) {
+  const Whitening plain = identity_whitening(campaign);
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
     const ExperimentData& data = campaign.runs[e];
     if (data.valid_count == 0) continue;
     const std::vector<WhiteBlock> blocks = whitened(campaign, static_cast<int>(e), raw[e], plain);
@@ -555,52 +587,36 @@ Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>&
     VectorXd weights(full.size() + u.size());
     weights << full, u;
     for (std::size_t i = 0; i < kinds.size(); ++i) {
-      const auto q = static_cast<std::size_t>(kinds[i]);
       VectorXd block = VectorXd::Zero(blocks[i].rows.rows());
       if (!blocks[i].columns.empty()) block = blocks[i].rows * weights(blocks[i].columns);
-      rest[q][e].assign(block.data(), block.data() + block.size());
-      // Clipped: a few outliers must not make the noise look white.
-      std::vector<double> size;
-      for (const double v : rest[q][e]) {
-        if (v != 0.0) size.push_back(std::abs(v));
-      }
-      const double bound =
-          (size.empty() ? 0.0 : 4.0 * estimator::kSigmaPerMedian * estimator::median(size)) + 1e-12;
-      Index row = 0;
-      std::vector<Index> row_of(static_cast<std::size_t>(data.size()), -1);
-      for (int k = 0; k < data.size(); ++k) {
-        if (data.valid[static_cast<std::size_t>(k)]) row_of[static_cast<std::size_t>(k)] = row++;
-      }
-      for (int k = 0; k < data.size(); ++k) {
-        const Index a = row_of[static_cast<std::size_t>(k)];
-        if (a < 0) continue;
-        for (int lag = 0; lag <= Whitening::kOrder && k - lag >= 0; ++lag) {
-          const Index b = row_of[static_cast<std::size_t>(k - lag)];
-          if (b < 0) break;
-          covariance[q][static_cast<std::size_t>(lag)] +=
-              std::clamp(block[a], -bound, bound) * std::clamp(block[b], -bound, bound);
-          // A sample that this residual does not use is exactly zero.
-          if (block[a] != 0.0) count[q][static_cast<std::size_t>(lag)] += 1.0;
-        }
-      }
+      out.add(data, e, static_cast<std::size_t>(kinds[i]), block);
     }
   }
-  for (const int kind : kinds) {
+  return out;
+}
+
+void set_filters(const Campaign& campaign, const LeftOver& left, Whitening& out) {
+  for (const int kind : kinds_of(campaign)) {
     const auto q = static_cast<std::size_t>(kind);
-    for (std::size_t lag = 0; lag < covariance[q].size(); ++lag) {
-      covariance[q][lag] /= std::max(count[q][0], 1.0);  // biased: keeps the filter stable
-    }
-    out.filter[q] = levinson(covariance[q]);
+    std::vector<double> covariance = left.covariance[q];
+    // Biased: keeps the filter stable.
+    for (double& each : covariance) each /= std::max(left.count[q][0], 1.0);
+    out.filter[q] = levinson(covariance);
   }
+}
+
+// Large residuals weigh less; and how friction's and balance's go together.
+void set_weights(const Campaign& campaign, const LeftOver& left, Whitening& out) {
+  const std::vector<int> kinds = kinds_of(campaign);
   double cross = 0.0, power_friction = 0.0, power_balance = 0.0;
-  for (std::size_t e = 0; e < runs; ++e) {
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
     const ExperimentData& data = campaign.runs[e];
-    if (rest[kFrictionResidual][e].empty()) continue;
+    if (left.rest[kFrictionResidual][e].empty()) continue;
     std::array<VectorXd, kResidualKinds> white;
     for (const int kind : kinds) {
       const auto q = static_cast<std::size_t>(kind);
       white[q].resize(data.valid_count);
-      whiten(data, out.filter[q], ArrayXd::Map(rest[q][e].data(), data.valid_count),
+      whiten(data, out.filter[q], ArrayXd::Map(left.rest[q][e].data(), data.valid_count),
              ArrayXd::Ones(data.valid_count), white[q].data());
       for (Index i = 0; i < white[q].size(); ++i) {
         const double size = std::abs(white[q][i]);
@@ -618,6 +634,24 @@ Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>&
   if (power_friction > 0.0 && power_balance > 0.0) {
     out.cross = std::clamp(cross / std::sqrt(power_friction * power_balance), -0.95, 0.95);
   }
+}
+
+}  // namespace
+
+Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>& raw,
+                        const Prior& prior, const Whitening& before, int jobs) {
+  const auto runs = campaign.runs.size();
+  std::vector<Summary> summaries(runs);
+  in_parallel(jobs, runs, [&](std::size_t e) {
+    summaries[e] = summary_of(campaign, static_cast<int>(e), raw[e], before);
+  });
+  std::vector<int> all(static_cast<std::size_t>(prior.pull.size()));
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
+  const Fit fit = fit_linear(summaries, all, prior, default_scatter(), 4);
+  const LeftOver left = left_over(campaign, raw, summaries, fit);
+  Whitening out = identity_whitening(campaign);
+  set_filters(campaign, left, out);
+  set_weights(campaign, left, out);
   for (std::size_t e = 0; e < runs; ++e) {
     RawColumns random;
     random.columns.assign(raw[e].columns.end() - kRandomEffects, raw[e].columns.end());

@@ -378,7 +378,6 @@ ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& 
       return propagate(campaign, at, *change);
     }
   }
-  // The form in overdrive is that of both end stops; the other is what the low one differs by.
   if (first_knot(parameter) >= 0) {
     ResidualColumns out;
     out[kFrictionResidual] = mode_column(at, parameter, 1.0, &CurveSample::k, n);
