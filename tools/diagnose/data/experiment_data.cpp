@@ -466,22 +466,11 @@ void add_belt_lines(const SignalTable& table, const estimator::VariatorParameter
   data.belt_Hz = omega_p * radius_m / kBeltLength_m;
 }
 
-}  // namespace
+Role torque_role(const ExperimentData& data) {
+  return data.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque;
+}
 
-ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator,
-                       Reaches reached) {
-  widen(reached, table);
-  ExperimentData data;
-  data.name = table.name;
-  data.notes = table.notes;
-  const Channel& speed = table[Role::kPrimarySpeed];
-  if (speed.t_s.size() < 10) {
-    data.notes.push_back(table.name + ": no primary_speed");
-    return data;
-  }
-  const double start_s = speed.t_s.front();
-  data.dt_s = std::max(kGrid_s, median_period_s(speed));
-  const int n = static_cast<int>((speed.t_s.back() - start_s) / data.dt_s) + 1;
+void put_on_grid(const SignalTable& table, double start_s, int n, ExperimentData& data) {
   const auto on_grid = [&](Role role) {
     GridSignal out = to_grid(table[role], start_s, n, data.dt_s);
     add_slow(out, data.dt_s);
@@ -492,20 +481,24 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
   data.omega_s = on_grid(Role::kSecondarySpeed);
   data.pressure = on_grid(Role::kSecondaryPressure);
   data.torque_is_engine = table[Role::kPrimaryTorque].empty();
-  data.torque = on_grid(data.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque);
+  data.torque = on_grid(torque_role(data));
   data.torque_s = on_grid(Role::kSecondaryTorque);
   data.pressure_p = on_grid(Role::kPrimaryPressure);
   data.command = on_grid(Role::kSecondaryPressureCommand);
   data.temperature = on_grid(Role::kOilTemperature);
+}
 
-  data.rounding_slip_share =
-      std::hypot(held_rounding_share(speed), held_rounding_share(table[Role::kSecondarySpeed]));
+void add_roundings(const SignalTable& table, ExperimentData& data) {
+  data.rounding_slip_share = std::hypot(held_rounding_share(table[Role::kPrimarySpeed]),
+                                        held_rounding_share(table[Role::kSecondarySpeed]));
   data.rounding_pressure_Pa = held_rounding(table[Role::kSecondaryPressure]);
-  data.rounding_torque_Nm =
-      held_rounding(table[data.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque]);
+  data.rounding_torque_Nm = held_rounding(table[torque_role(data)]);
   data.rounding_torque_s_Nm = held_rounding(table[Role::kSecondaryTorque]);
+}
 
-  data.line_p = order_line(speed);
+void add_lines(const SignalTable& table, const estimator::VariatorParameters& variator,
+               ExperimentData& data) {
+  data.line_p = order_line(table[Role::kPrimarySpeed]);
   data.line_s = order_line(table[Role::kSecondarySpeed]);
   for (const auto& [line, name] :
        {std::pair{&data.line_p, "primary_speed"}, {&data.line_s, "secondary_speed"}}) {
@@ -514,10 +507,13 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
                          " folds back to about 0 Hz; not judged there");
   }
   add_belt_lines(table, variator, data);
-  data.torque_spectrum =
-      pooled_spectrum(table[data.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque]);
+  data.torque_spectrum = pooled_spectrum(table[torque_role(data)]);
   data.torque_s_spectrum = pooled_spectrum(table[Role::kSecondaryTorque]);
+}
 
+// Samples at which the pressure or a torque rests on its bound.
+std::vector<bool> saturated_anywhere(const SignalTable& table, const Reaches& reached,
+                                     double start_s, int n, ExperimentData& data) {
   const auto saturated_on = [&](Role role) {
     return saturated_samples(table[role], reached[static_cast<std::size_t>(role)], start_s, n,
                              data.dt_s);
@@ -535,11 +531,22 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
     std::transform(saturated.begin(), saturated.end(), too.begin(), saturated.begin(),
                    std::logical_or<>());
   }
+  return saturated;
+}
+
+struct SampleFlags {
+  std::vector<bool> too_fast;   // the clamp moves too fast to be judged
+  std::vector<bool> runs_away;  // would be valid, but the belt does not grip
+};
+// End stop and validity of each sample.
+SampleFlags judge_samples(const estimator::VariatorParameters& variator,
+                          const std::vector<bool>& saturated, ExperimentData& data) {
+  const int n = data.size();
   data.stop.assign(static_cast<std::size_t>(n), kNoStop);
   data.valid.assign(static_cast<std::size_t>(n), false);
   data.slip_spread_share2 = ArrayXd::Zero(n);
-  std::vector<bool> too_fast(static_cast<std::size_t>(n), false);
-  std::vector<bool> runs_away(static_cast<std::size_t>(n), false);
+  SampleFlags out{std::vector<bool>(static_cast<std::size_t>(n), false),
+                  std::vector<bool>(static_cast<std::size_t>(n), false)};
   const auto usable = [](const GridSignal& signal, int k) {
     return !signal.present || std::isfinite(signal.value[k]);
   };
@@ -566,15 +573,39 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
                     usable(data.pressure, k) && usable(data.torque, k) &&
                     usable(data.torque_s, k) && usable(data.command, k) &&
                     usable(data.temperature, k) && usable(data.pressure_p, k) && !saturated[i];
-    runs_away[i] = data.valid[i] && !grips;
+    out.runs_away[i] = data.valid[i] && !grips;
     data.valid[i] = data.valid[i] && grips;
-    too_fast[i] = !(std::abs(step_N) < kForceStepMax * force_N);
+    out.too_fast[i] = !(std::abs(step_N) < kForceStepMax * force_N);
   }
   keep_until_it_steps(
       variator.secondary_piston_area_m2 * data.pressure.value + variator.secondary_spring_force_N,
-      data.dt_s, too_fast);
-  trim(runs_away, data);
-  mask_and_segment(too_fast, data);
+      data.dt_s, out.too_fast);
+  return out;
+}
+
+}  // namespace
+
+ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator,
+                       Reaches reached) {
+  widen(reached, table);
+  ExperimentData data;
+  data.name = table.name;
+  data.notes = table.notes;
+  const Channel& speed = table[Role::kPrimarySpeed];
+  if (speed.t_s.size() < 10) {
+    data.notes.push_back(table.name + ": no primary_speed");
+    return data;
+  }
+  const double start_s = speed.t_s.front();
+  data.dt_s = std::max(kGrid_s, median_period_s(speed));
+  const int n = static_cast<int>((speed.t_s.back() - start_s) / data.dt_s) + 1;
+  put_on_grid(table, start_s, n, data);
+  add_roundings(table, data);
+  add_lines(table, variator, data);
+  const std::vector<bool> saturated = saturated_anywhere(table, reached, start_s, n, data);
+  const SampleFlags flags = judge_samples(variator, saturated, data);
+  trim(flags.runs_away, data);
+  mask_and_segment(flags.too_fast, data);
   widen_slow(data.pressure, data.dt_s);
   if (data.saturated_pressure) {
     data.notes.push_back(table.name + ": secondary_pressure rests on its bound; left out there");
