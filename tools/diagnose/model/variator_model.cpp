@@ -190,6 +190,41 @@ namespace {
 bool is_zero(const ArrayXd& values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return v == 0.0; });
 }
+
+// Ratio without load, and capacity per clamp force but for what changes the friction.
+struct Unloaded {
+  ArrayXd ratio, lever_m;
+};
+
+Unloaded unloaded_of(const ExperimentData& run, const estimator::VariatorParameters& variator,
+                     const Eigen::VectorXd& nuisance) {
+  const int n = run.size();
+  Unloaded out{ArrayXd(n), ArrayXd(n)};
+  const double ratio_low = variator.ratio_low * std::exp(nuisance[kLnRatioLow]);
+  const double ratio_overdrive = variator.ratio_overdrive * std::exp(nuisance[kLnRatioOverdrive]);
+  const double gain = 2.0 / std::cos(variator.half_wedge_angle_rad) * std::exp(nuisance[kLnMuMax]);
+  const double lever_low_m = gain * variator.primary_radius_low_m;
+  const double lever_overdrive_m = gain * variator.primary_radius_overdrive_m;
+  for (int k = 0; k < n; ++k) {
+    const bool low = run.stop[static_cast<std::size_t>(k)] == kLowStop;
+    out.ratio[k] = low ? ratio_low : ratio_overdrive;
+    out.lever_m[k] = low ? lever_low_m : lever_overdrive_m;
+  }
+  return out;
+}
+
+// From the slow copies of all channels, the inertia's share of the engine's torque among them: by
+// the fast slope it would stand against a torque that no longer has what is fast, and what stands
+// behind the belt would be fitted to the noise of the speed's slope.
+ArrayXd balance_of(const ExperimentData& run, const Readings& read, const Context& c,
+                   const ArrayXd& ratio, double inertia_kg_m2) {
+  ArrayXd out = c.belt_torque + run.torque.slow - read.torque_Nm -
+                ratio * (run.torque_s.slow + inertia_kg_m2 * c.slope_s + c.secondary_loss_Nm);
+  if (run.torque_is_engine) {
+    out += c.variator.primary_inertia_kg_m2 * (run.omega_p.slope - run.omega_p.slow_slope);
+  }
+  return out;
+}
 }  // namespace
 
 Quantities evaluate(const ExperimentData& run, int experiment,
@@ -247,18 +282,7 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
   apply(Stage::kDriveline);
   c.belt_torque = c.torque - c.loss_Nm;
   c.deformation = nuisance[kDeformationPerkN] * 1e-3 * c.force_N;
-  // Ratio without load, and capacity per clamp force but for what changes the friction.
-  ArrayXd ratio(n), lever_m(n);
-  const double ratio_low = variator.ratio_low * std::exp(nuisance[kLnRatioLow]);
-  const double ratio_overdrive = variator.ratio_overdrive * std::exp(nuisance[kLnRatioOverdrive]);
-  const double gain = 2.0 / std::cos(variator.half_wedge_angle_rad) * std::exp(nuisance[kLnMuMax]);
-  const double lever_low_m = gain * variator.primary_radius_low_m;
-  const double lever_overdrive_m = gain * variator.primary_radius_overdrive_m;
-  for (int k = 0; k < n; ++k) {
-    const bool low = run.stop[static_cast<std::size_t>(k)] == kLowStop;
-    ratio[k] = low ? ratio_low : ratio_overdrive;
-    lever_m[k] = low ? lever_low_m : lever_overdrive_m;
-  }
+  auto [ratio, lever_m] = unloaded_of(run, variator, nuisance);
   apply(Stage::kRatio);
   ratio *= (1.0 - c.deformation).max(0.05);
   if (!is_zero(c.ln_ratio)) ratio *= c.ln_ratio.exp();  // hardly ever there, and slow
@@ -276,18 +300,10 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
   q.capacity = lever_m * (read_N * (1.0 + (c.force_N - read_N) / calm_N.max(50.0))).max(50.0);
   if (!is_zero(c.ln_friction)) q.capacity *= c.ln_friction.exp();
   if (run.torque_s.present) {
-    // From the slow copies of all channels, the inertia's share of the engine's torque among them:
-    // by the fast slope it would stand against a torque that no longer has what is fast, and what
-    // stands behind the belt would be fitted to the noise of the speed's slope.
     c.secondary_loss_Nm =
         nuisance[kSecondaryLoss_Nm] + nuisance[kSecondaryLossPerSpeed_Nms] * c.omega_s;
     apply(Stage::kSecondaryShaft);
-    q.balance = c.belt_torque + run.torque.slow - read.torque_Nm -
-                ratio * (run.torque_s.slow + nuisance[kSecondaryInertia_kgm2] * c.slope_s +
-                         c.secondary_loss_Nm);
-    if (run.torque_is_engine) {
-      q.balance += variator.primary_inertia_kg_m2 * (run.omega_p.slope - run.omega_p.slow_slope);
-    }
+    q.balance = balance_of(run, read, c, ratio, nuisance[kSecondaryInertia_kgm2]);
     q.secondary_loss_Nm = std::move(c.secondary_loss_Nm);
   }
   if (run.command.present) {
