@@ -102,6 +102,8 @@ void StopDetector::reset(double traction_per_Nm_N, double inertia_kg_m2) noexcep
   level_slip_percent_ = level_until_s_ = 0.0;
 }
 
+// In one piece: in seven functions it took 206 instructions a sample more, of the 15,000 that
+// tests/instructions allows.
 StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
                                              std::size_t window) const noexcept {
   Slope out;
