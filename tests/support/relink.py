@@ -24,9 +24,16 @@ class Relink:
                               text=True, cwd=self.build)
         return done.stderr if done.returncode else ""
 
-    def link(self, program, out, objects):
+    def room_of(self, test):
+        """The program that build/tests/TEST is: that of its room, which goes by the name it has when
+        it is called, or one of its own."""
+        path = self.build / "tests" / test
+        return os.readlink(path) if path.is_symlink() else test
+
+    def link(self, test, out, objects):
         """What an object defines is not taken from the libraries behind it."""
-        lines = subprocess.run(["ninja", "-C", self.build, "-t", "commands", program], check=True,
+        target = self.room_of(test)
+        lines = subprocess.run(["ninja", "-C", self.build, "-t", "commands", target], check=True,
                                capture_output=True, text=True).stdout.splitlines()
         words = shlex.split(lines[-1])[2:-2]
         at = words.index("-o")

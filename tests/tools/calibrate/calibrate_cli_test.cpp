@@ -15,9 +15,9 @@
 namespace beltgrip::test {
 namespace {
 
-class Calibrate : public testing::Test {
+class CalibrateCommand : public testing::Test {
  protected:
-  Calibrate() {
+  CalibrateCommand() {
     place.write("drive.dbc", kDriveDbc);
     place.write("beltgrip.toml", kDriveToml);
   }
@@ -31,7 +31,7 @@ class Calibrate : public testing::Test {
 
 // The shipped traffic, with kick-downs: a ratio that moves quickly passes for no inertia. And with
 // brakes, pressed while the torque still falls: a load that comes as fast as the torque goes.
-TEST_F(Calibrate, TheShippedCityDriveTellsInertiaAndDelay) {
+TEST_F(CalibrateCommand, TheShippedCityDriveTellsInertiaAndDelay) {
   for (const auto& [seed, lag_s] : {std::pair{"11", "0.06"}, {"21", "0.15"}, {"31", "0.15"}}) {
     SCOPED_TRACE(std::string(seed) + " " + lag_s);
     const std::string at = place.path(seed) + "/";
@@ -59,7 +59,7 @@ TEST_F(Calibrate, TheShippedCityDriveTellsInertiaAndDelay) {
   }
 }
 
-TEST_F(Calibrate, WritesKeysThatAreTaken) {
+TEST_F(CalibrateCommand, WritesKeysThatAreTaken) {
   DriveTruth truth;
   truth.ratio_overdrive = 2.262;
   place.write("drive.log", drive_log(drive(truth, {}, 3)));
@@ -105,7 +105,7 @@ TEST_F(Calibrate, WritesKeysThatAreTaken) {
 }
 
 // As it stands, after the configuration; in the user's units; with what he stated beside it.
-TEST_F(Calibrate, WritesAFileToInclude) {
+TEST_F(CalibrateCommand, WritesAFileToInclude) {
   place.write("drive.log", drive_log(drive({}, {}, 3)));
   std::string config = kDriveToml;
   const auto change = [&](const std::string& what, const std::string& by) {
@@ -134,7 +134,7 @@ TEST_F(Calibrate, WritesAFileToInclude) {
 
 // The same drive as a table: the lines name what the table's reader takes, and where the columns
 // are called like message and signal, whoever reads frames as well.
-TEST_F(Calibrate, WritesForATableWhatItsReaderTakes) {
+TEST_F(CalibrateCommand, WritesForATableWhatItsReaderTakes) {
   place.write("drive.log", drive_log(drive({}, {}, 3)));
   const std::string table = place.path("table.csv");
   ASSERT_EQ(beltgrip({"dbc", "decode", place.path("drive.log"), "--dbc", place.path("drive.dbc"),
@@ -163,7 +163,7 @@ TEST_F(Calibrate, WritesForATableWhatItsReaderTakes) {
 }
 
 // From quick engines to slow ones, through a log: the steps are found, and what they say is true.
-TEST_F(Calibrate, FindsInertiaAndDelayFromQuickAndSlowSteps) {
+TEST_F(CalibrateCommand, FindsInertiaAndDelayFromQuickAndSlowSteps) {
   // Steps of 20 ms move the speeds so fast that a daemon takes them for spikes.
   for (const auto& [lag_s, seed] :
        {std::pair{0.02, 3U}, {0.02, 5U}, {0.02, 8U}, {0.15, 5U}, {0.15, 8U}}) {
@@ -187,7 +187,7 @@ TEST_F(Calibrate, FindsInertiaAndDelayFromQuickAndSlowSteps) {
 }
 
 // Whatever the drive says.
-TEST_F(Calibrate, WritesNothingThatItsLoaderRefuses) {
+TEST_F(CalibrateCommand, WritesNothingThatItsLoaderRefuses) {
   // A torque that is configured as 190 ms late already: 30 ms more is beyond the loader's range.
   place.write("drive.log", drive_log(drive({}, {}, 3)));
   std::string config = kDriveToml;
@@ -237,7 +237,7 @@ const daemon::RoleBinding& pressure_of(const daemon::Config& config) {
   throw std::runtime_error("no secondary_pressure");
 }
 
-TEST_F(Calibrate, PressureFromDiagnosticsIsCalibratedAndWrittenWhole) {
+TEST_F(CalibrateCommand, PressureFromDiagnosticsIsCalibratedAndWrittenWhole) {
   DriveKind kind;
   kind.duration_s = 60.0;
   const std::string broadcast = drive_log(drive({}, kind, 3));
@@ -312,7 +312,7 @@ TEST_F(Calibrate, PressureFromDiagnosticsIsCalibratedAndWrittenWhole) {
   }
 }
 
-TEST_F(Calibrate, RefusesWithAReasonForEachKey) {
+TEST_F(CalibrateCommand, RefusesWithAReasonForEachKey) {
   DriveKind kind;
   kind.duration_s = 5.0;
   kind.key_on = false;
@@ -326,7 +326,7 @@ TEST_F(Calibrate, RefusesWithAReasonForEachKey) {
   }
 }
 
-TEST_F(Calibrate, MissingFilesAreOneLine) {
+TEST_F(CalibrateCommand, MissingFilesAreOneLine) {
   const RunResult result = calibrate({});
   EXPECT_EQ(result.status, 66);
   EXPECT_EQ(lines(result.err), 1) << result.err;
