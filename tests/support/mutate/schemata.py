@@ -42,7 +42,8 @@ class Writer:
         for begin, _, _, end, new in sorted(self.edits):
             if begin < at:
                 raise ValueError(f"{self.path}: edits overlap at {begin}")
-            out += [self.text[at:begin], new]
+            # A line keeps its number: by it an error of the compiler is told to its mutants.
+            out += [self.text[at:begin], new, "\n" * self.text[begin:end].count("\n")]
             at = end
         return "".join(out) + self.text[at:]
 
