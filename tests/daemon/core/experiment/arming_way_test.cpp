@@ -294,7 +294,7 @@ TEST(TheWay, SaysWhichRampWouldBeFastEnough) {
 }
 
 // A sine of two windows, of 130 ms: from one to the next its slope turns round, so that the noise
-// is the steepest slope of a line through thirteen of its points. With 2 %/s a steep fall is seen
+// is the steepest slope of a line through thirteen of its points. With 1.6 %/s a steep fall is seen
 // after 0.4 points of slip instead of 0.3, some 25 ms later.
 TEST(TheWay, ReckonsWithTheNoiseOfTheSpeeds) {
   const auto wave = [](double sample) { return std::sin(std::numbers::pi * sample / 13.0); };
@@ -309,7 +309,7 @@ TEST(TheWay, ReckonsWithTheNoiseOfTheSpeeds) {
     drive.torque_Nm = low ? 20.0 : 30.0;
     drive.own_force_N = 2.5 * drive.peak_N(drive.point(130.0));
     RampPoint shaken = drive.point(130.0);
-    shaken.slip_rate_noise_1_s = 0.02;
+    shaken.slip_rate_noise_1_s = 0.016;
     const Crossing wanted = search(shaken, drive.stale).crossing;
     ASSERT_GT(wanted.slip_rate_1_s, 0.0);
     const Crossing quiet = search(drive.point(130.0), drive.stale).crossing;
@@ -317,7 +317,7 @@ TEST(TheWay, ReckonsWithTheNoiseOfTheSpeeds) {
     Arming arming(drive.car);
     for (int i = 0; i < 400; ++i) {
       Arming::Now now = drive.now(i * kSample);
-      now.omega_s_rad_s *= 1.0 + 0.02 * square_s / moment * wave(i);
+      now.omega_s_rad_s *= 1.0 + 0.016 * square_s / moment * wave(i);
       arming.step(now);
     }
     ASSERT_TRUE(arming.cleared()) << low;
