@@ -163,7 +163,7 @@ TEST(Saturation, IsNotWhereAPressureIsHeldOnOneOfItsSteps) {
   EXPECT_GT(data.valid_count, 150);  // of 200, less the ends and the steps
 }
 
-// A ramp at whose end the belt runs away, and the pressure that catches it 0.2 s later.
+// A ramp at whose end the belt runs away, and the pressure that catches it.
 SignalTable run_away(double doubles_in_s) {
   constexpr double kCaught_s = 14.2;
   SignalTable table;
@@ -185,7 +185,7 @@ SignalTable run_away(double doubles_in_s) {
   return table;
 }
 
-TEST(RunAway, IsUsedUntilItIsFastAndUntilThePressureSteps) {
+TEST(RunAway, IsUsedUntilItIsFast) {
   const auto last_s = [](const ExperimentData& data) {
     double out = 0.0;
     for (int k = 0; k < 142; ++k) {
@@ -193,8 +193,6 @@ TEST(RunAway, IsUsedUntilItIsFastAndUntilThePressureSteps) {
     }
     return out;
   };
-  // Slow enough all the time: up to the samples beside the step.
-  EXPECT_GE(last_s(prepare(run_away(1.0), {})), 13.85);
   // 0.012 per second at 13.8 s, 0.03 at 14.1 s.
   const double fast_s = last_s(prepare(run_away(0.25), {}));
   EXPECT_GE(fast_s, 13.55);

@@ -31,7 +31,6 @@ constexpr double kForceMin_N = 200.0;
 // Of the clamp force: where its slow copy departs further from it, the pressure moves too fast for
 // what a lag, a shift or play is computed from.
 constexpr double kForceStepMax = 0.02;
-constexpr double kForceStepSeen = 0.01;  // half of it: the step itself has begun
 
 // One sigma of the weights that a sample of the grid is the mean by.
 double kernel_s(double dt_s) {
@@ -285,27 +284,6 @@ void trim(const std::vector<bool>& runs_away, ExperimentData& data) {
     k = end;
   }
   data.valid = kept;
-}
-
-// The slow copy sees a step of the pressure before it comes, and the samples before it, where the
-// belt has just passed its peak, are whole: what still goes on as it went is not too fast.
-void keep_until_it_steps(const ArrayXd& force_N, double dt_s, std::vector<bool>& too_fast) {
-  constexpr double kBefore_s = 0.8;
-  const auto n = static_cast<int>(too_fast.size());
-  const int before = static_cast<int>(std::lround(kBefore_s / dt_s));
-  for (int begin = 1; begin < n; ++begin) {
-    const auto i = static_cast<std::size_t>(begin);
-    if (!too_fast[i] || too_fast[i - 1] || begin < before) continue;
-    const auto course = force_N.segment(begin - before, before);
-    const ArrayXd t = ArrayXd::LinSpaced(before, 1.0 - before, 0.0);  // samples
-    const ArrayXd off = t - t.mean();
-    const double slope = (off * course).sum() / off.square().sum();
-    for (int k = begin; k < n && too_fast[static_cast<std::size_t>(k)]; ++k) {
-      const double as_it_went_N = course.mean() + slope * (k - begin + 1 - t.mean());
-      if (!(std::abs(force_N[k] - as_it_went_N) < kForceStepSeen * force_N[k])) break;
-      too_fast[static_cast<std::size_t>(k)] = false;
-    }
-  }
 }
 
 // Takes out the samples where the pressure moves too fast, and those beside them: a delay moves the
@@ -577,9 +555,6 @@ SampleFlags judge_samples(const estimator::VariatorParameters& variator,
     data.valid[i] = data.valid[i] && grips;
     out.too_fast[i] = !(std::abs(step_N) < kForceStepMax * force_N);
   }
-  keep_until_it_steps(
-      variator.secondary_piston_area_m2 * data.pressure.value + variator.secondary_spring_force_N,
-      data.dt_s, out.too_fast);
   return out;
 }
 
