@@ -418,8 +418,9 @@ Hypothesis fitted(Engine& engine, const std::vector<Score>& scores, const Hypoth
   const auto score = std::find_if(scores.begin(), scores.end(), [&](const Score& each) {
     return each.slot == candidate.back() && each.far;
   });
-  Hypothesis h = engine.refine_from(
-      score != scores.end() ? *score->far : engine.add(candidate).state, candidate);
+  std::optional<ModelState> begin;
+  if (score != scores.end()) begin = score->far;
+  Hypothesis h = engine.refine_from(begin ? *begin : engine.add(candidate).state, candidate);
   const auto or_better = [&](Hypothesis other) {
     if (other.log_likelihood > h.log_likelihood) h = std::move(other);
   };

@@ -159,7 +159,7 @@ ArrayXd answer_to(const Campaign& campaign, const Residuals& at, const Look& loo
   if (look.into == nullptr) return ArrayXd::Ones(at.foot.size());
   QuantityChange unit;
   unit.*look.into = ArrayXd::Ones(at.foot.size());
-  const ArrayXd answer = propagate(campaign, at, unit)[static_cast<std::size_t>(look.kind)];
+  ArrayXd answer = propagate(campaign, at, unit)[static_cast<std::size_t>(look.kind)];
   // None for more than those of a fifth of the samples: what runs away in half a second is no line.
   std::vector<double> sizes;
   for (const double each : answer) {
