@@ -88,7 +88,7 @@ struct Campaign {
 // A sample that counts, as the departure of its stop's friction curve sees it.
 struct CurveSample {
   int k = 0;
-  int row = 0;       // of the valid samples
+  int row = 0;              // of the valid samples
   SplinePosition position;  // of |foot|
   double capacity_Nm = 0.0;
   double weight = 0.0;  // of a change of the curve in the residual, with its sign
