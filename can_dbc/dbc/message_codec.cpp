@@ -34,19 +34,6 @@ std::uint64_t word_of(std::span<const std::uint8_t> payload) noexcept {
   return word;
 }
 
-// One or two words mostly: a call would take as long as two signals.
-void clear(std::vector<std::uint64_t>& words) noexcept {
-  constexpr std::size_t kFew = 2;
-  std::uint64_t* const first = words.data();
-  const std::size_t count = words.size();
-  if (count > kFew) {
-    std::memset(first, 0, count * kWord);
-    return;
-  }
-  if (count > 0) first[0] = 0;
-  if (count > 1) first[1] = 0;
-}
-
 // Where a signal lies.
 struct BitLayout {
   explicit BitLayout(const SignalDef& signal)
@@ -348,7 +335,7 @@ void MessageCodec::bring_near() const noexcept {
 void MessageCodec::decode(std::span<const std::uint8_t> payload,
                           DecodedMessage& out) const noexcept {
   assert(out.size() >= signals_.size());
-  clear(out.present_);
+  out.clear();
   Words words{.payload = payload};
   if (payload.size() <= kWord) {
     words.little = word_of(payload);

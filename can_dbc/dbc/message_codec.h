@@ -5,6 +5,7 @@
 // construction is start-up only.
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <span>
@@ -26,7 +27,7 @@ class DecodedMessage {
  public:
   // For messages of up to so many signals.
   explicit DecodedMessage(std::size_t signals = 0)
-      : signals_(signals), present_((signals + kBits - 1) / kBits) {}
+      : signals_(signals), present_(std::max(kWordsLeast, (signals + kBits - 1) / kBits)) {}
 
   std::size_t size() const noexcept { return signals_.size(); }
   bool has(std::size_t signal) const noexcept {
@@ -54,8 +55,15 @@ class DecodedMessage {
  private:
   friend class MessageCodec;
   static constexpr std::size_t kBits = 64;
+  static constexpr std::size_t kWordsLeast = 2;  // cleared without a look at how many there are
   static std::uint64_t bit(std::size_t signal) noexcept {
     return std::uint64_t{1} << (signal % kBits);
+  }
+
+  void clear() noexcept {
+    std::uint64_t* const words = present_.data();
+    words[0] = words[1] = 0;
+    if (present_.size() > kWordsLeast) std::fill(words + kWordsLeast, words + present_.size(), 0U);
   }
 
   std::vector<DecodedSignal> signals_;

@@ -42,6 +42,18 @@ TEST(MessageCodec, LeavesOutWhatLiesOutsideThePayload) {
   EXPECT_EQ(values.count(), 0U);
 }
 
+// Whichever word of the mask a signal has its bit in.
+TEST(MessageCodec, ForgetsTheFrameBefore) {
+  MessageDef message;
+  for (std::uint32_t i = 0; i < 150; ++i) message.signals.push_back(byte_signal("s", i % 8));
+  const MessageCodec codec(message);
+  DecodedMessage values(150);
+  codec.decode(std::array<std::uint8_t, 8>{}, values);
+  EXPECT_EQ(values.count(), 150U);
+  codec.decode({}, values);
+  EXPECT_EQ(values.count(), 0U);
+}
+
 TEST(MessageCodec, SelectsByRangesAlsoWhenTheSelectorComesLater) {
   MessageDef message;
   message.signals = {selected("low", 1, "mux", {{0, 3}, {7, 7}}),
