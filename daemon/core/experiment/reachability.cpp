@@ -18,7 +18,7 @@ constexpr double kSlipDetectableSteep_share = 0.003;
 constexpr double kSlipDetectableFlat_share = 0.008;
 // Measured: of the noise of the slip rate. In harsh noise 184 requests were ended 0.7 / 1.1 / 2.0
 // points (median, 90, 99 %) behind the peak of belts that fall by 4e-3 to 8e-3 per percent
-// (campaign from 1300001). With 0.2 three of 4,267 drives with nothing wrong slipped by 33 to 58 %
+// (campaign from 1300001). With 0.2 three of 4,924 drives with nothing wrong slipped by 33 to 58 %
 // (1311979, 1312543, 1318431), as did 952096; with 0.25 none of these. Values of 98 peaks in reach
 // in harsh / production / lab noise (--seeds 1500 --from 990001 --nothing-wrong): 62 / 70 / 70 with
 // 0.2, 52 / 70 / 70 with 0.25, 40 / 69 / 70 with 0.3, 13 / 68 with 0.4; with 0.3 the shipped car
