@@ -77,7 +77,9 @@ int main(int argc, char** argv) {
       " disturbances of " + std::to_string(kDisturbed) +
       ": results of another kind / values or bounds that move by 0.2 % / stops that move by 20 ms "
       "/ "
-      "disturbances that end otherwise. `tests/vary estimator/robust/thresholds.h` writes it.";
+      "disturbances that end otherwise. `tests/vary estimator/robust/thresholds.h` writes it. "
+      "Not on this panel: `stop = \"confidence\"`, where alone the forecast's numbers decide, and "
+      "a pressure whose reading steps.";
   return beltgrip::test::write_varied(argc, argv, "## What a fifth of a constant changes\n",
                                       introduction, kNumbers,
                                       [&before] { return changes(before, answers()); });
