@@ -13,7 +13,8 @@
 //   Lag          the force answers later than the crossing was planned for, or did not show in the
 //                rest of its fall that it does not
 //   ForceFloor   the request is at its floor, which no longer falls with the speed, or has risen;
-//                or the coast-down is over, or friction larger than was expected
+//                or the coast-down is over; or a belt of more friction than was expected holds
+//                there
 //   Time         the request has stood for kRequestLongest
 //   EngineSpeed  the primary has left the band around the speed that the secondary gives it at the
 //                start's ratio, or has fallen below its least speed: macro slip pulls the engine
@@ -114,6 +115,7 @@ class ClampRequest {
   Stop judge_damage(const Now& now) const noexcept;
   Stop judge_room(const Now& now) const noexcept;
   Stop judge_lag() const noexcept;
+  bool belt_holds() const noexcept;
   Stop judge_floor(const Now& now, double floor_N) const noexcept;
   Stop judge_course(const Now& now) const noexcept;
   std::optional<Role> untrue_speed(const Now& now, double drift) const noexcept;
@@ -165,6 +167,7 @@ class ClampRequest {
     MonoTime t = MonoTime::origin();
     double force_N = 0.0;
     double rate_N_per_s = 0.0;  // of its fall since the one before
+    double slip_share = 0.0;    // since the start
   };
   static constexpr std::size_t kAsked = 64;
   static constexpr Duration kCoursePeriod = 20 * kMillisecond;

@@ -209,11 +209,11 @@ TEST(Reachability, ASlowInputCostsRoom) {
             searched(point(20.0), reaction(0.1)).crossing().peak_slip_max_share);
 }
 
-// What the noise of the slip rate hides is seen later: 0.25 s of it, where that is more than 0.3
+// What the noise of the slip rate hides is seen later: 0.35 s of it, where that is more than 0.3
 // points.
 TEST(Reachability, NoiseOfTheSlipRateCostsRoom) {
   RampPoint quiet = point(25.0), loud = quiet, louder = quiet;
-  loud.slip_rate_noise_1_s = 0.012;
+  loud.slip_rate_noise_1_s = 0.008;
   louder.slip_rate_noise_1_s = 0.02;
   const Reaction r = reaction(0.08);
   const double rate = searched(quiet, r).crossing().slip_rate_1_s;
@@ -222,16 +222,16 @@ TEST(Reachability, NoiseOfTheSlipRateCostsRoom) {
             searched(quiet, r).crossing().dearest.slip_share);
   ASSERT_EQ(searched(louder, r).crossing().slip_rate_1_s, rate);
   EXPECT_EQ(searched(louder, r).crossing().dearest.slip_share,
-            std::max(excursion(louder, r, rate, 0.8, 0.005, 0.01).slip_share,
-                     excursion(louder, r, rate, 0.4, 0.005, 0.06).slip_share));
+            std::max(excursion(louder, r, rate, 0.8, 0.007, 0.01).slip_share,
+                     excursion(louder, r, rate, 0.4, 0.007, 0.06).slip_share));
 }
 
-// A crossing that would run on for more than 1.8 points is none, whatever room there is.
+// A crossing that would run on for more than 2.5 points is none, whatever room there is.
 TEST(Reachability, ACrossingNearToNotBeingCaughtIsNone) {
   for (double torque = 15.0; torque < 50.0; torque += 1.0) {
     const Crossing crossing = searched(point(torque), reaction(0.12)).crossing();
     if (crossing.slip_rate_1_s > 0.0) {
-      EXPECT_LT(crossing.dearest.slip_share, 0.018) << torque;
+      EXPECT_LT(crossing.dearest.slip_share, 0.025) << torque;
     }
   }
   EXPECT_EQ(searched(point(49.0), reaction(0.12)).crossing().slip_rate_1_s, 0.0);
@@ -287,7 +287,7 @@ Crossing chosen(const RampPoint& p, const Reaction& r) {
     const double lasts_s = 0.008 / rate + r.detection_s + r.dead_time_s + r.lag_s;
     tried.peak_slip_detectable_share =
         std::min(tried.peak_slip_max_share, 60.0 / (p.torque_Nm * p.omega_p_rad_s * lasts_s));
-    if (tried.dearest.slip_share < 0.018 && tried.peak_slip_max_share > p.peak_slip_share &&
+    if (tried.dearest.slip_share < 0.025 && tried.peak_slip_max_share > p.peak_slip_share &&
         tried.peak_slip_detectable_share > best.peak_slip_detectable_share) {
       best = tried;
     }
@@ -363,8 +363,8 @@ TEST(Reachability, WhatStandsInTheWayIsToldWithItsNumbers) {
   EXPECT_DOUBLE_EQ(fall.limit, 3.0);
   const double share = fall.figure / fall.limit;
   EXPECT_GT(share, 0.1);
-  EXPECT_LT(runs_on(steep, reaction(0.1), share), 0.018);
-  EXPECT_GE(runs_on(steep, reaction(0.1), share + 1.0 / 64.0), 0.018);
+  EXPECT_LT(runs_on(steep, reaction(0.1), share), 0.025);
+  EXPECT_GE(runs_on(steep, reaction(0.1), share + 1.0 / 64.0), 0.025);
   // An own force that does not hold the belt behind any peak: no fall is survived.
   RampPoint weak = point(25.0);
   weak.own_force_N = 0.9 * peak_force_N(weak, weak.mu_least);
@@ -378,7 +378,7 @@ TEST(Reachability, WhatStandsInTheWayIsToldWithItsNumbers) {
   ASSERT_EQ(slip_share.wall, CrossingWall::kSlip);
   EXPECT_DOUBLE_EQ(slip_share.limit, 0.02);
   EXPECT_LT(slip_share.figure, 0.8 / (450.0 * 0.0784) - 0.008);
-  EXPECT_GT(slip_share.figure, 0.8 / (450.0 * 0.0784) - 0.018);
+  EXPECT_GT(slip_share.figure, 0.8 / (450.0 * 0.0784) - 0.025);
   // A late peak under much torque, where a fall is gentle: energy.
   RampPoint late = point(45.0, 140.0);
   late.own_force_N *= 3.0;
@@ -437,16 +437,16 @@ TEST(Reachability, TheWallIsTheFirstThatAnotherAccountMeets) {
             }
             const double room = std::min(SlipLimits{}.slip_max_share,
                                          SlipLimits{}.slip_speed_max_m_s / (omega_rad_s * 0.0784));
-            if (steep.slip_share >= 0.018) {
+            if (steep.slip_share >= 0.025) {
               ++falls;
               EXPECT_EQ(told.wall, CrossingWall::kFall) << steep.slip_share;
               // To a sixty-fourth, by both of its cases.
               const double share = told.figure / told.limit;
-              if (runs_on(p, r, 1.0) >= 0.018) {  // else a flat top does
-                EXPECT_GE(runs_on(p, r, share + 1.0 / 64.0), 0.018) << fall << share_at_fault;
+              if (runs_on(p, r, 1.0) >= 0.025) {  // else a flat top does
+                EXPECT_GE(runs_on(p, r, share + 1.0 / 64.0), 0.025) << fall << share_at_fault;
               }
               if (share > 0.0) {
-                EXPECT_LT(runs_on(p, r, share), 0.018);
+                EXPECT_LT(runs_on(p, r, share), 0.025);
               }
             } else if (room - steep.slip_share <= peak) {
               ++slips;
