@@ -135,6 +135,18 @@ SignalTable held_pressure(double from_Pa, double to_Pa, double step_Pa) {
   return table;
 }
 
+// On the steps it is held on, before the fall and after it; those on the way it passes.
+TEST(Rounding, RestsWhereAReadingIsHeldAndNotWhereItPasses) {
+  const ExperimentData data = prepare(held_pressure(6e5, 3.2e5, 4e4), {});
+  ASSERT_EQ(data.rests_pressure.size(), 2U);
+  EXPECT_EQ(data.rests_pressure[0].begin, 0);
+  EXPECT_NEAR(data.rests_pressure[0].end, 66, 3);     // half a step into the fall
+  EXPECT_NEAR(data.rests_pressure[1].begin, 134, 3);  // as much before its end
+  EXPECT_EQ(data.rests_pressure[1].end, data.size());
+  EXPECT_NE(data.rests_pressure[0].step, data.rests_pressure[1].step);
+  EXPECT_TRUE(prepare(held_pressure(6e5, 3.2e5, 1e3), {}).rests_pressure.empty());
+}
+
 // What a sensor says that cannot go beyond.
 SignalTable clipped_pressure(double low_Pa, double high_Pa) {
   SignalTable table = held_pressure(6e5, 3.2e5, 1e3);

@@ -166,19 +166,48 @@ bool clipped(const Channel& channel) {
          all.elsewhere.share() < kHardly;
 }
 
+// The smallest step of a channel but for one in a hundred; 0: it never moves.
+double step_of(const Channel& channel) {
+  std::vector<double> steps;
+  const std::vector<double>& x = channel.value;
+  for (std::size_t i = 1; i + 1 < x.size(); ++i) {
+    if (x[i] != x[i - 1]) steps.push_back(std::abs(x[i] - x[i - 1]));
+  }
+  return steps.empty() ? 0.0 : estimator::at_rank(steps, steps.size() / 100);
+}
+
 // One sigma of a rounding that no noise carries from step to step, so that no averaging removes it:
 // there the samples repeat their neighbours.
 double held_rounding(const Channel& channel) {
-  std::vector<double> steps;
+  const double step = step_of(channel);
+  if (step == 0.0) return 0.0;
   double held = 0.0;
   const std::vector<double>& x = channel.value;
   for (std::size_t i = 1; i + 1 < x.size(); ++i) {
     held += x[i - 1] == x[i] && x[i] == x[i + 1] ? 1.0 : 0.0;
-    if (x[i] != x[i - 1]) steps.push_back(std::abs(x[i] - x[i - 1]));
   }
-  if (steps.empty()) return 0.0;
-  const double step = estimator::at_rank(steps, steps.size() / 100);
   return step / std::sqrt(12.0) * std::sqrt(held / static_cast<double>(x.size() - 2));
+}
+
+// Of a channel that rests on its steps, those that it does not merely pass.
+std::vector<Rest> rests_of(const Channel& channel, const ArrayXd& on_grid) {
+  std::vector<Rest> out;
+  if (channel.value.size() < 10 || !rests_on_steps(channel)) return out;
+  const double step = step_of(channel);
+  const double lowest = *std::min_element(channel.value.begin(), channel.value.end());
+  const auto n = static_cast<int>(on_grid.size());
+  const auto level = [&](int k) {
+    return std::isfinite(on_grid[k]) ? std::lround((on_grid[k] - lowest) / step) : -1;
+  };
+  for (int begin = 0, end = 0; begin < n; begin = end) {
+    const long here = level(begin);
+    while (end < n && level(end) == here) ++end;
+    const long before = begin > 0 ? level(begin - 1) : -1;
+    const long after = end < n ? level(end) : -1;
+    const bool passes = before >= 0 && after >= 0 && (before < here) == (here < after);
+    if (here >= 0 && !passes) out.push_back({{begin, end}, here});
+  }
+  return out;
 }
 
 // The same of its mean size.
@@ -472,6 +501,9 @@ void add_roundings(const SignalTable& table, ExperimentData& data) {
   data.rounding_pressure_Pa = held_rounding(table[Role::kSecondaryPressure]);
   data.rounding_torque_Nm = held_rounding(table[torque_role(data)]);
   data.rounding_torque_s_Nm = held_rounding(table[Role::kSecondaryTorque]);
+  data.rests_pressure = rests_of(table[Role::kSecondaryPressure], data.pressure.value);
+  data.rests_torque = rests_of(table[torque_role(data)], data.torque.value);
+  data.rests_torque_s = rests_of(table[Role::kSecondaryTorque], data.torque_s.value);
 }
 
 void add_lines(const SignalTable& table, const estimator::VariatorParameters& variator,

@@ -34,6 +34,11 @@ struct Stretch {
   int begin = 0, end = 0;  // end: behind the last
 };
 
+// The same on one step of a reading; a motion that comes back rests there again, off by the same.
+struct Rest : Stretch {
+  long step = 0;
+};
+
 struct ExperimentData {
   std::string name;
   double dt_s = 0.1;
@@ -55,6 +60,10 @@ struct ExperimentData {
   double rounding_slip_share =
       0.0;  // one sigma of what the rounding of the speeds leaves in the slip
   double rounding_pressure_Pa = 0.0, rounding_torque_Nm = 0.0, rounding_torque_s_Nm = 0.0;  // same
+  // Where a reading rests on one of its steps and goes back to where it came from, or begins or
+  // ends there: off by the same all along, and nothing says by how much. One that it passes on its
+  // way is off by nothing in the mean.
+  std::vector<Rest> rests_pressure, rests_torque, rests_torque_s;
   std::vector<std::string> notes;
   int size() const { return static_cast<int>(t_s.size()); }
 };

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <numeric>
 
@@ -20,6 +21,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+constexpr int kLevel = 0, kTorqueZero = 2, kTorqueOutZero = 4;  // of the random effects
 constexpr double kHuber = 3.0;
 constexpr double kScatterCap = 8.0;  // in usual scatters: beyond, it is an effect and not scatter
 
@@ -56,6 +58,69 @@ std::array<ResidualColumns, kRandomEffects> random_columns(const Campaign& campa
   out[4] = propagate(campaign, at, zero_out);
   zero_track.tracking = ArrayXd::Ones(n);
   out[5] = propagate(campaign, at, zero_track);
+  return out;
+}
+
+// The rows times the inverse root of one and the covariance of the errors that rest.
+ArrayXd less_rests(const std::vector<Whitening::Rest>& rests, ArrayXd rows) {
+  for (const auto& [first, by] : rests) {
+    const double square = by.squaredNorm();
+    if (square == 0.0) continue;
+    auto part = rows.segment(first, by.size());
+    const double share = (1.0 - 1.0 / std::sqrt(1.0 + square)) / square;
+    part -= share * by.dot(part.matrix()) * by.array();
+  }
+  return rows;
+}
+
+// Of one experiment, from its random effects' columns, the last of all.
+std::array<std::vector<Whitening::Rest>, kResidualKinds> rests_of(const Campaign& campaign, int run,
+                                                                  const RawColumns& raw) {
+  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+  const estimator::VariatorParameters& variator = campaign.variator;
+  std::array<std::vector<Whitening::Rest>, kResidualKinds> out;
+  if (data.rests_pressure.empty() && data.rests_torque.empty() && data.rests_torque_s.empty()) {
+    return out;
+  }
+  // Row of a sample: how many valid ones come before it.
+  std::vector<int> row(static_cast<std::size_t>(data.size()) + 1, 0);
+  ArrayXd per_force(data.valid_count), ratio(data.valid_count);
+  for (int k = 0; k < data.size(); ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    row[i + 1] = row[i] + data.valid[i];
+    if (!data.valid[i]) continue;
+    per_force[row[i]] =
+        1.0 / std::max(50.0, variator.secondary_piston_area_m2 * data.pressure.value[k] +
+                                 variator.secondary_spring_force_N);
+    ratio[row[i]] = data.stop[i] == kLowStop ? variator.ratio_low : variator.ratio_overdrive;
+  }
+  const auto column = [&](int random, ResidualKind kind) -> const ArrayXd& {
+    const std::size_t first = raw.columns.size() - kRandomEffects;
+    return raw.columns[first + static_cast<std::size_t>(random)][kind];
+  };
+  const auto add = [&](const std::vector<Rest>& rests, ResidualKind kind, const ArrayXd& by) {
+    if (by.size() == 0) return;
+    std::map<long, Whitening::Rest> by_step;
+    for (const Rest& rest : rests) {
+      const int first = row[static_cast<std::size_t>(rest.begin)];
+      const int end = row[static_cast<std::size_t>(rest.end)];
+      Whitening::Rest& all =
+          by_step.try_emplace(rest.step, Whitening::Rest{first, {}}).first->second;
+      all.by.conservativeResizeLike(VectorXd::Zero(end - all.first));
+      all.by.tail(end - first) = by.segment(first, end - first);
+    }
+    for (auto& [step, all] : by_step) out[kind].push_back(std::move(all));
+  };
+  add(data.rests_pressure, kFrictionResidual,
+      column(kLevel, kFrictionResidual) * per_force *
+          (variator.secondary_piston_area_m2 * data.rounding_pressure_Pa));
+  for (const ResidualKind kind : {kFrictionResidual, kBalanceResidual}) {
+    add(data.rests_torque, kind, column(kTorqueZero, kind) * data.rounding_torque_Nm);
+  }
+  if (campaign.has_balance) {
+    add(data.rests_torque_s, kBalanceResidual,
+        column(kTorqueOutZero, kBalanceResidual) * ratio * data.rounding_torque_s_Nm);
+  }
   return out;
 }
 
@@ -148,6 +213,12 @@ double scatter_penalty(const RandomVector& variance) {
   return (prior_runs(variance) * (share.log() + 1.0 / share - 1.0)).sum();
 }
 
+bool is_beyond_scatter(const Scatter& scatter) {
+  constexpr double kNearly = 0.99;
+  return scatter.variance[kLevel] >
+         kNearly * kScatterCap * kScatterCap * default_scatter().variance[kLevel];
+}
+
 bool parts_experiments(const Scatter& without, const Scatter& with) {
   constexpr double kMore = 4.0;  // of the variance, on balance of all kinds
   // By what healthy experiments differ anyway, none has been driven apart.
@@ -189,6 +260,7 @@ std::vector<WhiteBlock> whitened(const Campaign& campaign, int run, const RawCol
   const std::vector<int> kinds = kinds_of(campaign);
   const Index rows = data.valid_count;
   const auto& weight = whitening.weight[static_cast<std::size_t>(run)];
+  const auto e = static_cast<std::size_t>(run);
   std::vector<WhiteBlock> out(kinds.size());
   const bool mixed = campaign.has_balance && whitening.cross != 0.0;
   for (std::size_t i = kinds.size(); i-- > 0;) {  // friction last: the balance's goes into it
@@ -211,7 +283,9 @@ std::vector<WhiteBlock> whitened(const Campaign& campaign, int run, const RawCol
       if (in.size() == 0) {
         to.setZero();
       } else {
-        whiten(data, whitening.filter[kind], in, weight[kind], to.data());
+        const bool rests = e < whitening.rest.size() && !whitening.rest[e][kind].empty();
+        whiten(data, whitening.filter[kind], rests ? less_rests(whitening.rest[e][kind], in) : in,
+               weight[kind], to.data());
       }
       if (beside == nullptr) continue;
       if (next < beside->size() && (*beside)[next] == column) {
@@ -572,13 +646,12 @@ void LeftOver::add(const ExperimentData& data, std::size_t e, std::size_t q,
 }
 
 LeftOver left_over(const Campaign& campaign, const std::vector<RawColumns>& raw,
-                   const std::vector<Summary>& summaries, const Fit& fit) {
+                   const std::vector<Summary>& summaries, const Fit& fit, const Whitening& plain) {
   VectorXd full(fit.step.size() + 1);
   full << fit.step, 1.0;
   const MatrixXd inverse = (1.0 / fit.scatter.variance).matrix().asDiagonal();
   LeftOver out(campaign.runs.size());
   const std::vector<int> kinds = kinds_of(campaign);
-  const Whitening plain = identity_whitening(campaign);
   for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
     const ExperimentData& data = campaign.runs[e];
     if (data.valid_count == 0) continue;
@@ -648,8 +721,11 @@ Whitening fit_whitening(const Campaign& campaign, const std::vector<RawColumns>&
   std::vector<int> all(static_cast<std::size_t>(prior.pull.size()));
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
   const Fit fit = fit_linear(summaries, all, prior, default_scatter(), 4);
-  const LeftOver left = left_over(campaign, raw, summaries, fit);
   Whitening out = identity_whitening(campaign);
+  for (std::size_t e = 0; e < runs; ++e) {
+    out.rest.push_back(rests_of(campaign, static_cast<int>(e), raw[e]));
+  }
+  const LeftOver left = left_over(campaign, raw, summaries, fit, out);
   set_filters(campaign, left, out);
   set_weights(campaign, left, out);
   for (std::size_t e = 0; e < runs; ++e) {

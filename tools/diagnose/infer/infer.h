@@ -31,6 +31,13 @@ struct Whitening {
     std::vector<double> sigma;                 // innovation, per order
   };
   std::array<Filter, kResidualKinds> filter;
+  // An error that is the same as long as a reading rests on its step: what one sigma of it comes to
+  // in the rows from the first on. Taken out before the filter, as far as it may be that.
+  struct Rest {
+    int first = 0;
+    Eigen::VectorXd by;
+  };
+  std::vector<std::array<std::vector<Rest>, kResidualKinds>> rest;  // per experiment; may be empty
   double cross = 0.0;  // correlation of the whitened friction and balance residuals
   std::vector<std::array<Eigen::ArrayXd, kResidualKinds>> weight;  // per experiment
   // Columns of the random effects per experiment, whitened; the same for all hypotheses. Empty:
@@ -51,6 +58,8 @@ struct Scatter {
   RandomVector variance;
 };
 Scatter default_scatter();
+// Of the friction's level: more than any scatter is, so that its estimate ends at a bound.
+bool is_beyond_scatter(const Scatter& scatter);
 // A cause that acts in every experiment makes them more alike. What fits within each of them and
 // drives them apart is none: a noise in the regressors that it happens to divide.
 bool parts_experiments(const Scatter& without, const Scatter& with);
