@@ -232,6 +232,14 @@ bool is_in_curve(const Naming& naming, int slot) {
          });
 }
 
+// What cannot be itself says nothing against a name that is there beside it as well: it is in the
+// place of another cause.
+bool stands_beside(const Engine& engine, const Hypothesis& rival, int slot) {
+  const Hypothesis both = engine.refine_from(rival.state, plus(rival.slots, slot));
+  return both.log_evidence > rival.log_evidence + std::log(kThereOdds) &&
+         credible(engine, slot, both.state.effects[slot]);
+}
+
 struct Promotion {
   Hypothesis hypothesis;
   int slot, instead_of;
@@ -289,6 +297,10 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
         promoted = Promotion{other, ranked[i].second, out.slot};
       }
       if (is_in_curve(naming, ranked[i].second)) continue;  // never a name
+      if (other.log_evidence > whole.log_evidence && !credible(engine, other) &&
+          stands_beside(engine, other, out.slot)) {
+        continue;
+      }
       evidence[id_of(engine, ranked[i].second)].push_back(other.log_evidence);
       if (id_of(engine, ranked[i].second) != id_of(engine, out.slot) &&
           other.log_evidence > whole.log_evidence - std::log(kClassOdds)) {
