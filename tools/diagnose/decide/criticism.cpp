@@ -22,6 +22,21 @@ void demote_order(std::vector<Cell>& cells) {
                         [&](const Cell& cell) { return !is_order(cell); });
 }
 
+// A function of what a named effect follows, beside it; the one with the largest gain. Where that
+// is there still, the cause follows the same and is another.
+const Cell* own_shape(const Engine& engine, const std::vector<Cell>& cells) {
+  const Cell* out = nullptr;
+  for (const Cell& cell : cells) {  // the best first
+    const bool is_own =
+        std::any_of(engine.accepted().begin(), engine.accepted().end(), [&](int slot) {
+          return engine.campaign().slots[static_cast<std::size_t>(slot)].row->depends_on ==
+                 cell.abscissa.variable->name;
+        });
+    if (is_own && (out == nullptr || cell.gain() > out->gain())) out = &cell;
+  }
+  return out;
+}
+
 // Of the residuals that wander by as much as matters.
 double least_whiteness(const Engine& engine) {
   const auto by_kind = wander(engine, engine.state());
@@ -102,6 +117,7 @@ Criticism criticise(const Engine& engine, Steps steps) {
     if (cell.smooth_gain > thresholds::kSmoothBeside) law = std::max(law, cell.law_gain);
     smooth = std::max(smooth, cell.smooth_gain);
   }
+  if (const Cell* own = own_shape(engine, out.cells)) out.own = *own;
   const ScatterRatios ratio = scatter_ratios(engine, out.base.scatter);
   const ScatterRatios unusual = scatter_ratios(engine, default_scatter());
   using namespace thresholds;
@@ -109,6 +125,7 @@ Criticism criticise(const Engine& engine, Steps steps) {
   out.tests = {
       {"law_cell", law, kLawCell},
       {"smooth_cell", smooth, kSmoothCell},
+      {"own_shape", out.own ? out.own->gain() : 0.0, kOwnShape},
       {"line", fine ? out.line.excess : 0.0, kLine},
       {"channel_line", out.channel_line.excess, kChannelLine},
       {"belt_passage", belt_line(engine.campaign(), out.belt_Hz), kBeltLine},
@@ -191,7 +208,8 @@ Unexplained what_is_left(const Criticism& criticism, bool has_balance) {
         [&](const Cell& cell) { return may_be_scatter(cell, criticism, has_balance); });
     best = found == criticism.cells.end() ? nullptr : &*found;
   }
-  if (stands_out || (scatters && best != nullptr)) {
+  if (!stands_out && best == nullptr && fails("own_shape")) best = &*criticism.own;
+  if (stands_out || ((scatters || fails("own_shape")) && best != nullptr)) {
     out.acts_on = best->injection->acts_on;
     out.depends_on = {best->abscissa.variable->name};
     out.share = best->share;
