@@ -305,6 +305,7 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
       if (id_of(engine, ranked[i].second) != id_of(engine, out.slot) &&
           other.log_evidence > whole.log_evidence - std::log(kClassOdds)) {
         out.aliases.push_back(ranked[i].second);
+        if (credible(engine, other)) out.in_its_place.push_back(other);
       }
     }
     std::vector<double> all{without.log_evidence};

@@ -19,8 +19,9 @@ struct Accepted {
   double stability = 0.0;  // share of the fits without one experiment in which it is there, 95 %
   double chi2 = 0.0;
   double probability = 0.0;
-  double ln_odds = 0.0;        // against its not being there, nor anything in its place
-  std::vector<int> aliases;    // slots of other effects that fit as well
+  double ln_odds = 0.0;                  // against its not being there, nor anything in its place
+  std::vector<int> aliases;              // slots of other effects that fit as well
+  std::vector<Hypothesis> in_its_place;  // with each of these instead
   double left_out_gain = 0.0;  // of the log predictive density of experiments left out of the fit
 };
 

@@ -305,6 +305,7 @@ class Run {
     fill_findings(engine, named ? naming.accepted : std::vector<Accepted>(), naming, gain);
     fill_learned(engine, naming, learning, gain);
     judge(engine, naming, learning, named);
+    count_unexplained(engine, learning.left);
     propose(engine, naming, learning);
     answer_.extended = request_.model;
     store_learned();
@@ -418,6 +419,66 @@ class Run {
     if (!out().complete) out().unexplained.reset();
   }
 
+  // What is left unexplained stands in the level of the friction as well: which of the experiments,
+  // or which value of what it follows, is the machine's own cannot be said.
+  void count_unexplained(const Engine& engine, const Criticism& left) {
+    const auto mu_max = out().machine.find("mu_max");
+    if (!out().unexplained || left.tests.empty() || mu_max == out().machine.end()) return;
+    const Scatter scatter = engine.scatter();
+    if (is_beyond_scatter(scatter)) {
+      out().machine.erase(mu_max);
+      out().notes.emplace_back(
+          "mu_max: experiments differ by more than friction scatters, for no reason found; no "
+          "value");
+      return;
+    }
+    double variance = 0.0;
+    const auto fails = [&](const char* name) { return !left.test(name).passed(); };
+    if (fails("scatter_friction") || fails("unusual_friction")) variance += scatter.variance[0];
+    if (fails("law_cell") || fails("smooth_cell")) variance += friction_variance(engine, left);
+    Interval& told = mu_max->second;
+    const double half = std::hypot(0.5 * std::log(told.high / told.low),
+                                   estimator::kNormal95 * std::sqrt(variance));
+    told.low = told.value * std::exp(-half);
+    told.high = told.value * std::exp(half);
+  }
+
+  // What the function that stands out comes to in the friction, relative, about its mean.
+  static double friction_variance(const Engine& engine, const Criticism& left) {
+    const Cell& cell = left.cells.front();
+    double per_unit = 0.0;
+    switch (cell.injection->injection) {
+      case Injection::kFriction:
+      case Injection::kTorqueGain:
+        per_unit = cell.injection->unit;
+        break;
+      case Injection::kTorque:
+        per_unit = cell.injection->unit / typical(engine, &ExperimentData::torque);
+        break;
+      case Injection::kClampForce:
+        per_unit = cell.injection->unit / (engine.campaign().variator.secondary_piston_area_m2 *
+                                           typical(engine, &ExperimentData::pressure));
+        break;
+      case Injection::kRatio:
+        return 0.0;
+    }
+    const Eigen::ArrayXd off = cell.mean.array() - cell.mean.mean();
+    return per_unit * per_unit * off.square().mean();
+  }
+
+  // Mean magnitude of a channel over the samples that count.
+  static double typical(const Engine& engine, GridSignal ExperimentData::*channel) {
+    double sum = 0.0, count = 1e-9;
+    for (const ExperimentData& run : engine.campaign().runs) {
+      for (int k = 0; k < run.size(); ++k) {
+        if (!run.valid[static_cast<std::size_t>(k)]) continue;
+        sum += std::abs((run.*channel).value[k]);
+        count += 1.0;
+      }
+    }
+    return std::max(sum / count, 1e-9);
+  }
+
   // Beyond doubt, and by more than two machines of one type do.
   static bool differs(double off, double sigma, double tolerance) {
     constexpr double kSure = 5.0;  // chosen, sigmas: of some twenty constants none by chance
@@ -466,8 +527,25 @@ class Run {
       tell(low ? "peak_slip_low" : "peak_slip_overdrive", peak.ln_slip, peak.ln_slip_sigma,
            low ? kLnPeakSlipLow : kLnPeakSlipOverdrive);
       if (low && uses_stop(engine, kOverdriveStop)) continue;
-      tell("mu_max", peak.ln_mu, peak.ln_mu_sigma, kLnMuMax);
+      tell("mu_max", peak.ln_mu,
+           std::hypot(peak.ln_mu_sigma, mu_of_class(engine, naming, peak, stop)), kLnMuMax);
     }
+  }
+
+  // What another member of the class in a name's place would have mu_max differ by, one sigma: by
+  // their probabilities beside the name's.
+  static double mu_of_class(const Engine& engine, const Naming& naming, const FittedPeak& peak,
+                            int stop) {
+    double weights = 1.0, squares = 0.0;
+    for (const Accepted& each : naming.accepted) {
+      for (const Hypothesis& other : each.in_its_place) {
+        const double weight = std::exp(other.log_evidence - naming.hypothesis.log_evidence);
+        const double off = fitted_peak(engine, other, stop).ln_mu - peak.ln_mu;
+        weights += weight;
+        squares += weight * off * off;
+      }
+    }
+    return std::sqrt(squares / weights);
   }
 
   void tell_machine(const std::string& name, const Interval& fitted, double of_model,
