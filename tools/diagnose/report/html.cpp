@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "tools/diagnose/data/baseline_tests.h"
 #include "tools/diagnose/report/finding_words.h"
 #include "tools/diagnose/report/json.h"
 
@@ -128,28 +129,37 @@ void add_learned(report::HtmlPage& page, const Diagnosis& d) {
   page.table({"learned", "signal, SI", "before", "after", "difference (95 %)"}, rows);
 }
 
-// p-values; what chance does once in a thousand tests counts as a failure.
+// p-values; what chance does in one of a thousand campaigns counts as a failure.
 void add_tests(report::HtmlPage& page, const Diagnosis& d) {
-  constexpr double kFails = 1e-3, kShown = 1e-12;
+  constexpr double kShown = 1e-12;
+  const BaselineTests all = baseline_tests(d.baseline);
+  if (all.count == 0) return;
   std::vector<std::string> head{"its residual"};
   std::map<std::string, std::vector<std::string>> cells;
-  int count = 0, failed = 0;
+  int failed = 0;
   for (const auto& [name, signal] : d.baseline) {
     for (const auto& [test, p] : signal.tests) {
       std::vector<std::string>& row = cells[test];
       row.resize(head.size() - 1);
-      row.push_back((p < kFails ? "fails, p " : "p ") + (p < kShown ? "< 1e-12" : short_number(p)));
-      ++count;
-      if (p < kFails) ++failed;
+      const bool fails = all.fails(p);
+      row.push_back((fails ? "fails, p " : "p ") + (p < kShown ? "< 1e-12" : short_number(p)));
+      if (fails) ++failed;
     }
     head.push_back(name);
   }
-  if (count == 0) return;
+  const std::string least = "p " + short_number(all.least_p) + ", the smallest of " +
+                            std::to_string(all.count) + ", chance gives in " +
+                            short_number(100.0 * all.by_chance(all.least_p)) +
+                            " % of healthy campaigns";
   page.paragraph(
       "The scatter between experiments of a healthy machine lies beyond the noise, too. Tests of "
       "these residuals, with that scatter and the noise's autocorrelation counted: " +
-      std::to_string(failed) + " of " + std::to_string(count) +
-      " fail (p below 0.001). An empty cell: these data cannot show it there.");
+      (failed == 0
+           ? "none fails (" + least + ")"
+           : std::to_string(failed) + " of " + std::to_string(all.count) +
+                 " fail beyond what chance does among so many in 0.1 % of healthy campaigns") +
+      ". The verdict rests on the tests of what the findings leave, whose limits healthy campaigns "
+      "set. An empty cell: these data cannot show it there.");
   Rows rows;
   for (auto& [test, row] : cells) {
     const bool plain = test == "whiteness" || test.starts_with("order_spectrum");

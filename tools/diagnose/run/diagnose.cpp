@@ -7,6 +7,7 @@
 #include "estimator/physics/clamp_force.h"
 #include "estimator/statistics/distributions.h"
 #include "estimator/statistics/interval.h"
+#include "tools/diagnose/data/baseline_tests.h"
 #include "tools/diagnose/decide/criticism.h"
 #include "tools/diagnose/decide/learn.h"
 #include "tools/diagnose/decide/namer.h"
@@ -596,6 +597,15 @@ class Run {
         if (test.acts_on == acts_on) signal.tests[test.name] = test.p;
       }
       out().baseline[name] = signal;
+    }
+    // Small by itself, and nothing among so many: said, so that nobody takes it for a
+    // contradiction.
+    const BaselineTests all = baseline_tests(out().baseline);
+    if (all.count > 0 && all.least_p < kNoChance && !all.fails(all.least_p)) {
+      out().notes.push_back(
+          "of " + std::to_string(all.count) + " tests of the residuals the smallest p is " +
+          text_of(all.least_p) + " (" + all.signal + ", " + all.test + "), which chance gives in " +
+          text_of(100.0 * all.by_chance(all.least_p)) + " % of healthy campaigns");
     }
   }
 
