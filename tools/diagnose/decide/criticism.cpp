@@ -208,7 +208,7 @@ Unexplained what_is_left(const Criticism& criticism, bool has_balance) {
         [&](const Cell& cell) { return may_be_scatter(cell, criticism, has_balance); });
     best = found == criticism.cells.end() ? nullptr : &*found;
   }
-  if (!stands_out && best == nullptr && fails("own_shape")) best = &*criticism.own;
+  if (!stands_out && best == nullptr && criticism.own && fails("own_shape")) best = &*criticism.own;
   if (stands_out || ((scatters || fails("own_shape")) && best != nullptr)) {
     out.acts_on = best->injection->acts_on;
     out.depends_on = {best->abscissa.variable->name};

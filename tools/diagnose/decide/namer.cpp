@@ -11,6 +11,7 @@
 #include "tools/diagnose/decide/unknown.h"
 #include "tools/diagnose/infer/gain.h"
 #include "tools/diagnose/infer/parallel.h"
+#include "tools/diagnose/infer/scatter_base.h"
 #include "tools/diagnose/infer/uncertainty.h"
 
 namespace beltgrip::diagnose {
@@ -137,19 +138,25 @@ bool bends_machine(const Engine& engine, const Hypothesis& h) {
   return off(h.state) > std::max(kTolerances, off(engine.state()) + 1.0);
 }
 
-// A size that no machine has is one where the data do not hold the fit; one far below the usual is
-// of no consequence, however sure; a value that is held from one sample to the next is late by half
-// the time between them, and one held from one step to the next is off by half a step; no tilt
-// shows at one torque.
+// One far below the usual is of no consequence, however sure; a value that is held from one sample
+// to the next is late by half the time between them, and one held from one step to the next is off
+// by half a step.
+bool of_consequence(const Engine& engine, int slot, double size) {
+  const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
+  return std::abs(size) >= kHeld * sample_period_s(engine.campaign(), which) &&
+         std::abs(size) >= half_step(engine.campaign(), which) &&
+         std::abs(size) > kOfConsequence * which.row->typical;
+}
+
+// A size that no machine has is one where the data do not hold the fit; no tilt shows at one
+// torque.
 bool credible(const Engine& engine, int slot, double size) {
   const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
   const EffectRow& row = *which.row;
-  const double share = std::abs(size) / row.typical;
-  if (std::abs(size) < kHeld * sample_period_s(engine.campaign(), which)) return false;
-  if (std::abs(size) < half_step(engine.campaign(), which)) return false;
+  if (!of_consequence(engine, slot, size)) return false;
   if (row.id == "radius_tilt" && !engine.campaign().torque_varies) return false;
   const double whole = engine.campaign().switched_on[slot] + size;
-  return share > kOfConsequence && share < kBelievable && whole < row.high &&
+  return std::abs(size) / row.typical < kBelievable && whole < row.high &&
          (whole > row.low || row.low == 0.0);
 }
 
@@ -232,9 +239,21 @@ bool is_in_curve(const Naming& naming, int slot) {
          });
 }
 
-// What cannot be itself says nothing against a name that is there beside it as well: it is in the
-// place of another cause.
-bool stands_beside(const Engine& engine, const Hypothesis& rival, int slot) {
+// All experiments are the same ramp.
+bool repeats_one(const Campaign& campaign) {
+  const std::vector<int> groups = replicate_groups(campaign);
+  for (std::size_t e = 0; e < groups.size(); ++e) {
+    if (campaign.runs[e].valid_count > 0 && groups[e] != 0) return false;
+  }
+  return true;
+}
+
+// A cause that is too small to be a name, or that no machine has, says nothing against one that is
+// there beside it as well: it is in the place of another. Where all experiments repeat one ramp,
+// what no machine has may be several constants of the machine at once, and says that nothing holds.
+bool stands_beside(const Engine& engine, const Hypothesis& rival, int of_rival, int slot) {
+  const bool is_too_small = !of_consequence(engine, of_rival, rival.state.effects[of_rival]);
+  if (!is_too_small && (credible(engine, rival) || repeats_one(engine.campaign()))) return false;
   const Hypothesis both = engine.refine_from(rival.state, plus(rival.slots, slot));
   return both.log_evidence > rival.log_evidence + std::log(kThereOdds) &&
          credible(engine, slot, both.state.effects[slot]);
@@ -297,8 +316,8 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
         promoted = Promotion{other, ranked[i].second, out.slot};
       }
       if (is_in_curve(naming, ranked[i].second)) continue;  // never a name
-      if (other.log_evidence > whole.log_evidence && !credible(engine, other) &&
-          stands_beside(engine, other, out.slot)) {
+      if (other.log_evidence > whole.log_evidence &&
+          stands_beside(engine, other, ranked[i].second, out.slot)) {
         continue;
       }
       evidence[id_of(engine, ranked[i].second)].push_back(other.log_evidence);
