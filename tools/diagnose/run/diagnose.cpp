@@ -425,7 +425,7 @@ class Run {
   void count_unexplained(const Engine& engine, const Criticism& left) {
     const auto mu_max = out().machine.find("mu_max");
     if (!out().unexplained || left.tests.empty() || mu_max == out().machine.end()) return;
-    const Scatter scatter = engine.scatter();
+    const Scatter& scatter = engine.scatter();
     if (is_beyond_scatter(scatter)) {
       out().machine.erase(mu_max);
       out().notes.emplace_back(
