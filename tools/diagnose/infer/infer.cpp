@@ -96,7 +96,7 @@ std::array<std::vector<Whitening::Rest>, kResidualKinds> rests_of(const Campaign
   }
   const auto column = [&](int random, ResidualKind kind) -> const ArrayXd& {
     const std::size_t first = raw.columns.size() - kRandomEffects;
-    return raw.columns[first + static_cast<std::size_t>(random)][kind];
+    return raw.columns[first + static_cast<std::size_t>(random)][static_cast<std::size_t>(kind)];
   };
   const auto add = [&](const std::vector<Rest>& rests, ResidualKind kind, const ArrayXd& by) {
     if (by.size() == 0) return;
@@ -109,7 +109,7 @@ std::array<std::vector<Whitening::Rest>, kResidualKinds> rests_of(const Campaign
       all.by.conservativeResizeLike(VectorXd::Zero(end - all.first));
       all.by.tail(end - first) = by.segment(first, end - first);
     }
-    for (auto& [step, all] : by_step) out[kind].push_back(std::move(all));
+    for (auto& [step, all] : by_step) out[static_cast<std::size_t>(kind)].push_back(std::move(all));
   };
   add(data.rests_pressure, kFrictionResidual,
       column(kLevel, kFrictionResidual) * per_force *
