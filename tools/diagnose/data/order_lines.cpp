@@ -4,6 +4,7 @@
 #include <cmath>
 #include <complex>
 #include <limits>
+#include <numbers>
 #include <optional>
 
 namespace beltgrip::diagnose {
@@ -116,6 +117,21 @@ std::optional<double> left_of(const Piece& piece, double order) {
   return sum / static_cast<double>(piece.omega_rad_s.size());
 }
 
+// The same as whether left_of knows; for two sines instead of two of each sample where the kernel's
+// denominator alone says so: a sine is least at an end of what lies between 0 and pi.
+bool is_left(const Piece& piece, double order) {
+  const auto [least, most] =
+      std::minmax_element(piece.omega_rad_s.begin(), piece.omega_rad_s.end());
+  const double from = 0.5 * order * *least * piece.period_s;
+  const double to = 0.5 * order * *most * piece.period_s;
+  constexpr double kRounding = 1.0 + 1e-9;
+  const bool is_plain = from > 0.0 && to < std::numbers::pi &&
+                        (2.0 * each_side(piece.period_s) + 1.0) * (1.0 - kLeft) *
+                                std::min(std::sin(from), std::sin(to)) >
+                            kRounding;
+  return is_plain || left_of(piece, order).has_value();
+}
+
 std::vector<Piece> pieces_of(const Channel& speed) {
   std::vector<Piece> out;
   if (speed.t_s.size() < 100) return out;
@@ -164,7 +180,7 @@ struct Noise {
 Noise noise_about(const Piece& piece, double order) {
   Noise out;
   for (const double neighbour : kNeighbours) {
-    if (!left_of(piece, neighbour * order)) continue;
+    if (!is_left(piece, neighbour * order)) continue;
     out.mean += piece.power_at(neighbour * order);
     out.count += 1.0;
   }

@@ -1,6 +1,7 @@
 #include "tools/diagnose/data/spectral_lines.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 #include <numbers>
@@ -25,6 +26,55 @@ std::size_t bin_of(double frequency_Hz) {
   return static_cast<std::size_t>(std::lround(frequency_Hz / PooledSpectrum::kStep_Hz));
 }
 
+// Samples that turn at once: one sample's phases wait for each other, those of several do not. Each
+// sum takes them in their order, so that it is the same as of one at a time.
+class Turns {
+ public:
+  static constexpr std::size_t kMost = 8;
+  explicit Turns(std::size_t bins) : real_(bins), imaginary_(bins) {}
+
+  void add(double y, std::complex<double> turn) {
+    y_[count_] = y;
+    turn_real_[count_] = turn.real();
+    turn_imaginary_[count_] = turn.imag();
+    if (++count_ == kMost) take();
+  }
+  // Adds |sum|^2 / n of each bin.
+  void finish(double n, std::vector<double>& power) {
+    for (std::size_t i = count_; i < kMost; ++i) y_[i] = turn_real_[i] = turn_imaginary_[i] = 0.0;
+    if (count_ > 0) take();
+    for (std::size_t i = 0; i < power.size(); ++i) {
+      power[i] += (real_[i] * real_[i] + imaginary_[i] * imaginary_[i]) / n;
+    }
+  }
+
+ private:
+  void take() {
+    constexpr std::size_t kCount = kMost;
+    std::array<double, kCount> real, imaginary{};
+    real.fill(1.0);
+    for (std::size_t bin = 0; bin < real_.size(); ++bin) {
+      double sum_real = real_[bin], sum_imaginary = imaginary_[bin];
+      for (std::size_t i = 0; i < kCount; ++i) {
+        sum_real += y_[i] * real[i];
+        sum_imaginary += y_[i] * imaginary[i];
+      }
+      real_[bin] = sum_real;
+      imaginary_[bin] = sum_imaginary;
+      for (std::size_t i = 0; i < kCount; ++i) {
+        const double was = real[i];
+        real[i] = was * turn_real_[i] - imaginary[i] * turn_imaginary_[i];
+        imaginary[i] = was * turn_imaginary_[i] + imaginary[i] * turn_real_[i];
+      }
+    }
+    count_ = 0;
+  }
+
+  std::vector<double> real_, imaginary_;
+  std::array<double, kMost> y_{}, turn_real_{}, turn_imaginary_{};
+  std::size_t count_ = 0;
+};
+
 // Without its straight line, through Hann's window: of a course that goes on, little is left.
 void add_piece(const Channel& channel, std::size_t begin, std::size_t end,
                std::vector<double>& power) {
@@ -37,20 +87,15 @@ void add_piece(const Channel& channel, std::size_t begin, std::size_t end,
     ty += (channel.t_s[i] - t0) * (channel.value[i] - y0);
   }
   const double slope = tt > 0.0 ? ty / tt : 0.0;
-  std::vector<std::complex<double>> sums(power.size());
+  Turns turns(power.size());
   for (std::size_t i = begin; i < end; ++i) {
     const double t = channel.t_s[i] - channel.t_s[begin];
     const double angle = 2.0 * std::numbers::pi * PooledSpectrum::kStep_Hz * t;
     const double window = 0.5 - 0.5 * std::cos(angle);
     const double y = window * (channel.value[i] - y0 - slope * (channel.t_s[i] - t0));
-    const std::complex<double> turn = std::polar(1.0, -angle);
-    std::complex<double> phase = 1.0;
-    for (std::complex<double>& sum : sums) {
-      sum += y * phase;
-      phase *= turn;
-    }
+    turns.add(y, std::polar(1.0, -angle));
   }
-  for (std::size_t i = 0; i < power.size(); ++i) power[i] += std::norm(sums[i]) / n;
+  turns.finish(n, power);
 }
 
 }  // namespace
