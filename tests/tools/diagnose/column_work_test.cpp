@@ -67,5 +67,17 @@ TEST(Remembered, AsksOnceAndForgetsTheOldest) {
   EXPECT_EQ(ask(1.0), 4);
 }
 
+TEST(Remembered, AsksAnewWhereWhatItKnowsWillNotDo) {
+  const Remembered<int> memory(4);
+  const auto ask = [&](int answer, int least) {
+    return memory.of(
+        {1.0}, [&] { return answer; }, [&](int known) { return known >= least; });
+  };
+  EXPECT_EQ(ask(5, 0), 5);
+  EXPECT_EQ(ask(9, 5), 5);
+  EXPECT_EQ(ask(9, 6), 9);
+  EXPECT_EQ(ask(7, 6), 9);
+}
+
 }  // namespace
 }  // namespace beltgrip::diagnose

@@ -25,11 +25,14 @@ constexpr std::size_t kFromAfar = 5;  // of these, from afar
 constexpr double kPlain = 2.0;        // times the threshold: no chance
 constexpr double kFar = 1000.0;       // gain of a candidate: the machine alone is far from the data
 constexpr double kNearMax = 400.0;
+// Of the log evidence: what is less probable by so much adds nothing to a sum of doubles.
+constexpr double kNothingBeside = 40.0;
 constexpr std::size_t kNearest = 2;  // refitted however far: a shift is far from linear
 constexpr double kNear = 40.0;       // linear loss within which a refit may still reach the best
 constexpr int kEffectsMax = 3;
 constexpr int kStepsMax = 4;
 constexpr int kRounds = 3;
+constexpr int kSteps = 5;         // of a fit of a candidate
 constexpr int kSettling = 20;     // steps of a fit whose effects are settled
 constexpr int kGroupDegrees = 3;  // of a group of score_groups
 constexpr double kPromotedOdds = 3.0;
@@ -225,9 +228,10 @@ bool outlasts(const Engine& engine, const Hypothesis& best, const UnknownGroup& 
 
 // The better of both starts: the linear one may lead far along what the data hardly hold.
 Hypothesis refine_replacement(const Engine& engine, const Engine::Replacement& start,
-                              const std::vector<int>& slots) {
-  Hypothesis linear = engine.refine_from(start.state, slots);
-  Hypothesis beside = engine.refine_from(start.beside, slots);
+                              const std::vector<int>& slots, double worth) {
+  Hypothesis linear = engine.refine_from(start.state, slots, kSteps, worth);
+  Hypothesis beside =
+      engine.refine_from(start.beside, slots, kSteps, std::max(worth, linear.log_likelihood));
   return linear.log_likelihood > beside.log_likelihood ? linear : beside;
 }
 
@@ -291,7 +295,8 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
               [](const auto& a, const auto& b) { return a.first.gain > b.first.gain; });
     std::map<std::string_view, std::vector<double>> evidence;
     evidence[id_of(engine, out.slot)].push_back(whole.log_evidence);
-    const Hypothesis without = refine_replacement(engine, engine.replace(others, out.slot), others);
+    const Hypothesis without =
+        refine_replacement(engine, engine.replace(others, out.slot), others, Engine::kAnyWorth);
     const double loss = std::max(0.0, whole.log_likelihood - without.log_likelihood) * 2.0;
     std::size_t near = 0;
     while (
@@ -303,11 +308,12 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
     in_parallel(engine.jobs(), near, [&](std::size_t i) {
       if (stop()) return;
       const std::vector<int> rival = plus(others, ranked[i].second);
-      rivals[i] = refine_replacement(engine, ranked[i].first, rival);
+      rivals[i] =
+          refine_replacement(engine, ranked[i].first, rival, whole.log_evidence - kNothingBeside);
     });
     for (std::size_t i = 0; i < near; ++i) {
       const std::optional<Hypothesis>& rival = rivals[i];
-      if (!rival) continue;
+      if (!rival || rival->is_given_up()) continue;
       const Hypothesis& other = *rival;
       if (parts_experiments(without.fit.scatter, other.fit.scatter)) continue;
       const double bar = promoted ? promoted->hypothesis.log_evidence
@@ -345,7 +351,8 @@ void drop(Engine& engine, const Naming& naming, int slot) {
   start.learned = engine.state().learned;
   for (const int kept : fewer) start.effects[kept] = engine.state().effects[kept];
   const Hypothesis from_here = engine.refine(fewer);
-  const Hypothesis from_nominal = engine.refine_from(start, fewer);
+  const Hypothesis from_nominal =
+      engine.refine_from(start, fewer, kSteps, from_here.log_likelihood);
   engine.accept(from_here.log_likelihood > from_nominal.log_likelihood ? from_here : from_nominal);
   engine.update_noise();
 }
@@ -444,22 +451,27 @@ void drop_superfluous(Engine& engine, double threshold) {
   }
 }
 
-// From the linear estimate, and where that leaves the range of the linear, from the present.
+// From the linear estimate, and where that leaves the range of the linear, from the present. What
+// does not become worth it is given up.
 Hypothesis fitted(Engine& engine, const std::vector<Score>& scores, const Hypothesis& base,
-                  const std::vector<int>& candidate, bool afar) {
+                  const std::vector<int>& candidate, bool afar, double worth) {
   const auto score = std::find_if(scores.begin(), scores.end(), [&](const Score& each) {
     return each.slot == candidate.back() && each.far;
   });
   std::optional<ModelState> begin;
   if (score != scores.end()) begin = score->far;
-  Hypothesis h = engine.refine_from(begin ? *begin : engine.add(candidate).state, candidate);
+  Hypothesis h =
+      engine.refine_from(begin ? *begin : engine.add(candidate).state, candidate, kSteps, worth);
   const auto or_better = [&](Hypothesis other) {
     if (other.log_likelihood > h.log_likelihood) h = std::move(other);
   };
-  if (h.log_likelihood < base.log_likelihood) or_better(engine.refine(candidate));
-  if (afar) or_better(engine.refine_from_afar(candidate));
+  const auto better = [&] { return std::max(worth, h.log_likelihood); };
+  if (h.log_likelihood < base.log_likelihood) {
+    or_better(engine.refine(candidate, kSteps, better()));
+  }
+  if (afar) or_better(engine.refine_from_afar(candidate, better()));
   if (id_of(engine, candidate.back()) == "friction_ratio") {
-    or_better(engine.refine_from(with_one_curve(engine), candidate));
+    or_better(engine.refine_from(with_one_curve(engine), candidate, kSteps, better()));
   }
   return h;
 }
@@ -536,6 +548,8 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
                                  [](const Score& score) { return score.gain > kFar; });
     Hypothesis best;
     bool found = false;
+    const double gain_least = std::max(out.threshold, worth_beside(first_gain));
+    const double worth = base.log_likelihood + 0.5 * gain_least;
     const auto consider = [&](Hypothesis h) {
       const double gain = 2.0 * (h.log_likelihood - base.log_likelihood);
       for (const double chi2 : h.chi2) {
@@ -543,7 +557,7 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
       }
       if (!credible(engine, h)) return;
       if (parts_experiments(base.fit.scatter, h.fit.scatter)) return;
-      if (gain < std::max(out.threshold, worth_beside(first_gain))) return;
+      if (gain < gain_least) return;
       if (!found || h.log_evidence > best.log_evidence) {
         best = std::move(h);
         found = true;
@@ -556,11 +570,11 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
       std::vector<std::optional<Hypothesis>> fits(candidates.size());
       in_parallel(engine.jobs(), candidates.size(), [&](std::size_t i) {
         if (!stop())
-          fits[i] =
-              fitted(engine, scores, base, plus(set, candidates[i]), from_afar && i < kFromAfar);
+          fits[i] = fitted(engine, scores, base, plus(set, candidates[i]),
+                           from_afar && i < kFromAfar, worth);
       });
       for (std::optional<Hypothesis>& fit : fits) {
-        if (!fit) continue;
+        if (!fit || fit->is_given_up()) continue;
         consider(without_superfluous(engine, std::move(*fit), out.threshold));
       }
     };
@@ -579,7 +593,7 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
       const double single = 2.0 * (best.log_likelihood - base.log_likelihood);
       for (std::size_t i = 0; i < pairs.size() && i < 3 && !stop(); ++i) {
         if (pairs[i].first < single + out.threshold + worth_beside(single)) break;
-        consider(fitted(engine, scores, base, pairs[i].second, false));
+        consider(fitted(engine, scores, base, pairs[i].second, false, worth));
       }
     }
     const double gain = 2.0 * (best.log_likelihood - base.log_likelihood);

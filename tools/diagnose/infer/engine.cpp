@@ -26,12 +26,22 @@ constexpr int kAttempts = 10;          // to find a step that gains, each shorte
 constexpr double kLongStep = 0.05;     // in tolerances and usual sizes
 constexpr double kWorthwhile = 1.0;    // of the log likelihood
 constexpr double kNothingMore = 0.02;  // of the same, for a step: the end
-constexpr double kSameStep = 1e-3;     // apart by less of their length: both fail
-constexpr double kCurveFault = 0.1;    // one sigma of curve_faults()
-constexpr int kSettled = 20;           // steps, where all else stays
-constexpr double kReach = 3.0;         // chosen, tolerances: no healthy machine is farther off
-constexpr double kFarReach = 3.0;      // chosen, times: as far the equation is that of a far size
-constexpr double kSizePrior = 3.0;     // one sigma of an effect's size, in usual sizes
+// Of the same, by the linear: a step that promises less moves nothing by a twentieth of its sigma.
+constexpr double kPromisesNothing = 1e-3;
+// Times what the linear promises, which is no bound. Measured, of 238 fits of the 24 campaigns of
+// tools/DIAGNOSE.md that four times would give up: five reach what they have to, with 6.7 times at
+// most.
+constexpr double kBeyondPromise = 10.0;
+constexpr double kSameStep = 1e-3;   // apart by less of their length: both fail
+constexpr double kCurveFault = 0.1;  // one sigma of curve_faults()
+// Of two starts for the machine, at the last coarse look, by its noise. Measured, in the 24
+// campaigns of tools/DIAGNOSE.md: what came first in the end was behind by 6.9 at most.
+constexpr double kBehind = 8.0;     // of the log likelihood
+constexpr double kSamePlace = 0.1;  // chosen: sigmas
+constexpr int kSettled = 20;        // steps, where all else stays
+constexpr double kReach = 3.0;      // chosen, tolerances: no healthy machine is farther off
+constexpr double kFarReach = 3.0;   // chosen, times: as far the equation is that of a far size
+constexpr double kSizePrior = 3.0;  // one sigma of an effect's size, in usual sizes
 // Chosen, one sigma of what the form of friction over slip at the low end stop differs from that in
 // overdrive by, of what belts differ from each other by: it is the same belt on the same pulleys. A
 // curve of its own takes over what the friction itself differs by. A fifth less and a fifth more
@@ -67,6 +77,16 @@ void reweigh(const Campaign& campaign, const ModelState& state, Whitening& white
       }
     }
   }
+}
+
+// By how much the log likelihood would grow by a step if all were linear.
+double promise(const NormalEquations& equations, const Prior& prior, const VectorXd& step) {
+  const Index n = step.size();
+  const VectorXd slope =
+      -equations.total.topRightCorner(n, 1) + prior.precision.cwiseProduct(prior.pull);
+  const VectorXd bend =
+      equations.total.topLeftCorner(n, n) * step + prior.precision.cwiseProduct(step);
+  return slope.dot(step) - 0.5 * bend.dot(step);
 }
 
 // Of what only equality is asked.
@@ -223,8 +243,8 @@ std::vector<int> Engine::columns_of(const std::vector<int>& parameters) const {
 
 Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int>& parameters,
                                  const ModelState& start, const Whitening& whitening,
-                                 const Scatter& scatter, int iterations,
-                                 int scatter_iterations) const {
+                                 const Scatter& scatter, int iterations, int scatter_iterations,
+                                 double worth) const {
   VectorXd scales(static_cast<Index>(parameters.size()));
   for (Index j = 0; j < scales.size(); ++j) {
     scales[j] = scale(parameters[static_cast<std::size_t>(j)]);
@@ -272,6 +292,11 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
     }
     const Prior here = prior(parameters, best.state);
     const NormalEquations equations = normal_equations(best.summaries, columns, best.fit.scatter);
+    if (worth > best.objective) {
+      const VectorXd step = fit_linear(equations, here, best.fit.scatter).step;
+      best.given_up = best.objective + kBeyondPromise * promise(equations, here, step) < worth;
+      if (best.given_up) break;
+    }
     double gained = 0.0;
     bool moved = false;
     VectorXd failed = VectorXd::Zero(scales.size());  // the last step that did
@@ -280,6 +305,7 @@ Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int
       damped.precision += damping * diagonal;
       damped.pull = here.pull.cwiseProduct(here.precision).cwiseQuotient(damped.precision);
       const Fit step = fit_linear(equations, damped, best.fit.scatter);
+      if (promise(equations, here, step.step) < kPromisesNothing) break;
       if ((step.step - failed).norm() < kSameStep * failed.norm()) {
         damping = std::clamp(10.0 * damping, 1e-5, 1e6);
         continue;
@@ -334,6 +360,21 @@ void Engine::fit_machine() {
     std::vector<ModelState> way;
     Whitening whitening;
     double objective = 0.0;
+    MatrixXd information;  // on the constants, scaled
+  };
+  // The same measure for every start: no weights, scatter between experiments counted.
+  const Whitening plain = identity_whitening(campaign_);
+  const auto measure = [&](Attempt& attempt) {
+    const Optimum at =
+        minimise(coarse_.back(), nuisances_, attempt.last, plain, default_scatter(), 0, 0);
+    const auto n = static_cast<Index>(nuisances_.size());
+    attempt.objective = at.objective;
+    attempt.information = MatrixXd::Identity(n, n);
+    for (const Summary& each : at.summaries) attempt.information += each.aa.topLeftCorner(n, n);
+  };
+  const auto is_same_place = [&](const Attempt& a, const Attempt& b) {
+    const VectorXd apart = prior(nuisances_, a.last).pull - prior(nuisances_, b.last).pull;
+    return apart.dot(a.information * apart) < kSamePlace * kSamePlace;
   };
   constexpr std::array kPeaks{0.012, 0.02, 0.035};
   // From the coarsest look, where only what is usual holds the machine, and from one that the data
@@ -359,20 +400,34 @@ void Engine::fit_machine() {
       }
       attempt.way.push_back(state);
     }
-    for (const int iterations : {8, 6}) {
-      state =
-          minimise(campaign_, nuisances_, state, whitening, default_scatter(), iterations, 0).state;
-      reweigh(campaign_, state, whitening);
-    }
-    // The same measure for every start: no weights, scatter between experiments counted.
     attempt.last = state;
-    attempt.objective = minimise(coarse_.back(), nuisances_, state, identity_whitening(campaign_),
-                                 default_scatter(), 0, 0)
-                            .objective;
+    measure(attempt);
   }
-  const Attempt& best = *std::max_element(
-      attempts.begin(), attempts.end(),
-      [](const Attempt& a, const Attempt& b) { return a.objective < b.objective; });
+  // What lies behind here does not come first there, and what has come to the same place goes on as
+  // one.
+  const auto most =
+      std::max_element(attempts.begin(), attempts.end(), [](const Attempt& a, const Attempt& b) {
+        return a.objective < b.objective;
+      })->objective;
+  std::vector<Attempt*> finalists;
+  for (Attempt& attempt : attempts) {
+    const bool is_again =
+        std::any_of(finalists.begin(), finalists.end(),
+                    [&](const Attempt* other) { return is_same_place(*other, attempt); });
+    if (!(attempt.objective < most - kBehind) && !is_again) finalists.push_back(&attempt);
+  }
+  for (Attempt* const attempt : finalists) {
+    for (const int iterations : {8, 6}) {
+      attempt->last = minimise(campaign_, nuisances_, attempt->last, attempt->whitening,
+                               default_scatter(), iterations, 0)
+                          .state;
+      reweigh(campaign_, attempt->last, attempt->whitening);
+    }
+    measure(*attempt);
+  }
+  const Attempt& best = **std::max_element(
+      finalists.begin(), finalists.end(),
+      [](const Attempt* a, const Attempt* b) { return a->objective < b->objective; });
   state_ = best.last;
   first_ = best.first;
   way_ = best.way;
@@ -394,7 +449,7 @@ Nominal Engine::nominal_from(const ModelState& sharp) const {
   return out;
 }
 
-Hypothesis Engine::refine_from_afar(const std::vector<int>& slots) const {
+Hypothesis Engine::refine_from_afar(const std::vector<int>& slots, double worth) const {
   ModelState first = first_;
   first.learned = state_.learned;
   std::vector<double> question(slots.begin(), slots.end());
@@ -411,7 +466,7 @@ Hypothesis Engine::refine_from_afar(const std::vector<int>& slots) const {
             }
             return state;
           }),
-      slots, 8);
+      slots, 8, worth);
 }
 
 // Friction that the data reach: what is left above belongs to single samples.
@@ -703,22 +758,24 @@ void Engine::move(const std::vector<int>& parameters, const VectorXd& step, doub
   }
 }
 
-Hypothesis Engine::refine(const std::vector<int>& slots, int iterations) const {
-  return refine_from(state_, slots, iterations);
+Hypothesis Engine::refine(const std::vector<int>& slots, int iterations, double worth) const {
+  return refine_from(state_, slots, iterations, worth);
 }
 
 Hypothesis Engine::refine_from(const ModelState& from, const std::vector<int>& slots,
-                               int iterations) const {
+                               int iterations, double worth) const {
   std::vector<double> question{static_cast<double>(noise_version_), static_cast<double>(iterations),
                                static_cast<double>(accepted_.size())};
   question.insert(question.end(), base_.scatter.variance.begin(), base_.scatter.variance.end());
   question.insert(question.end(), slots.begin(), slots.end());
   append(from, question);
-  return hypotheses_.of(question, [&] { return fit_from(from, slots, iterations); });
+  return hypotheses_.of(
+      question, [&] { return fit_from(from, slots, iterations, worth); },
+      [&](const Hypothesis& known) { return known.given_up_below <= worth; });
 }
 
-Hypothesis Engine::fit_from(const ModelState& from, const std::vector<int>& slots,
-                            int iterations) const {
+Hypothesis Engine::fit_from(const ModelState& from, const std::vector<int>& slots, int iterations,
+                            double worth) const {
   Hypothesis out;
   out.slots = slots;
   ModelState start = from;
@@ -735,7 +792,8 @@ Hypothesis Engine::fit_from(const ModelState& from, const std::vector<int>& slot
   std::vector<int> columns(parameters.size());
   for (std::size_t i = 0; i < columns.size(); ++i) columns[i] = static_cast<int>(i);
   const Optimum optimum =
-      minimise(campaign_, parameters, start, whitening_, base_.scatter, iterations, 6);
+      minimise(campaign_, parameters, start, whitening_, base_.scatter, iterations, 6, worth);
+  if (optimum.given_up) out.given_up_below = worth;
   const ModelState& best = optimum.state;
   const Fit& fit = optimum.fit;
   const std::vector<Summary>& summaries = optimum.summaries;

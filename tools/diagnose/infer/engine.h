@@ -3,6 +3,8 @@
 // their likelihoods compare.
 #pragma once
 
+#include <cmath>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -20,6 +22,9 @@ struct Hypothesis {
   double log_evidence = 0.0;    // sizes integrated out
   std::vector<double> chi2;     // per slot: equivalent chi-square(1) of its being there
   std::vector<double> degrees;  // per slot: of freedom
+  // Not fitted to its end: it would not reach this log likelihood.
+  double given_up_below = -std::numeric_limits<double>::infinity();
+  bool is_given_up() const { return std::isfinite(given_up_below); }
 };
 
 // Of Score::in_curve. More: in these experiments the effect is no other thing than a friction curve
@@ -78,13 +83,16 @@ class Engine {
   // that may be the effect that is looked for, and with so much scatter nothing of it is seen.
   std::vector<Score> screen_with_usual_scatter() const;
   bool scatters_unusually() const;
-  // Full non-linear fit of a set of slots (all of them, accepted or not).
-  Hypothesis refine(const std::vector<int>& slots, int iterations = 5) const;
-  Hypothesis refine_from(const ModelState& start, const std::vector<int>& slots,
-                         int iterations = 5) const;
+  // Full non-linear fit of a set of slots (all of them, accepted or not). worth: a log likelihood
+  // that the caller has no use below.
+  static constexpr double kAnyWorth = -std::numeric_limits<double>::infinity();
+  Hypothesis refine(const std::vector<int>& slots, int iterations = 5,
+                    double worth = kAnyWorth) const;
+  Hypothesis refine_from(const ModelState& start, const std::vector<int>& slots, int iterations = 5,
+                         double worth = kAnyWorth) const;
   // The same from far away: coarse noise first, the machine's constants from where fit_machine
   // began.
-  Hypothesis refine_from_afar(const std::vector<int>& slots) const;
+  Hypothesis refine_from_afar(const std::vector<int>& slots, double worth = kAnyWorth) const;
   // Gain of twice the log likelihood of a set over the accepted one, linear, and its state.
   // Of `slots` in place of the accepted one `instead_of`, whose size goes back to zero.
   struct Replacement {
@@ -131,12 +139,13 @@ class Engine {
     Fit fit;
     double objective = 0.0;  // log likelihood with priors, at the state
     std::vector<Summary> summaries;
+    bool given_up = false;
   };
   // Levenberg-Marquardt on the marginal likelihood, scatter re-estimated on the way.
   // scatter_iterations 0: it stays, and the state alone is asked for.
   Optimum minimise(const Campaign& campaign, const std::vector<int>& parameters,
                    const ModelState& start, const Whitening& whitening, const Scatter& scatter,
-                   int iterations, int scatter_iterations) const;
+                   int iterations, int scatter_iterations, double worth = kAnyWorth) const;
   static constexpr int kScatterSteps = 8;
   // from: the fit without the slot; scatter_steps 0: by its scatter.
   std::vector<Score> screen(const Fit& from, int scatter_steps) const;
@@ -149,7 +158,8 @@ class Engine {
   // The matrices with the sizes of some accepted effects put back to zero.
   std::vector<Summary> summaries_without(const std::vector<int>& slots) const;
   double ln_mu_reached() const;
-  Hypothesis fit_from(const ModelState& from, const std::vector<int>& slots, int iterations) const;
+  Hypothesis fit_from(const ModelState& from, const std::vector<int>& slots, int iterations,
+                      double worth) const;
 
   int jobs_;
   Campaign campaign_;

@@ -114,7 +114,8 @@ void take_in(Engine& engine, const std::vector<LearnedTerm>& terms,
   ModelState there = here;
   engine.move(parameters, step, 1.0, there);
   const Hypothesis from_here = engine.refine_from(here, engine.accepted(), kSettling);
-  const Hypothesis from_there = engine.refine_from(there, engine.accepted(), kSettling);
+  const Hypothesis from_there =
+      engine.refine_from(there, engine.accepted(), kSettling, from_here.log_likelihood);
   engine.accept(from_there.log_likelihood > from_here.log_likelihood ? from_there : from_here);
   engine.update_noise();
 }

@@ -17,13 +17,14 @@ class Remembered {
  public:
   explicit Remembered(std::size_t most) : most_(most) {}
 
-  // question: all numbers that the answer depends on.
-  template <typename Find>
-  Answer of(const std::vector<double>& question, const Find& find) const {
+  // question: all numbers that the answer depends on. will_do: of a known answer; if not, anew.
+  template <typename Find, typename WillDo>
+  Answer of(const std::vector<double>& question, const Find& find, const WillDo& will_do) const {
     {
       const std::scoped_lock lock(kept_->mutex);
-      const auto found = std::find_if(kept_->all.begin(), kept_->all.end(),
-                                      [&](const auto& each) { return each.first == question; });
+      const auto found = std::find_if(kept_->all.begin(), kept_->all.end(), [&](const auto& each) {
+        return each.first == question && will_do(each.second);
+      });
       if (found != kept_->all.end()) return found->second;
     }
     Answer answer = find();
@@ -31,6 +32,10 @@ class Remembered {
     kept_->all.emplace_back(question, answer);
     if (kept_->all.size() > most_) kept_->all.pop_front();
     return answer;
+  }
+  template <typename Find>
+  Answer of(const std::vector<double>& question, const Find& find) const {
+    return of(question, find, [](const Answer&) { return true; });
   }
 
  private:
