@@ -82,8 +82,8 @@ Workplace* Screen::place_ = nullptr;
 
 // Ends in the first experiment, long before the log does, and stands still there.
 TEST_F(Screen, ShowsTheExperimentAt80x24) {
-  const Terminal terminal(*place_, command("--from 9 --duration 0.5; echo ENDED; cat"), 80, 24);
-  const std::string seen = terminal.wait_for("end of --duration, at 9.5 s");
+  const Terminal terminal(*place_, command("--from 11.5 --duration 0.5; echo ENDED; cat"), 80, 24);
+  const std::string seen = terminal.wait_for("end of --duration, at 12.0 s");
   for (const char* part :
        {"trace.log", "ramping", "excited", "primary_speed", "slip sigma*", "asked", "q quit"}) {
     EXPECT_TRUE(has(seen, part)) << part << "\n" << seen;
