@@ -329,31 +329,40 @@ TEST_F(Stops, AFloorThatHardlyFalls) {
 }
 
 // A belt of more friction than was expected may still come to its peak as the floor falls: for as
-// long as it slips by 0.6 % a second there.
+// long as it has slipped by 0.6 %/s over the last second.
 TEST_F(Stops, ABeltThatHoldsOnTheFloor) {
   struct Case {
-    double mu_star, slip_1_s;
-    bool ends;
+    double mu_star, slip_1_s, later_1_s;  // from 1.5 s on
+    Duration sample;
+    int ends_after_ms;  // 0: in 3 s not
   };
   for (const Case& c :
-       {Case{-0.1101, 0.0055, true}, Case{-0.1101, 0.0065, false}, Case{-0.1099, 0.0, false}}) {
+       {Case{-0.1101, 0.0055, 0.0055, kSample, 1000}, Case{-0.1101, 0.0065, 0.0065, kSample, 0},
+        Case{-0.11, 0.0, 0.0, kSample, 0}, Case{-0.1101, 0.012, 0.0, kSample, 2020},
+        Case{-0.1101, 0.0058, 0.0058, 7 * kMillisecond, 1050}}) {
     SetUp();
     now_.torque_Nm = -3.0;
     now_.mu_star = c.mu_star;
     now_.clamp_force_N = floor_N_ + 5.0;
     begin();
-    int ended = 0;
-    for (int i = 0; i <= 300 && ended == 0; ++i) {
-      now_.t += kSample;
-      if (i > 0) floor_N_ -= 0.25;
-      slip_share(c.slip_1_s * 5e-3 * i);
+    const double sample_s = seconds(c.sample);
+    int ended_ms = 0;
+    double slip = 0.0;
+    for (double t = 0.0; t <= 3.0 && ended_ms == 0; t += sample_s) {
+      now_.t += c.sample;
+      if (t > 0.0) {
+        floor_N_ -= 50.0 * sample_s;
+        slip += (t <= 1.5 ? c.slip_1_s : c.later_1_s) * sample_s;
+      }
+      slip_share(slip);
       request_.follow(now_, floor_N_, floor_N_ + 5.0);
-      if (request_.backup_stop() != StopReason::kNone) ended = i;
+      if (request_.backup_stop() != StopReason::kNone) {
+        ended_ms = static_cast<int>(std::lround(1e3 * t));
+      }
     }
-    EXPECT_EQ(ended > 0, c.ends) << c.mu_star << " " << c.slip_1_s;
-    if (!c.ends) continue;
-    EXPECT_EQ(ended, 200);
-    EXPECT_EQ(stop().reason, StopReason::kForceFloor);
+    EXPECT_EQ(ended_ms, c.ends_after_ms) << c.mu_star << " " << c.slip_1_s;
+    EXPECT_EQ(request_.backup_stop(),
+              c.ends_after_ms > 0 ? StopReason::kForceFloor : StopReason::kNone);
   }
 }
 
