@@ -32,7 +32,7 @@ struct Ramp {
 
 std::string number(double value) {
   char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.4g", value);
+  std::snprintf(buffer, sizeof buffer, "%.5g", value);
   return buffer;
 }
 
