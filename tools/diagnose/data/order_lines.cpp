@@ -124,6 +124,8 @@ bool is_left(const Piece& piece, double order) {
       std::minmax_element(piece.omega_rad_s.begin(), piece.omega_rad_s.end());
   const double from = 0.5 * order * *least * piece.period_s;
   const double to = 0.5 * order * *most * piece.period_s;
+  // Derived: far above the rounding of a sine, which must not call plain what left_of refuses; what
+  // lies within is asked of left_of, so that no such number changes an answer.
   constexpr double kRounding = 1.0 + 1e-9;
   const bool is_plain = from > 0.0 && to < std::numbers::pi &&
                         (2.0 * each_side(piece.period_s) + 1.0) * (1.0 - kLeft) *

@@ -30,18 +30,19 @@ std::size_t bin_of(double frequency_Hz) {
 // sum takes them in their order, so that it is the same as of one at a time.
 class Turns {
  public:
-  static constexpr std::size_t kMost = 8;
+  // Derived: the doubles of a cache line. Decides speed alone.
+  static constexpr std::size_t kAtOnce = 8;
   explicit Turns(std::size_t bins) : real_(bins), imaginary_(bins) {}
 
   void add(double y, std::complex<double> turn) {
     y_[count_] = y;
     turn_real_[count_] = turn.real();
     turn_imaginary_[count_] = turn.imag();
-    if (++count_ == kMost) take();
+    if (++count_ == kAtOnce) take();
   }
   // Adds |sum|^2 / n of each bin.
   void finish(double n, std::vector<double>& power) {
-    for (std::size_t i = count_; i < kMost; ++i) y_[i] = turn_real_[i] = turn_imaginary_[i] = 0.0;
+    for (std::size_t i = count_; i < kAtOnce; ++i) y_[i] = turn_real_[i] = turn_imaginary_[i] = 0.0;
     if (count_ > 0) take();
     for (std::size_t i = 0; i < power.size(); ++i) {
       power[i] += (real_[i] * real_[i] + imaginary_[i] * imaginary_[i]) / n;
@@ -50,18 +51,17 @@ class Turns {
 
  private:
   void take() {
-    constexpr std::size_t kCount = kMost;
-    std::array<double, kCount> real, imaginary{};
+    std::array<double, kAtOnce> real, imaginary{};
     real.fill(1.0);
     for (std::size_t bin = 0; bin < real_.size(); ++bin) {
       double sum_real = real_[bin], sum_imaginary = imaginary_[bin];
-      for (std::size_t i = 0; i < kCount; ++i) {
+      for (std::size_t i = 0; i < kAtOnce; ++i) {
         sum_real += y_[i] * real[i];
         sum_imaginary += y_[i] * imaginary[i];
       }
       real_[bin] = sum_real;
       imaginary_[bin] = sum_imaginary;
-      for (std::size_t i = 0; i < kCount; ++i) {
+      for (std::size_t i = 0; i < kAtOnce; ++i) {
         const double was = real[i];
         real[i] = was * turn_real_[i] - imaginary[i] * turn_imaginary_[i];
         imaginary[i] = was * turn_imaginary_[i] + imaginary[i] * turn_real_[i];
@@ -71,7 +71,7 @@ class Turns {
   }
 
   std::vector<double> real_, imaginary_;
-  std::array<double, kMost> y_{}, turn_real_{}, turn_imaginary_{};
+  std::array<double, kAtOnce> y_{}, turn_real_{}, turn_imaginary_{};
   std::size_t count_ = 0;
 };
 
