@@ -25,6 +25,12 @@ inline constexpr double kPromisedEnergy_J = 100.0;  // beyond the peak
 // which the estimator reads off the data.
 inline constexpr double kObservedSpeedShare = 0.5;  // of the least speed at the start
 
+// --- a crossing is reckoned before it is asked for (experiment/reachability) ---------------------
+// Of slip beyond the peak, where friction falls as steeply as must be survived. A crossing that
+// runs further is so near to not being caught at all that a little less force, friction or inertia
+// decides. Measured, with what noise hides: the table in reachability.cpp.
+inline constexpr double kCrossingSlipBeyond_share = 0.025;
+
 // --- the request ends itself (experiment/clamp_request) ------------------------------------------
 inline constexpr double kRequestSlip_share = 0.07;        // chosen: room to come back, at any speed
 inline constexpr double kRequestSlipBeyond_share = 0.02;  // chosen: past where friction was largest
@@ -73,6 +79,8 @@ static_assert(kRequestSlip_share < kMonitorSlipDebounced_share &&
               kMonitorSlip_share < kPromisedSlip_share);
 static_assert(kRequestSlipRateFrom_share < kRequestSlip_share &&
               kRequestSlipBeyond_share < kRequestSlip_share);
+static_assert(kRequestSlipBeyond_share < kCrossingSlipBeyond_share &&
+              kCrossingSlipBeyond_share < kPromisedSlip_share);
 static_assert(kRequestSlipRate_1_s < kMonitorSlipRate_1_s);
 static_assert(kRequestFast_m_s < kMonitorSlipSpeed_m_s);
 static_assert(kMonitorSlipSpeed_m_s < kPromisedSlipSpeed_m_s);

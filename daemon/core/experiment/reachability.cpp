@@ -9,7 +9,7 @@ namespace beltgrip::daemon {
 namespace {
 
 // Tried: below the least the energy of a slow crossing grows and its ramp outlasts the coast-down,
-// above the largest the slip on its way. Measured, with kExcursionMost
+// above the largest the slip on its way. Measured, with kCrossingSlipBeyond_share
 // 0.025 (campaign --seeds 3000 --from 920001 --nothing-wrong): a value from 123 of 192 peaks in
 // reach; with 3 %/s beside them from 109, and one break of G1. With 1.5 %/s beside them 79, 80, 45
 // of the 98 below instead of 81, 83, 45, and two of the five drives below slip.
@@ -17,16 +17,14 @@ constexpr std::array kSlipRates_1_s{0.025, 0.02};
 // A steep fall is seen early, a flat top late.
 constexpr double kSlipDetectableSteep_share = 0.003;
 constexpr double kSlipDetectableFlat_share = 0.008;
-// Measured, both together: how far behind the peak a steep fall is seen at the latest, of the noise
-// of the slip rate, and the slip beyond the peak that a crossing may be reckoned to come to. A
-// crossing that runs further is so near to not being caught at all that a little less force,
-// friction or inertia decides. In harsh noise 184 requests were ended 0.7 / 1.1 / 2.0 points
-// (median, 90, 99 %) behind the peak of belts that fall by 4e-3 to 8e-3 per percent (campaign from
-// 1300001). Values of 98 peaks in reach in lab / production / harsh noise (--seeds 1500 --from
-// 990001 --nothing-wrong), and how many of the five drives with nothing wrong slip that ever did
-// (952096, 952287, 1311979, 1312543, 1318431):
+// Measured, together with limits::kCrossingSlipBeyond_share: how far behind the peak a steep fall
+// is seen at the latest, of the noise of the slip rate. In harsh noise 184 requests were ended 0.7
+// / 1.1 / 2.0 points (median, 90, 99 %) behind the peak of belts that fall by 4e-3 to 8e-3 per
+// percent (campaign from 1300001). Values of 98 peaks in reach in lab / production / harsh noise
+// (--seeds 1500 --from 990001 --nothing-wrong), and how many of the five drives with nothing wrong
+// slip that ever did (952096, 952287, 1311979, 1312543, 1318431):
 //   kSlipDetectable_s  0.25   0.25   0.27   0.30   0.30   0.30   0.35   0.35   0.40   0.40
-//   kExcursionMost     0.018  0.025  0.021  0.021  0.023  0.025  0.025  0.028  0.025  0.05
+//   slip beyond        0.018  0.025  0.021  0.021  0.023  0.025  0.025  0.028  0.025  0.05
 //   lab                70     78     79     79     82     78     80     81     78     77
 //   production         70            78     78     78     81     83     83     78     77
 //   harsh              52            59     48     52     57     44     47     40     31
@@ -34,7 +32,6 @@ constexpr double kSlipDetectableFlat_share = 0.008;
 // (0.25 with 0.025, 0.30 with 0.025 and those of 0.40 before a request rode its floor for as long
 // as that falls.)
 constexpr double kSlipDetectable_s = 0.35;
-constexpr double kExcursionMost = 0.025;
 constexpr double kFlatFall = 0.05;  // of mu per unit of slip
 constexpr double kSlipSpan = 1.05;  // 1 + sigma, of the slip beyond the peak
 constexpr double kNotCaught = 1e9;
@@ -192,7 +189,7 @@ void CrossingSearch::try_corner() noexcept {
   tries_.peak_slip_detectable_share = std::min(
       tries_.peak_slip_max_share,
       limits_.energy_stop_J / (std::max(1.0, point_.torque_Nm * point_.omega_p_rad_s) * told_s));
-  if (tries_.dearest.slip_share < kExcursionMost &&
+  if (tries_.dearest.slip_share < limits::kCrossingSlipBeyond_share &&
       tries_.peak_slip_max_share > point_.peak_slip_share &&
       tries_.peak_slip_detectable_share > crossing_.peak_slip_detectable_share) {
     crossing_ = tries_;
@@ -202,7 +199,7 @@ void CrossingSearch::try_corner() noexcept {
 // By the last rate, the slowest: it runs on least.
 void CrossingSearch::deny() noexcept {
   const Excursion& cost = tries_.dearest;
-  if (cost.slip_share >= kExcursionMost) {
+  if (cost.slip_share >= limits::kCrossingSlipBeyond_share) {
     denied_ = {CrossingWall::kFall, 0.0, point_.fall};
     return;
   }
@@ -225,7 +222,7 @@ void CrossingSearch::step_fall() noexcept {
   if (fall_known()) return;
   const double share = 0.5 * (survived_ + lost_);
   const Excursion all = excursion_at(kSlipRates_1_s.back(), {.fault = fault_next_}, share);
-  const bool survives = all.slip_share < kExcursionMost;
+  const bool survives = all.slip_share < limits::kCrossingSlipBeyond_share;
   if (survives && !fault_next_) {
     fault_next_ = true;
     return;
