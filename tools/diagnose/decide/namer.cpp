@@ -33,7 +33,6 @@ constexpr double kNear = 40.0;       // linear loss within which a refit may sti
 constexpr int kEffectsMax = 3;
 constexpr int kStepsMax = 4;
 constexpr int kRounds = 3;
-constexpr int kSteps = 5;         // of a fit of a candidate
 constexpr int kSettling = 20;     // steps of a fit whose effects are settled
 constexpr int kGroupDegrees = 3;  // of a group of score_groups
 constexpr double kPromotedOdds = 3.0;
@@ -230,9 +229,9 @@ bool outlasts(const Engine& engine, const Hypothesis& best, const UnknownGroup& 
 // The better of both starts: the linear one may lead far along what the data hardly hold.
 Hypothesis refine_replacement(const Engine& engine, const Engine::Replacement& start,
                               const std::vector<int>& slots, double worth) {
-  Hypothesis linear = engine.refine_from(start.state, slots, kSteps, worth);
-  Hypothesis beside =
-      engine.refine_from(start.beside, slots, kSteps, std::max(worth, linear.log_likelihood));
+  Hypothesis linear = engine.refine_from(start.state, slots, Engine::kSteps, worth);
+  Hypothesis beside = engine.refine_from(start.beside, slots, Engine::kSteps,
+                                         std::max(worth, linear.log_likelihood));
   return linear.log_likelihood > beside.log_likelihood ? linear : beside;
 }
 
@@ -353,7 +352,7 @@ void drop(Engine& engine, const Naming& naming, int slot) {
   for (const int kept : fewer) start.effects[kept] = engine.state().effects[kept];
   const Hypothesis from_here = engine.refine(fewer);
   const Hypothesis from_nominal =
-      engine.refine_from(start, fewer, kSteps, from_here.log_likelihood);
+      engine.refine_from(start, fewer, Engine::kSteps, from_here.log_likelihood);
   engine.accept(from_here.log_likelihood > from_nominal.log_likelihood ? from_here : from_nominal);
   engine.update_noise();
 }
@@ -461,18 +460,18 @@ Hypothesis fitted(Engine& engine, const std::vector<Score>& scores, const Hypoth
   });
   std::optional<ModelState> begin;
   if (score != scores.end()) begin = score->far;
-  Hypothesis h =
-      engine.refine_from(begin ? *begin : engine.add(candidate).state, candidate, kSteps, worth);
+  Hypothesis h = engine.refine_from(begin ? *begin : engine.add(candidate).state, candidate,
+                                    Engine::kSteps, worth);
   const auto or_better = [&](Hypothesis other) {
     if (other.log_likelihood > h.log_likelihood) h = std::move(other);
   };
   const auto better = [&] { return std::max(worth, h.log_likelihood); };
   if (h.log_likelihood < base.log_likelihood) {
-    or_better(engine.refine(candidate, kSteps, better()));
+    or_better(engine.refine(candidate, Engine::kSteps, better()));
   }
   if (afar) or_better(engine.refine_from_afar(candidate, better()));
   if (id_of(engine, candidate.back()) == "friction_ratio") {
-    or_better(engine.refine_from(with_one_curve(engine), candidate, kSteps, better()));
+    or_better(engine.refine_from(with_one_curve(engine), candidate, Engine::kSteps, better()));
   }
   return h;
 }

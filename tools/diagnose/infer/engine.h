@@ -86,10 +86,11 @@ class Engine {
   // Full non-linear fit of a set of slots (all of them, accepted or not). worth: a log likelihood
   // that the caller has no use below.
   static constexpr double kAnyWorth = -std::numeric_limits<double>::infinity();
-  Hypothesis refine(const std::vector<int>& slots, int iterations = 5,
+  static constexpr int kSteps = 5;  // of a candidate's fit, beside those that settle
+  Hypothesis refine(const std::vector<int>& slots, int iterations = kSteps,
                     double worth = kAnyWorth) const;
-  Hypothesis refine_from(const ModelState& start, const std::vector<int>& slots, int iterations = 5,
-                         double worth = kAnyWorth) const;
+  Hypothesis refine_from(const ModelState& start, const std::vector<int>& slots,
+                         int iterations = kSteps, double worth = kAnyWorth) const;
   // The same from far away: coarse noise first, the machine's constants from where fit_machine
   // began.
   Hypothesis refine_from_afar(const std::vector<int>& slots, double worth = kAnyWorth) const;

@@ -214,9 +214,7 @@ double scatter_penalty(const RandomVector& variance) {
 }
 
 bool is_beyond_scatter(const Scatter& scatter) {
-  constexpr double kNearly = 0.99;
-  return scatter.variance[kLevel] >
-         kNearly * kScatterCap * kScatterCap * default_scatter().variance[kLevel];
+  return scatter.variance[kLevel] >= kScatterCap * kScatterCap * default_scatter().variance[kLevel];
 }
 
 bool parts_experiments(const Scatter& without, const Scatter& with) {
