@@ -27,6 +27,7 @@ constexpr double kFar = 1000.0;       // gain of a candidate: the machine alone 
 constexpr double kNearMax = 400.0;
 // Of the log evidence. Derived: e^-40 is a fiftieth of the last bit of a double (2^-52 = e^-36), so
 // that what is less probable by so much adds nothing to a sum; a larger number adds nothing either.
+// A fifth more or less: the same bytes in the 24 campaigns of tools/DIAGNOSE.md.
 constexpr double kNothingBeside = 40.0;
 constexpr std::size_t kNearest = 2;  // refitted however far: a shift is far from linear
 constexpr double kNear = 40.0;       // linear loss within which a refit may still reach the best
