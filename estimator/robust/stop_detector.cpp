@@ -37,20 +37,256 @@ Known torque_at_begin(const ExperimentRecord& record, double begin_s, const Know
                                               square(1.0 - share) * readings.variance};
 }
 
-}  // namespace
+// Of a moment's torque and of its derivative over tau = 0..1, the window from begin to end.
+struct Weights {
+  Eigen::Vector2d value;
+  Eigen::Vector2d derivative;  // by tau
+};
 
-StopDetector::Weights StopDetector::sensor_weights(double tau) noexcept {
-  return {{1.0, tau * tau}, {0.0, 0.0}};
-}
+Weights sensor_weights(double tau) noexcept { return {{1.0, tau * tau}, {0.0, 0.0}}; }
 
-StopDetector::Weights StopDetector::engine_weights(double tau) noexcept {
+Weights engine_weights(double tau) noexcept {
   const double rest = 1.0 - tau;
   return {{tau * rest * rest, tau * tau * rest},
           {1.0 - 4.0 * tau + 3.0 * tau * tau, 2.0 * tau - 3.0 * tau * tau}};
 }
 
+Eigen::Matrix3d slow_covariance(double window_s, Weights (*weights)(double) noexcept) noexcept {
+  // Each half of so many parts: the time before, then the window.
+  constexpr std::size_t kParts = 40;
+  const double faded = std::exp(-window_s / (kSlowTime_s * double{kParts}));
+  Eigen::Vector3d recent = Eigen::Vector3d::Zero();  // sum of earlier weights, faded
+  Eigen::Matrix3d out = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < 2 * kParts; ++i) {
+    Eigen::Vector3d w = Eigen::Vector3d::UnitX();
+    if (i >= kParts) {
+      const double tau = (static_cast<double>(i - kParts) + 0.5) / double{kParts};
+      w << 0.0, weights(tau).value;
+    }
+    w /= double{kParts};
+    recent *= faded;
+    out += w * w.transpose() + w * recent.transpose() + recent * w.transpose();
+    recent += w;
+  }
+  return out;
+}
+
+// The window up to now, and as long a time before it, in cells; the newest has age 0.
+struct Stretch {
+  const History& history;
+  std::size_t level = 0;
+  std::size_t cells = 0;  // of the window; 0: the record is too short
+  double cell_s = 0.0, count = 0.0, length_s = 0.0;
+
+  const Cell& cell(std::size_t age) const noexcept { return history.cell(level, age); }
+};
+
+Stretch stretch_of(const History& history, double window_s) noexcept {
+  Stretch out{history};
+  while (out.level + 1 < History::kLevels &&
+         history.cell_s(out.level) * static_cast<double>(StopDetector::kMostCells) < window_s) {
+    ++out.level;
+  }
+  out.cell_s = history.cell_s(out.level);
+  const auto cells = static_cast<std::size_t>(window_s / out.cell_s);
+  if (cells < 4 || history.size(out.level) < 2 * cells + 1) return out;
+  out.cells = cells;
+  out.count = static_cast<double>(cells);
+  out.length_s = out.cell_s * out.count;
+  return out;
+}
+
+// Slip around the window's begin and over its last quarter.
+struct Gain {
+  bool counts = false;  // it is more than noise and deformation
+  double begin_percent = 0.0, end_percent = 0.0, percent = 0.0;
+  double variance = 0.0;
+  double force_before_N = 0.0;
+};
+
+Gain gain_over(const ExperimentRecord& record, const Stretch& window) noexcept {
+  Gain out;
+  const std::size_t quarter = std::max<std::size_t>(1, window.cells / 4);
+  const double per_quarter = 1.0 / static_cast<double>(quarter);
+  for (std::size_t i = 0; i < quarter; ++i) {
+    out.begin_percent += window.cell(window.cells - quarter / 2 + i).slip_percent * per_quarter;
+    out.end_percent += window.cell(i).slip_percent * per_quarter;
+  }
+  out.percent = out.end_percent - out.begin_percent;
+  if (out.percent < kSmallestGain_percent) return out;  // most windows: no more is needed
+  double force_after_N = 0.0;
+  for (std::size_t i = 0; i < quarter; ++i) {
+    out.force_before_N += window.cell(window.cells - quarter / 2 + i).clamp_force_N * per_quarter;
+    force_after_N += record.clamp_force_N(window.cell(i)) * per_quarter;
+  }
+  // Deformation moves the slip by itself as the clamp force falls: that counts for nothing.
+  const double deformation_percent =
+      kPercent * kDeformationMost_1_N * std::abs(out.force_before_N - force_after_N);
+  if (out.percent < kSmallestGain_percent + deformation_percent) return out;
+  // A longer window is new less often in proportion, and may err more often in proportion. In a
+  // Gaussian's far tail: twice the logarithm of how much less often the window is a new one.
+  // While the noise itself is known from few data, Student's tail is as much longer (Wallace).
+  out.variance = 2.0 * record.slip_noise_percent2_s() * per_quarter / window.cell_s;
+  const double freedom = std::max(1.0, record.slip_noise_freedom());
+  const double normal_squared =
+      square(kInManyLooks) - 2.0 * std::log(window.length_s / kShortestWindow_s);
+  const double deviations_squared = freedom * std::expm1(normal_squared / freedom);
+  out.counts = !(square(out.percent) < deviations_squared * out.variance);
+  return out;
+}
+
+// What was before the window, over as long a time: torque and its turn, and what it is if the belt
+// goes on to carry what it is loaded with: of the line, of the readings, or between, by their
+// variances.
+struct Before {
+  double end_s = 0.0;
+  double force_N = 0.0;
+  double readings_Nm = 0.0, turn_Nm = 0.0;
+  double noise_Nm2_s = 0.0, density_Nm2_s = 0.0;
+  double variation_Nm2_s = 0.0;  // of the true torque, at this time scale
+  double line_share = 0.0;
+  double torque_Nm = 0.0, hold_variance = 0.0;
+};
+
+Before before_of(const ExperimentRecord& record, const Stretch& window,
+                 double force_before_N) noexcept {
+  Before out;
+  const std::size_t cells = window.cells;
+  out.end_s = window.cell(cells).t_s + 0.5 * window.cell_s;
+  for (std::size_t i = cells; i < 2 * cells; ++i) {
+    const double torque_Nm = window.cell(i).torque_Nm;
+    out.readings_Nm += torque_Nm / window.count;
+    out.turn_Nm += (2 * i + 1 < 3 * cells ? torque_Nm : -torque_Nm) / (0.5 * window.count);
+  }
+  const Line& force = record.force_line();
+  const Line& held = record.torque_line();
+  out.force_N = out.end_s >= force.begin_s ? force.at(out.end_s) : force_before_N;
+  out.noise_Nm2_s = record.torque_noise_Nm2_s();
+  out.density_Nm2_s = std::max(out.noise_Nm2_s, record.torque().density(window.length_s));
+  out.variation_Nm2_s = out.density_Nm2_s - out.noise_Nm2_s;
+  const double line_variance =
+      out.variation_Nm2_s / window.length_s + held.variance_at(record.duration_s()) + kTiny;
+  const double readings_variance = out.noise_Nm2_s / window.length_s + kTiny;
+  out.line_share =
+      out.end_s >= held.begin_s ? readings_variance / (readings_variance + line_variance) : 0.0;
+  out.hold_variance =
+      square(out.line_share) * line_variance + square(1.0 - out.line_share) * readings_variance;
+  out.torque_Nm = out.line_share * held.at(out.end_s) + (1.0 - out.line_share) * out.readings_Nm;
+  return out;
+}
+
+// The two weighted moments over the window, of the torque and of what it is in m_1 and k; and those
+// of k_hold.
+struct Sums {
+  Eigen::Vector2d torque = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d force = Eigen::Matrix2d::Zero();
+  double hold_top = 0.0, hold_bottom = 0.0;
+};
+
+Sums sums_over(const ExperimentRecord& record, const Stretch& window, const Before& before,
+               double slip_begin_percent, double inertia_kg_m2) noexcept {
+  Sums out;
+  const bool engine = inertia_kg_m2 > 0.0;
+  const Line& held = record.torque_line();
+  const double omega_reference_rad_s = window.cell(window.cells / 2).omega_p_rad_s;
+  for (std::size_t i = 0; i < window.cells; ++i) {
+    const Cell& cell = window.cell(window.cells - 1 - i);
+    const double tau = (static_cast<double>(i) + 0.5) / window.count;
+    const double F = record.clamp_force_N(cell);
+    const double x = cell.slip_percent - slip_begin_percent;
+    const Weights w = engine ? engine_weights(tau) : sensor_weights(tau);
+    if (engine) {
+      // - integral of w domega/dt = integral of dw/dt omega.
+      const double T =
+          before.line_share * held.at(cell.t_s) + (1.0 - before.line_share) * cell.torque_Nm;
+      out.torque += w.value * T + w.derivative * (inertia_kg_m2 / window.length_s *
+                                                  (cell.omega_p_rad_s - omega_reference_rad_s));
+    } else {
+      out.torque += w.value * cell.torque_Nm;
+    }
+    out.force.col(0) += w.value * F;
+    out.force.col(1) += w.value * (F * x);
+    out.hold_top += square(tau) * (1.0 - F / before.force_N);
+    out.hold_bottom += square(tau) * F * x;
+  }
+  return out;
+}
+
+// Of the torque's moments, as traction.
+Eigen::Matrix2d moment_noise(const ExperimentRecord& record, const Stretch& window,
+                             const Before& before, const StopDetector::Moments& moments, double c,
+                             double inertia_kg_m2) noexcept {
+  const bool engine = inertia_kg_m2 > 0.0;
+  const double share = before.line_share;
+  Eigen::Matrix2d out = moments.value * before.noise_Nm2_s;
+  if (engine) {
+    out = moments.derivative *
+              (square(inertia_kg_m2 / window.length_s) * record.omega_noise_rad2_s()) +
+          moments.value *
+              (square(share) * before.variation_Nm2_s + square(1.0 - share) * before.noise_Nm2_s);
+  }
+  out *= square(c) / window.cell_s;
+  if (engine) {
+    out += square(c * share) * record.torque_line().variance_at(record.duration_s()) * moments.sum *
+           moments.sum.transpose();
+  }
+  return out;
+}
+
+// What is known of m_1 from before.
+Known begin_by_engine(const ExperimentRecord& record, const Stretch& window, const Before& before,
+                      double c, double inertia_kg_m2) noexcept {
+  const std::size_t cells = window.cells;
+  const double length_s = window.length_s;
+  const double begin_rad_s = window.cell(cells).omega_p_rad_s;
+  const double rate_before =
+      (begin_rad_s - window.cell(2 * cells - 1).omega_p_rad_s) / (length_s - window.cell_s);
+  const double rate_after = (window.cell(0).omega_p_rad_s - begin_rad_s) / length_s;
+  Known m_1{c * before.torque_Nm / before.force_N, before.hold_variance};
+  m_1.value -= c * inertia_kg_m2 * rate_before / before.force_N;
+  m_1.variance += square(inertia_kg_m2) *
+                  (square(rate_after - rate_before) +
+                   12.0 * record.omega_noise_rad2_s() / (length_s * length_s * length_s));
+  m_1.variance *= square(c / before.force_N);
+  return m_1;
+}
+
+Known begin_by_sensor(const ExperimentRecord& record, const Stretch& window, const Before& before,
+                      double c) noexcept {
+  const double length_s = window.length_s;
+  const double mean_variance = before.density_Nm2_s / length_s;
+  const Known torque = torque_at_begin(record, before.end_s, {before.readings_Nm, mean_variance},
+                                       before.variation_Nm2_s / length_s);
+  Known m_1{c * torque.value / before.force_N, torque.variance};
+  m_1.variance += std::max(0.0, square(before.turn_Nm) - 4.0 * before.density_Nm2_s / length_s);
+  m_1.variance *= square(c / before.force_N);
+  return m_1;
+}
+
+// k, of what is known from before and of the two moments.
+Known slope_of(const Stretch& window, const Before& before, const Sums& sums, const Known& m_1,
+               const Eigen::Matrix2d& noise, double slow_variance, const Eigen::Matrix3d& slow,
+               double c) noexcept {
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  spread(0, 0) = m_1.variance;
+  spread.bottomRightCorner<2, 2>() = noise;
+  const Eigen::Vector3d per_Nm(c / before.force_N, c * window.count, c * window.count);
+  spread += slow_variance * per_Nm.asDiagonal() * slow * per_Nm.asDiagonal();
+  const Eigen::Vector2d traction = sums.torque * c;
+  const Eigen::Vector3d measured(m_1.value, traction(0), traction(1));
+  spread.diagonal() += kTiny * (measured.cwiseAbs2() + Eigen::Vector3d::Constant(kTiny));
+  Eigen::Matrix<double, 3, 2> known;
+  known << 1.0, 0.0, sums.force;
+  const Eigen::Matrix<double, 2, 3> weighted = known.transpose() * spread.inverse();
+  const Eigen::Matrix2d covariance = (weighted * known).inverse();
+  const Eigen::Vector2d right = weighted * measured;
+  return {(covariance * right)(1), covariance(1, 1)};
+}
+
+}  // namespace
+
 StopDetector::StopDetector() {
-  const auto fill = [](MomentTable& table, Weights (*weights)(double)) {
+  const auto fill = [](MomentTable& table, auto weights) {
     for (std::size_t n = 1; n < table.size(); ++n) {
       for (std::size_t i = 0; i < n; ++i) {
         const Weights w = weights((static_cast<double>(i) + 0.5) / static_cast<double>(n));
@@ -60,35 +296,16 @@ StopDetector::StopDetector() {
       }
     }
   };
-  fill(sensor_moments_, sensor_weights);
-  fill(engine_moments_, engine_weights);
+  fill(sensor_.moments, sensor_weights);
+  fill(engine_.moments, engine_weights);
   double window = kShortestWindow_s;
   for (double& w : window_s_) {
     w = window;
     window *= kWindowFactor;
   }
-  fill_slow(sensor_slow_, sensor_weights);
-  fill_slow(engine_slow_, engine_weights);
-}
-
-void StopDetector::fill_slow(SlowTable& table, Weights (*weights)(double)) const noexcept {
-  for (std::size_t window = 0; window < window_s_.size(); ++window) {
-    // Each half of so many parts: the time before, then the window.
-    constexpr std::size_t kParts = 40;
-    const double faded = std::exp(-window_s_[window] / (kSlowTime_s * double{kParts}));
-    Eigen::Vector3d recent = Eigen::Vector3d::Zero();  // sum of earlier weights, faded
-    table[window].setZero();
-    for (std::size_t i = 0; i < 2 * kParts; ++i) {
-      Eigen::Vector3d w = Eigen::Vector3d::UnitX();
-      if (i >= kParts) {
-        const double tau = (static_cast<double>(i - kParts) + 0.5) / double{kParts};
-        w << 0.0, weights(tau).value;
-      }
-      w /= double{kParts};
-      recent *= faded;
-      table[window] += w * w.transpose() + w * recent.transpose() + recent * w.transpose();
-      recent += w;
-    }
+  for (std::size_t i = 0; i < window_s_.size(); ++i) {
+    sensor_.slow[i] = slow_covariance(window_s_[i], sensor_weights);
+    engine_.slow[i] = slow_covariance(window_s_[i], engine_weights);
   }
 }
 
@@ -102,153 +319,39 @@ void StopDetector::reset(double traction_per_Nm_N, double inertia_kg_m2) noexcep
   level_slip_percent_ = level_until_s_ = 0.0;
 }
 
-// In one piece: in seven functions it took 206 instructions a sample more, of the 15,000 that
-// tests/instructions allows.
 StopDetector::Slope StopDetector::slope_over(const ExperimentRecord& record,
                                              std::size_t window) const noexcept {
   Slope out;
-  const double window_s = window_s_[window];
-  const History& history = record.history();
-  std::size_t level = 0;
-  while (level + 1 < History::kLevels &&
-         history.cell_s(level) * static_cast<double>(kMostCells) < window_s) {
-    ++level;
-  }
-  const double cell_s = history.cell_s(level);
-  const auto cells = static_cast<std::size_t>(window_s / cell_s);
-  if (cells < 4 || history.size(level) < 2 * cells + 1) return out;
-  const double n = static_cast<double>(cells);
-  const double W = cell_s * n;
-
-  // Slip around the window's begin and over its last quarter.
-  const std::size_t quarter = std::max<std::size_t>(1, cells / 4);
-  const double per_quarter = 1.0 / static_cast<double>(quarter);
-  double s_1 = 0.0, s_2 = 0.0;
-  for (std::size_t i = 0; i < quarter; ++i) {
-    s_1 += history.cell(level, cells - quarter / 2 + i).slip_percent * per_quarter;
-    s_2 += history.cell(level, i).slip_percent * per_quarter;
-  }
-  out.gained = s_2 - s_1;
-  if (out.gained < kSmallestGain_percent) return out;  // most windows: no more is needed
-  double force_before = 0.0, force_after = 0.0;
-  for (std::size_t i = 0; i < quarter; ++i) {
-    force_before += history.cell(level, cells - quarter / 2 + i).clamp_force_N * per_quarter;
-    force_after += record.clamp_force_N(history.cell(level, i)) * per_quarter;
-  }
-  // Deformation moves the slip by itself as the clamp force falls: that counts for nothing.
-  const double deformation = kPercent * kDeformationMost_1_N * std::abs(force_before - force_after);
-  if (out.gained < kSmallestGain_percent + deformation) return out;
-  // A longer window is new less often in proportion, and may err more often in proportion. In a
-  // Gaussian's far tail: twice the logarithm of how much less often the window is a new one.
-  // While the noise itself is known from few data, Student's tail is as much longer (Wallace).
-  const double gained_variance = 2.0 * record.slip_noise_percent2_s() * per_quarter / cell_s;
-  const double freedom = std::max(1.0, record.slip_noise_freedom());
-  const double normal_squared = square(kInManyLooks) - 2.0 * std::log(W / kShortestWindow_s);
-  const double gain_deviations_squared = freedom * std::expm1(normal_squared / freedom);
-  if (square(out.gained) < gain_deviations_squared * gained_variance) return out;
-
-  // What was before: torque and its turn over as long a time as the window, speed's slope.
-  const Cell& begin = history.cell(level, cells);
-  const double t_1 = begin.t_s + 0.5 * cell_s;
-  double torque_before = 0.0, torque_turn = 0.0;
-  for (std::size_t i = cells; i < 2 * cells; ++i) {
-    const double torque = history.cell(level, i).torque_Nm;
-    torque_before += torque / n;
-    torque_turn += (2 * i + 1 < 3 * cells ? torque : -torque) / (0.5 * n);
-  }
-  const Line& force = record.force_line();
-  const Line& held = record.torque_line();
-  const double F_1 = t_1 >= force.begin_s ? force.at(t_1) : force_before;
-  const double noise = record.torque_noise_Nm2_s();
-  const double density = std::max(noise, record.torque().density(W));
-  const double variation = density - noise;  // of the true torque, at this time scale
-  // Torque if it is held: of the line, of the readings, or between, by their variances.
-  const double line_variance = variation / W + held.variance_at(record.duration_s()) + kTiny;
-  const double readings_variance = noise / W + kTiny;
-  const double line_share =
-      t_1 >= held.begin_s ? readings_variance / (readings_variance + line_variance) : 0.0;
-  const double hold_variance =
-      square(line_share) * line_variance + square(1.0 - line_share) * readings_variance;
-  const double T_1 = line_share * held.at(t_1) + (1.0 - line_share) * torque_before;
-
-  Eigen::Matrix2d A = Eigen::Matrix2d::Zero();
-  Eigen::Vector2d y = Eigen::Vector2d::Zero();
-  double hold_top = 0.0, hold_bottom = 0.0;
+  const Stretch stretch = stretch_of(record.history(), window_s_[window]);
+  if (stretch.cells == 0) return out;
+  const Gain gain = gain_over(record, stretch);
+  if (!gain.counts) return out;
   const bool engine = inertia_kg_m2_ > 0.0;
-  const double omega_reference = history.cell(level, cells / 2).omega_p_rad_s;
-  for (std::size_t i = 0; i < cells; ++i) {
-    const Cell& cell = history.cell(level, cells - 1 - i);
-    const double tau = (static_cast<double>(i) + 0.5) / n;
-    const double F = record.clamp_force_N(cell);
-    const double x = cell.slip_percent - s_1;
-    const Weights w = engine ? engine_weights(tau) : sensor_weights(tau);
-    if (engine) {
-      // - integral of w domega/dt = integral of dw/dt omega.
-      const double T = line_share * held.at(cell.t_s) + (1.0 - line_share) * cell.torque_Nm;
-      y += w.value * T +
-           w.derivative * (inertia_kg_m2_ / W * (cell.omega_p_rad_s - omega_reference));
-    } else {
-      y += w.value * cell.torque_Nm;
-    }
-    A.col(0) += w.value * F;
-    A.col(1) += w.value * (F * x);
-    hold_top += square(tau) * (1.0 - F / F_1);
-    hold_bottom += square(tau) * F * x;
-  }
-  y *= c_;
-  const Moments& moments = engine ? engine_moments_[cells] : sensor_moments_[cells];
-  Eigen::Matrix2d N = moments.value * noise;
-  if (engine) {
-    N = moments.derivative * (square(inertia_kg_m2_ / W) * record.omega_noise_rad2_s()) +
-        moments.value * (square(line_share) * variation + square(1.0 - line_share) * noise);
-  }
-  N *= square(c_) / cell_s;
-  // What is known of m_1 from before.
-  double m_1 = c_ * T_1 / F_1;
-  double m_1_variance = hold_variance;
-  if (engine) {
-    N += square(c_ * line_share) * held.variance_at(record.duration_s()) * moments.sum *
-         moments.sum.transpose();
-    const double span = W - cell_s;
-    const double rate_before =
-        (begin.omega_p_rad_s - history.cell(level, 2 * cells - 1).omega_p_rad_s) / span;
-    const double rate_after = (history.cell(level, 0).omega_p_rad_s - begin.omega_p_rad_s) / W;
-    m_1 -= c_ * inertia_kg_m2_ * rate_before / F_1;
-    m_1_variance += square(inertia_kg_m2_) * (square(rate_after - rate_before) +
-                                              12.0 * record.omega_noise_rad2_s() / (W * W * W));
-  } else {
-    const Known torque = torque_at_begin(record, t_1, {torque_before, density / W}, variation / W);
-    m_1 = c_ * torque.value / F_1;
-    m_1_variance = torque.variance + std::max(0.0, square(torque_turn) - 4.0 * density / W);
-  }
-  m_1_variance *= square(c_ / F_1);
-  // Of what is known from before and of the two moments.
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  spread(0, 0) = m_1_variance;
-  spread.bottomRightCorner<2, 2>() = N;
-  const Eigen::Vector3d per_Nm(c_ / F_1, c_ * n, c_ * n);
-  spread += record.torque_slow_variance() * per_Nm.asDiagonal() *
-            (engine ? engine_slow_ : sensor_slow_)[window] * per_Nm.asDiagonal();
-  const Eigen::Vector3d seen(m_1, y(0), y(1));
-  spread.diagonal() += kTiny * (seen.cwiseAbs2() + Eigen::Vector3d::Constant(kTiny));
-  Eigen::Matrix<double, 3, 2> known;
-  known << 1.0, 0.0, A;
-  const Eigen::Matrix<double, 2, 3> weighted = known.transpose() * spread.inverse();
-  const Eigen::Matrix2d covariance = (weighted * known).inverse();
-  const Eigen::Vector2d right = weighted * seen;
-  out.k = (covariance * right)(1);
+  const WeightTables& tables = engine ? engine_ : sensor_;
+  const Before before = before_of(record, stretch, gain.force_before_N);
+  const Sums sums = sums_over(record, stretch, before, gain.begin_percent, inertia_kg_m2_);
+  const Known m_1 = engine ? begin_by_engine(record, stretch, before, c_, inertia_kg_m2_)
+                           : begin_by_sensor(record, stretch, before, c_);
+  const Eigen::Matrix2d noise =
+      moment_noise(record, stretch, before, tables.moments[stretch.cells], c_, inertia_kg_m2_);
+  const Known k = slope_of(stretch, before, sums, m_1, noise, record.torque_slow_variance(),
+                           tables.slow[window], c_);
 
-  const double mu_1 = c_ * T_1 / F_1;
-  const double gain_variance = gained_variance / square(out.gained);  // relative
-  const double force_variance = square(mu_1 * W / (F_1 * out.gained)) * force.slope_variance;
-  out.k_deviation = std::sqrt(covariance(1, 1) + square(out.k) * gain_variance + force_variance);
-  out.hold = mu_1 * F_1 * hold_top / hold_bottom;
+  const double F_1 = before.force_N;
+  const double mu_1 = c_ * before.torque_Nm / F_1;
+  const double gain_variance = gain.variance / square(gain.percent);  // relative
+  const double force_variance =
+      square(mu_1 * stretch.length_s / (F_1 * gain.percent)) * record.force_line().slope_variance;
+  out.gained = gain.percent;
+  out.k = k.value;
+  out.k_deviation = std::sqrt(k.variance + square(out.k) * gain_variance + force_variance);
+  out.hold = mu_1 * F_1 * sums.hold_top / sums.hold_bottom;
   out.hold_deviation = std::sqrt(square(out.hold) * gain_variance + force_variance +
-                                 square(c_ / (F_1 * out.gained)) * hold_variance);
-  out.slip_percent = s_2;
-  out.level =
-      kLevelElasticity * mu_1 / std::max(s_2 - smallest_slip_percent_, kLevelSlipLeast_percent);
-  out.duration_s = W;
+                                 square(c_ / (F_1 * gain.percent)) * before.hold_variance);
+  out.slip_percent = gain.end_percent;
+  out.level = kLevelElasticity * mu_1 /
+              std::max(gain.end_percent - smallest_slip_percent_, kLevelSlipLeast_percent);
+  out.duration_s = stretch.length_s;
   out.valid = std::isfinite(out.k) && std::isfinite(out.k_deviation) && out.level > 0.0;
   return out;
 }

@@ -32,6 +32,15 @@ namespace beltgrip::estimator {
 
 class StopDetector {
  public:
+  static constexpr std::size_t kMostCells = 40;  // in a window
+  // Sums over the cells of a window: of the weights, of their products, of those of their
+  // derivatives by tau. They depend on the number of cells only.
+  struct Moments {
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    Eigen::Matrix2d value = Eigen::Matrix2d::Zero();
+    Eigen::Matrix2d derivative = Eigen::Matrix2d::Zero();
+  };
+
   // c: cos(theta) / (2 R_p); inertia 0 where the torque of the belt is measured.
   StopDetector();
   void reset(double traction_per_Nm_N, double inertia_kg_m2) noexcept;
@@ -44,27 +53,14 @@ class StopDetector {
   double smallest_slip_percent() const noexcept { return smallest_slip_percent_; }
 
  private:
-  // Weighted over tau = 0..1, the window from begin to end.
-  struct Weights {
-    Eigen::Vector2d value;
-    Eigen::Vector2d derivative;  // by tau
-  };
-  static Weights sensor_weights(double tau) noexcept;
-  static Weights engine_weights(double tau) noexcept;
-  static constexpr int kWindows = 30;            // 0.12 s * 1.3^n: up to 4 min
-  static constexpr std::size_t kMostCells = 40;  // in a window
-  // Sums over the cells of a window: of the weights, of their products, of those of their
-  // derivatives by tau. They depend on the number of cells only.
-  struct Moments {
-    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-    Eigen::Matrix2d value = Eigen::Matrix2d::Zero();
-    Eigen::Matrix2d derivative = Eigen::Matrix2d::Zero();
-  };
+  static constexpr int kWindows = 30;  // 0.12 s * 1.3^n: up to 4 min
   using MomentTable = std::array<Moments, kMostCells + 1>;
-  // Covariance of the torque's slow error, where its variance is 1, in each window: of its mean
-  // over as long a time before, and of its two weighted means within.
-  using SlowTable = std::array<Eigen::Matrix3d, kWindows>;
-  void fill_slow(SlowTable& table, Weights (*weights)(double)) const noexcept;
+  struct WeightTables {
+    MomentTable moments;
+    // Covariance of the torque's slow error, where its variance is 1, in each window: of its mean
+    // over as long a time before, and of its two weighted means within.
+    std::array<Eigen::Matrix3d, kWindows> slow;
+  };
   struct Slope {
     bool valid = false;
     double gained = 0.0;
@@ -78,8 +74,7 @@ class StopDetector {
   void update_smallest_slip(const ExperimentRecord& record) noexcept;
   StopReason backup(const ExperimentRecord& record) const noexcept;
 
-  MomentTable sensor_moments_, engine_moments_;
-  SlowTable sensor_slow_, engine_slow_;
+  WeightTables sensor_, engine_;
   double c_ = 0.0;
   double inertia_kg_m2_ = 0.0;
   std::array<double, kWindows> window_s_{};
