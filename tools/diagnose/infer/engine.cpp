@@ -21,8 +21,12 @@ using Eigen::VectorXd;
 constexpr double kSaturatedPrecision = 50.0;
 // Chosen, of the noise. The first covers what any machine leaves: 0.04 Nm of noise, 12 Nm.
 constexpr std::array kCoarseness{300.0, 100.0, 30.0, 8.0, 2.0};
-constexpr double kCovered = 2.0;       // chosen: rms in units of noise that the eye tells from none
-constexpr int kAttempts = 10;          // to find a step that gains, each shorter than the last
+constexpr double kCovered = 2.0;  // chosen: rms in units of noise that the eye tells from none
+constexpr int kAttempts = 10;     // to find a step that gains, each shorter than the last
+// Of Levenberg and Marquardt, times the curvature.
+constexpr double kDampingFirst = 1e-4, kDampingLeast = 1e-5, kDampingMost = 1e6;
+constexpr double kDampingFactor = 10.0;
+constexpr double kShareLeast = 0.1;    // of a step: none is tried that is shorter
 constexpr double kLongStep = 0.05;     // in tolerances and usual sizes
 constexpr double kWorthwhile = 1.0;    // of the log likelihood
 constexpr double kNothingMore = 0.02;  // of the same, for a step: the end
@@ -93,6 +97,151 @@ double promise(const NormalEquations& equations, const Prior& prior, const Vecto
       equations.total.topLeftCorner(n, n) * step + prior.precision.cwiseProduct(step);
   return slope.dot(step) - 0.5 * bend.dot(step);
 }
+
+// Levenberg-Marquardt on the marginal likelihood of some parameters, scatter re-estimated on the
+// way where scatter_iterations is not 0.
+class Descent {
+ public:
+  Descent(const Engine& engine, const Campaign& campaign, const std::vector<int>& parameters,
+          const Whitening& whitening, int scatter_iterations)
+      : engine_(engine),
+        campaign_(campaign),
+        parameters_(parameters),
+        whitening_(whitening),
+        scatter_iterations_(scatter_iterations),
+        scales_(static_cast<Index>(parameters.size())),
+        columns_(parameters.size()) {
+    for (std::size_t j = 0; j < parameters.size(); ++j) {
+      scales_[static_cast<Index>(j)] = engine.scale(parameters[j]);
+      columns_[j] = static_cast<int>(j);
+    }
+  }
+
+  void begin(const ModelState& start, const Scatter& scatter) {
+    best_.state = start;
+    best_.fit.scatter = scatter;
+    at_ = residuals_at(start);
+    take_stand();
+  }
+  // False: no other step is of use. is_last: no other is taken.
+  bool step(double worth, bool is_last) {
+    const Prior here = engine_.prior(parameters_, best_.state);
+    const NormalEquations equations =
+        normal_equations(best_.summaries, columns_, best_.fit.scatter);
+    best_.given_up = worth > best_.objective && !can_reach(worth, equations, here);
+    if (best_.given_up) return false;
+    const double gained = try_dampings(equations, here);
+    const bool ends = gained < kNothingMore || is_last;
+    if (gained <= 0.0 || (ends && !with_fit())) return false;
+    take_stand();
+    return !ends;
+  }
+  Optimum optimum() && { return std::move(best_); }
+
+ private:
+  bool with_fit() const { return scatter_iterations_ > 0; }
+
+  std::vector<Residuals> residuals_at(const ModelState& state) const {
+    const std::vector<int>& used = engine_.used();
+    std::vector<Residuals> out(used.size());
+    in_parallel(engine_.jobs(), out.size(),
+                [&](std::size_t i) { out[i] = residuals_of(campaign_, used[i], state); });
+    return out;
+  }
+  std::vector<Summary> summaries_at(const ModelState& state, std::vector<Residuals>& at,
+                                    const std::vector<int>& wanted) const {
+    const std::vector<int>& used = engine_.used();
+    std::vector<Summary> out(used.size());
+    in_parallel(engine_.jobs(), out.size(), [&](std::size_t i) {
+      out[i] = summarise(campaign_, used[i], state, at[i], wanted, scales_, whitening_);
+    });
+    engine_.add_curve_bounds(state, wanted, out);
+    return out;
+  }
+  // Log likelihood of staying at a state.
+  double standing(const ModelState& state, const std::vector<Summary>& summaries,
+                  const Scatter& with) const {
+    const Prior here = engine_.prior(parameters_, state);
+    return log_likelihood(normal_equations(summaries, {}, with), with) -
+           0.5 * here.pull.cwiseAbs2().dot(here.precision);
+  }
+  // Matrices, fit and likelihood at the best state.
+  void take_stand() {
+    best_.summaries = summaries_at(best_.state, at_, parameters_);
+    if (with_fit()) {
+      best_.fit = fit_linear(best_.summaries, columns_, engine_.prior(parameters_, best_.state),
+                             best_.fit.scatter, scatter_iterations_);
+    }
+    best_.objective = standing(best_.state, best_.summaries, best_.fit.scatter);
+  }
+  bool can_reach(double worth, const NormalEquations& equations, const Prior& here) const {
+    const VectorXd step = fit_linear(equations, here, best_.fit.scatter).step;
+    return !(best_.objective + kBeyondPromise * promise(equations, here, step) < worth);
+  }
+
+  // More and more damped, until a step gains: by how much of the log likelihood. 0: none does.
+  double try_dampings(const NormalEquations& equations, const Prior& here) {
+    VectorXd diagonal = VectorXd::Zero(scales_.size());
+    for (const Summary& each : best_.summaries) {
+      diagonal += each.aa.diagonal().head(scales_.size());
+    }
+    VectorXd failed = VectorXd::Zero(scales_.size());  // the last step that did
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
+      Prior damped = here;
+      damped.precision += damping_ * diagonal;
+      damped.pull = here.pull.cwiseProduct(here.precision).cwiseQuotient(damped.precision);
+      const VectorXd step = fit_linear(equations, damped, best_.fit.scatter).step;
+      if (promise(equations, here, step) < kPromisesNothing) break;
+      if ((step - failed).norm() < kSameStep * failed.norm()) {
+        damp(kDampingFactor);
+        continue;
+      }
+      const auto [gained, share] = try_shares(step);
+      damp(gained > 0.0 && share == 1.0 ? 1.0 / kDampingFactor : kDampingFactor);
+      if (gained > 0.0) return gained;
+      failed = step;
+    }
+    return 0.0;
+  }
+  void damp(double factor) {
+    damping_ = std::clamp(factor * damping_, kDampingLeast, kDampingMost);
+  }
+
+  struct Tried {
+    double gained = 0.0, share = 1.0;
+  };
+  // The step, or a half or less of it, that gains most; the best state then is the one there.
+  Tried try_shares(const VectorXd& step) {
+    Tried out;
+    const ModelState from = best_.state;
+    // A long step for next to nothing has gone past what it was made for.
+    const bool is_long = step.cwiseAbs().maxCoeff() > kLongStep;
+    for (double share = 1.0; share > kShareLeast; share *= 0.5) {
+      ModelState next = from;
+      engine_.move(parameters_, step, share, next);
+      std::vector<Residuals> there = residuals_at(next);
+      const double gain =
+          standing(next, summaries_at(next, there, {}), best_.fit.scatter) - best_.objective;
+      if (gain <= out.gained) break;  // a shorter one gains less still
+      out = {gain, share};
+      best_.state = next;
+      at_ = std::move(there);
+      if (gain > kWorthwhile || !is_long) break;
+    }
+    return out;
+  }
+
+  const Engine& engine_;
+  const Campaign& campaign_;
+  const std::vector<int>& parameters_;
+  const Whitening& whitening_;
+  int scatter_iterations_;
+  VectorXd scales_;
+  std::vector<int> columns_;
+  Optimum best_;
+  std::vector<Residuals> at_;  // the best state
+  double damping_ = kDampingFirst;
+};
 
 // Of what only equality is asked.
 int next_version() {
@@ -246,108 +395,15 @@ std::vector<int> Engine::columns_of(const std::vector<int>& parameters) const {
   return out;
 }
 
-Engine::Optimum Engine::minimise(const Campaign& campaign, const std::vector<int>& parameters,
-                                 const ModelState& start, const Whitening& whitening,
-                                 const Scatter& scatter, int iterations, int scatter_iterations,
-                                 double worth) const {
-  VectorXd scales(static_cast<Index>(parameters.size()));
-  for (Index j = 0; j < scales.size(); ++j) {
-    scales[j] = scale(parameters[static_cast<std::size_t>(j)]);
+Optimum Engine::minimise(const Campaign& campaign, const std::vector<int>& parameters,
+                         const ModelState& start, const Whitening& whitening,
+                         const Scatter& scatter, int iterations, int scatter_iterations,
+                         double worth) const {
+  Descent descent(*this, campaign, parameters, whitening, scatter_iterations);
+  descent.begin(start, scatter);
+  for (int i = 0; i < iterations && descent.step(worth, i + 1 == iterations); ++i) {
   }
-  std::vector<int> columns(parameters.size());
-  for (std::size_t i = 0; i < columns.size(); ++i) columns[i] = static_cast<int>(i);
-  const auto residuals_at = [&](const ModelState& state) {
-    std::vector<Residuals> out(used_.size());
-    in_parallel(jobs_, out.size(),
-                [&](std::size_t i) { out[i] = residuals_of(campaign, used_[i], state); });
-    return out;
-  };
-  const auto summaries_at = [&](const ModelState& state, std::vector<Residuals>& at,
-                                const std::vector<int>& wanted) {
-    std::vector<Summary> out(used_.size());
-    in_parallel(jobs_, out.size(), [&](std::size_t i) {
-      out[i] = summarise(campaign, used_[i], state, at[i], wanted, scales, whitening);
-    });
-    add_curve_bounds(state, wanted, out);
-    return out;
-  };
-  // Log likelihood of staying at a state.
-  const auto standing = [&](const ModelState& state, const std::vector<Summary>& summaries,
-                            const Scatter& with) {
-    const Prior here = prior(parameters, state);
-    return log_likelihood(normal_equations(summaries, {}, with), with) -
-           0.5 * here.pull.cwiseAbs2().dot(here.precision);
-  };
-  Optimum best;
-  best.state = start;
-  std::vector<Residuals> at = residuals_at(start);
-  best.summaries = summaries_at(start, at, parameters);
-  best.fit.scatter = scatter;
-  const bool with_fit = scatter_iterations > 0;
-  if (with_fit) {
-    best.fit =
-        fit_linear(best.summaries, columns, prior(parameters, start), scatter, scatter_iterations);
-  }
-  best.objective = standing(start, best.summaries, best.fit.scatter);
-  double damping = 1e-4;
-  for (int i = 0; i < iterations; ++i) {
-    VectorXd diagonal = VectorXd::Zero(scales.size());
-    for (const Summary& each : best.summaries) {
-      diagonal += each.aa.diagonal().head(scales.size());
-    }
-    const Prior here = prior(parameters, best.state);
-    const NormalEquations equations = normal_equations(best.summaries, columns, best.fit.scatter);
-    if (worth > best.objective) {
-      const VectorXd step = fit_linear(equations, here, best.fit.scatter).step;
-      best.given_up = best.objective + kBeyondPromise * promise(equations, here, step) < worth;
-      if (best.given_up) break;
-    }
-    double gained = 0.0;
-    bool moved = false;
-    VectorXd failed = VectorXd::Zero(scales.size());  // the last step that did
-    for (int attempt = 0; attempt < kAttempts && !moved; ++attempt) {
-      Prior damped = here;
-      damped.precision += damping * diagonal;
-      damped.pull = here.pull.cwiseProduct(here.precision).cwiseQuotient(damped.precision);
-      const Fit step = fit_linear(equations, damped, best.fit.scatter);
-      if (promise(equations, here, step.step) < kPromisesNothing) break;
-      if ((step.step - failed).norm() < kSameStep * failed.norm()) {
-        damping = std::clamp(10.0 * damping, 1e-5, 1e6);
-        continue;
-      }
-      const ModelState from = best.state;
-      gained = 0.0;
-      double share = 1.0;
-      // A long step for next to nothing has gone past what it was made for.
-      const bool is_long = step.step.cwiseAbs().maxCoeff() > kLongStep;
-      for (double tried = 1.0; tried > 0.1; tried *= 0.5) {
-        ModelState next = from;
-        move(parameters, step.step, tried, next);
-        std::vector<Residuals> there = residuals_at(next);
-        const double gain =
-            standing(next, summaries_at(next, there, {}), best.fit.scatter) - best.objective;
-        if (gain <= gained) break;  // a shorter one gains less still
-        gained = gain;
-        share = tried;
-        best.state = next;
-        at = std::move(there);
-        if (gained > kWorthwhile || !is_long) break;
-      }
-      moved = gained > 0.0;
-      failed = step.step;
-      damping = std::clamp(moved && share == 1.0 ? 0.1 * damping : 10.0 * damping, 1e-5, 1e6);
-    }
-    const bool is_last = !moved || gained < kNothingMore || i + 1 == iterations;
-    if (!moved || (is_last && !with_fit)) break;
-    best.summaries = summaries_at(best.state, at, parameters);
-    if (with_fit) {
-      best.fit = fit_linear(best.summaries, columns, prior(parameters, best.state),
-                            best.fit.scatter, scatter_iterations);
-    }
-    best.objective = standing(best.state, best.summaries, best.fit.scatter);
-    if (is_last) break;
-  }
-  return best;
+  return std::move(descent).optimum();
 }
 
 void Engine::fit_machine() {

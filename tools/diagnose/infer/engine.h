@@ -54,6 +54,14 @@ struct Nominal {
   bool is_covered = true;  // the sensors' own noise does
 };
 
+struct Optimum {
+  ModelState state;
+  Fit fit;
+  double objective = 0.0;  // log likelihood with priors, at the state
+  std::vector<Summary> summaries;
+  bool given_up = false;
+};
+
 class Engine {
  public:
   // jobs: threads; the same result for any number.
@@ -137,13 +145,6 @@ class Engine {
             ModelState& state) const;
 
  private:
-  struct Optimum {
-    ModelState state;
-    Fit fit;
-    double objective = 0.0;  // log likelihood with priors, at the state
-    std::vector<Summary> summaries;
-    bool given_up = false;
-  };
   // Levenberg-Marquardt on the marginal likelihood, scatter re-estimated on the way.
   // scatter_iterations 0: it stays, and the state alone is asked for.
   Optimum minimise(const Campaign& campaign, const std::vector<int>& parameters,
