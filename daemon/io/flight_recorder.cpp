@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstdio>
 #include <cstring>
 #include <ctime>
@@ -16,6 +15,7 @@
 #include <utility>
 
 #include "can_dbc/log/can_log.h"
+#include "can_dbc/text/number_text.h"
 
 namespace beltgrip::daemon {
 
@@ -38,11 +38,6 @@ std::string plain_name(std::string name) {
   std::replace_if(
       name.begin(), name.end(), [](char c) { return c == '/' || c == ':'; }, '_');
   return name;
-}
-
-std::string number_text(double value) {
-  std::array<char, 32> digits;
-  return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
 }
 
 std::string stamp_text(std::int64_t t_ns) {

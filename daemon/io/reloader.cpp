@@ -1,8 +1,8 @@
 #include "daemon/io/reloader.h"
 
-#include <charconv>
 #include <utility>
 
+#include "can_dbc/text/number_text.h"
 #include "daemon/core/config/load/config_fingerprint.h"
 #include "daemon/core/config/load/config_reload.h"
 #include "daemon/core/config/load/load_config.h"
@@ -14,11 +14,6 @@ namespace beltgrip::daemon {
 namespace {
 
 std::string quoted(const std::string& text) { return '"' + text + '"'; }
-
-std::string shortest(double value) {
-  char digits[32];
-  return {digits, std::to_chars(digits, digits + sizeof digits, value).ptr};
-}
 
 // What a daemon holds as long as it lives; empty: nothing of it has changed.
 std::string needs_restart(const Config& running, const Config& found) {
@@ -43,8 +38,8 @@ std::string needs_restart(const Config& running, const Config& found) {
     return line("daemon.state_dir", quoted(found.state_dir), quoted(running.state_dir));
   }
   if (found.estimator.sample_rate_hz != running.estimator.sample_rate_hz) {
-    return line("estimator.sample_rate_hz", shortest(found.estimator.sample_rate_hz),
-                shortest(running.estimator.sample_rate_hz));
+    return line("estimator.sample_rate_hz", number_text(found.estimator.sample_rate_hz),
+                number_text(running.estimator.sample_rate_hz));
   }
   return {};
 }

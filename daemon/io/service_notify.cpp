@@ -2,9 +2,7 @@
 
 #include <systemd/sd-daemon.h>
 
-#include <array>
-#include <charconv>
-
+#include "can_dbc/text/number_text.h"
 #include "daemon/core/observe/event.h"
 #include "daemon/core/publish/names.h"
 
@@ -15,13 +13,6 @@ namespace {
 // Room for three missed turns before the service manager loses patience.
 constexpr int kFeedsPerPeriod = 4;
 
-std::string four_digits(double value) {
-  std::array<char, 32> text;
-  const auto end =
-      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed, 4).ptr;
-  return {text.data(), end};
-}
-
 }  // namespace
 
 std::string status_line(const Observation& observation) {
@@ -29,9 +20,9 @@ std::string status_line(const Observation& observation) {
   std::string line(state_name(report.state));
   const estimator::PeakEstimate& peak = report.result.peak;
   if (peak.kind == estimator::PeakKind::kValue) {
-    line += ", mu_max " + four_digits(peak.mu_max) + " +- " + four_digits(peak.mu_max_std);
+    line += ", mu_max " + fixed_text(peak.mu_max, 4) + " +- " + fixed_text(peak.mu_max_std, 4);
   } else if (peak.kind == estimator::PeakKind::kLowerBound) {
-    line += ", mu_max above " + four_digits(peak.mu_max);
+    line += ", mu_max above " + fixed_text(peak.mu_max, 4);
   } else {
     line += ", no result yet";
   }

@@ -1,12 +1,11 @@
 #include "tools/cli/dbc.h"
 
-#include <array>
-#include <charconv>
 #include <cinttypes>
 #include <cstdio>
 #include <memory>
 #include <string>
 
+#include "can_dbc/text/number_text.h"
 #include "can_dbc/text/printable.h"
 #include "tools/cli/dbc_decode.h"
 #include "tools/cli/dbc_encode.h"
@@ -49,11 +48,6 @@ std::string id_text(can::CanId id) {
   char text[16];
   std::snprintf(text, sizeof text, id.extended ? "0x%08" PRIX32 "x" : "0x%03" PRIX32, id.value);
   return text;
-}
-
-std::string number_text(double value) {
-  std::array<char, 32> text;
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
 }
 
 std::string type_text(can::ValueType type) {

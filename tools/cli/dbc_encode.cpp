@@ -1,7 +1,6 @@
 #include "tools/cli/dbc_encode.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <charconv>
 #include <cmath>
@@ -10,6 +9,7 @@
 
 #include "can_dbc/dbc/message_codec.h"
 #include "can_dbc/log/can_log.h"
+#include "can_dbc/text/number_text.h"
 #include "can_dbc/text/printable.h"
 #include "tools/cli/dbc_file.h"
 #include "tools/cli/failure.h"
@@ -30,11 +30,6 @@ struct Given {
 };
 
 [[noreturn]] void refuse(const std::string& text) { throw Failure{kUsage, text}; }
-
-std::string number_text(double value) {
-  std::array<char, 32> text;
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-}
 
 std::string names_of(const std::vector<can::SignalDef>& signals) {
   std::string names;

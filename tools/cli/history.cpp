@@ -1,7 +1,5 @@
 // beltgrip history: the experiments that a daemon has kept, and what they say together. Reads the
 // file and changes nothing, while the daemon runs or not; with --from it fills one from logs.
-#include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
@@ -15,6 +13,7 @@
 #include <vector>
 
 #include "can_dbc/text/format.h"
+#include "can_dbc/text/number_text.h"
 #include "daemon/core/publish/names.h"
 #include "daemon/io/carried_keeper.h"
 #include "daemon/io/history_db.h"
@@ -93,11 +92,8 @@ std::vector<Cell> cells(const HistoryRow& row) {
           text("fingerprint", row.fingerprint)};
 }
 
-std::string number_text(double value) {
-  if (!std::isfinite(value)) return {};
-  std::array<char, 32> digits;
-  return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
-}
+// Nothing where there is no value.
+std::string cell_text(double value) { return std::isfinite(value) ? number_text(value) : ""; }
 
 std::string json_lines(const History& history) {
   std::string out;
@@ -162,7 +158,7 @@ std::string csv(const History& history) {
     for (const Cell& cell : cells(row)) {
       if (!first) out += ',';
       first = false;
-      out += cell.is_text ? cell.text : number_text(cell.number);
+      out += cell.is_text ? cell.text : cell_text(cell.number);
     }
     out += '\n';
   }

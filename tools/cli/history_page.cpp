@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
+#include "can_dbc/text/format.h"
 #include "daemon/core/publish/names.h"
 #include "tools/report/html_page.h"
 #include "tools/text/snake_case.h"
@@ -18,10 +18,7 @@ using estimator::PeakKind;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 std::string number(const char* pattern, double value) {
-  if (!std::isfinite(value)) return {};
-  char buffer[64];
-  std::snprintf(buffer, sizeof buffer, pattern, value);
-  return buffer;
+  return std::isfinite(value) ? format(pattern, value) : "";
 }
 
 bool belongs(const daemon::HistoryRow& row, estimator::Direction direction,

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "can_dbc/text/format.h"
 #include "daemon/core/publish/names.h"
 #include "estimator/physics/least_loss.h"
 #include "tools/cli/command.h"
@@ -34,12 +35,6 @@ struct Options {
   bool quiet = false;
 };
 
-std::string number(const char* pattern, auto... values) {
-  char buffer[64];
-  std::snprintf(buffer, sizeof buffer, pattern, values...);
-  return buffer;
-}
-
 // What torque_reserve_Nm would cost least: shown, nothing chooses it.
 void add_least_loss(report::HtmlPage& page, const daemon::Config& config, const LastValue& value) {
   const estimator::VariatorParameters& variator = config.variator;
@@ -53,22 +48,22 @@ void add_least_loss(report::HtmlPage& page, const daemon::Config& config, const 
   page.heading("Reserve of least loss");
   page.paragraph(
       "torque_reserve_Nm with which MinClampForce costs least, by the last value (" + value.name +
-      "), safety_factor " + number("%g", variator.safety_factor) +
-      ". Configured: " + number("%g", variator.torque_reserve_Nm) +
+      "), safety_factor " + format("%g", variator.safety_factor) +
+      ". Configured: " + format("%g", variator.torque_reserve_Nm) +
       " Nm. A reserve must also hold what comes faster than the hydraulics; a force above the "
       "controller's own, or below its pressure floor, saves nothing.");
   std::vector<std::vector<std::string>> rows;
   for (const double torque_Nm : {25.0, 50.0, 100.0, 150.0}) {
     std::vector<std::string>& row = rows.emplace_back();
-    row.push_back(number("%.0f", torque_Nm));
+    row.push_back(format("%.0f", torque_Nm));
     for (const double share : shares) {
       row.push_back(
-          number("%.1f", estimator::reserve_of_least_loss_Nm(variator, share, torque_Nm)));
+          format("%.1f", estimator::reserve_of_least_loss_Nm(variator, share, torque_Nm)));
     }
   }
   page.table({"torque at the primary, Nm",
-              number("reserve, Nm: belt and bearings, %.2f Nm/kN", 1e3 * losses[0]),
-              number("reserve, Nm: and a pump, %.2f Nm/kN", 1e3 * losses[1])},
+              format("reserve, Nm: belt and bearings, %.2f Nm/kN", 1e3 * losses[0]),
+              format("reserve, Nm: and a pump, %.2f Nm/kN", 1e3 * losses[1])},
              rows);
 }
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
+#include "can_dbc/text/format.h"
 #include "daemon/core/publish/names.h"
 #include "daemon/core/reasons/reasons.h"
 #include "estimator/physics/clamp_force.h"
@@ -16,12 +16,6 @@ namespace beltgrip::cli {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-
-std::string number(const char* pattern, auto... values) {
-  char buffer[64];
-  std::snprintf(buffer, sizeof buffer, pattern, values...);
-  return buffer;
-}
 
 // Experiment, then the inhibits, then the faults, a bit each.
 constexpr std::size_t kFirstInhibit = 1, kFirstFault = kFirstInhibit + daemon::kInhibitCount;
@@ -142,7 +136,7 @@ void ReportCourses::take_lanes(const daemon::SampleReport& report, double t_s) {
 }
 
 void ReportCourses::take_result(const daemon::ExperimentResult& result) {
-  now_.name = log_ + number(", from %.2f s on", daemon::seconds(result.start.since_origin()));
+  now_.name = log_ + format(", from %.2f s on", daemon::seconds(result.start.since_origin()));
   if (result.stopped) now_.stop_s = daemon::seconds(result.end.since_origin());
   const bool value = result.outcome == daemon::Outcome::kCompleted;
   const estimator::PeakEstimate& peak = result.peak;
@@ -151,8 +145,8 @@ void ReportCourses::take_result(const daemon::ExperimentResult& result) {
     last_value_ = {now_.name, peak.mu_max, peak.sigma_peak_percent, end_stop_};
   }
   const bool bound = has_bound(result);
-  const std::string mu_max = value   ? number("%.4f", peak.mu_max)
-                             : bound ? number("at least %.4f", peak.mu_max)
+  const std::string mu_max = value   ? format("%.4f", peak.mu_max)
+                             : bound ? format("at least %.4f", peak.mu_max)
                                      : "";
   now_.verdict = {now_.name,
                   outcome_text(result.outcome) + ", " + reason_text(result.stop_reason),
@@ -160,12 +154,12 @@ void ReportCourses::take_result(const daemon::ExperimentResult& result) {
                   text::snake_case(daemon::direction_name(result.direction)),
                   text::snake_case(daemon::end_stop_name(result.end_stop)),
                   mu_max,
-                  value ? number("%.4f .. %.4f", peak.ci95_low, peak.ci95_high) : "",
-                  result.stopped ? number("%.2f", result.sigma_stop_percent) : "",
-                  value ? number("%.2f", peak.sigma_peak_percent) : "",
-                  number("%.1f", of_this_.slip_most_percent),
-                  number("%.0f", of_this_.energy_J),
-                  number("%.2f", of_this_.path_m)};
+                  value ? format("%.4f .. %.4f", peak.ci95_low, peak.ci95_high) : "",
+                  result.stopped ? format("%.2f", result.sigma_stop_percent) : "",
+                  value ? format("%.2f", peak.sigma_peak_percent) : "",
+                  format("%.1f", of_this_.slip_most_percent),
+                  format("%.0f", of_this_.energy_J),
+                  format("%.2f", of_this_.path_m)};
   drive_.results.push_back({daemon::seconds(result.end.since_origin()),
                             mu_max.empty() ? outcome_text(result.outcome) : mu_max});
   experiments_.push_back(std::move(now_));
@@ -201,8 +195,8 @@ void ReportCourses::finish(const ReplayResult& result) {
       const bool inhibit = i < kFirstFault;
       const std::size_t k = i - kFirstInhibit;
       drive_.reasons.push_back(
-          {stood.name, number("%.1f", sum_s), std::to_string(stood.spans_s.size()),
-           inhibit ? number("%.1f", result.inhibited_s[k]) : "", std::string(words(i).means),
+          {stood.name, format("%.1f", sum_s), std::to_string(stood.spans_s.size()),
+           inhibit ? format("%.1f", result.inhibited_s[k]) : "", std::string(words(i).means),
            inhibit ? result.inhibit_figures[k] : "", std::string(words(i).remedy)});
     } else {
       drive_.experiments_s = stood.spans_s;

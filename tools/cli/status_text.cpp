@@ -1,10 +1,9 @@
 #include "tools/cli/status_text.h"
 
-#include <array>
-#include <charconv>
 #include <cstdint>
-#include <cstdio>
 
+#include "can_dbc/text/format.h"
+#include "can_dbc/text/number_text.h"
 #include "can_dbc/text/printable.h"
 #include "daemon/core/reasons/reasons.h"
 
@@ -21,10 +20,7 @@ std::string list(const Json& names) {
 }
 
 std::string number(const Json& value, const char* format) {
-  if (!value.is_number()) return "-";
-  char text[64];
-  std::snprintf(text, sizeof text, format, value.get<double>());
-  return text;
+  return value.is_number() ? beltgrip::format(format, value.get<double>()) : "-";
 }
 
 std::string state_text(const Json& status) {
@@ -92,12 +88,8 @@ class Metrics {
   // Nothing where there is no value.
   void sample(const Json& value, const std::string& labels = {}, double scale = 1.0) {
     if (!value.is_number()) return;
-    std::array<char, 32> text;
-    const auto [end, error] =
-        std::to_chars(text.data(), text.data() + text.size(), value.get<double>() * scale);
-    out_ += name_ + "{" + label_ + (labels.empty() ? "" : "," + labels) + "} ";
-    out_.append(text.data(), error == std::errc{} ? end : text.data());
-    out_ += '\n';
+    out_ += name_ + "{" + label_ + (labels.empty() ? "" : "," + labels) + "} " +
+            number_text(value.get<double>() * scale) + '\n';
   }
   const std::string& text() const { return out_; }
 

@@ -1,7 +1,8 @@
 #include "tools/report/drive_page.h"
 
-#include <cstdio>
 #include <utility>
+
+#include "can_dbc/text/number_text.h"
 
 namespace beltgrip::report {
 namespace {
@@ -9,9 +10,7 @@ namespace {
 std::vector<std::string> wear_row(const char* when, const Wear& wear) {
   std::vector<std::string> row{when};
   for (const double value : {wear.known_s, wear.energy_J, wear.path_m, wear.slip_most_percent}) {
-    char cell[32];
-    std::snprintf(cell, sizeof cell, "%.1f", value);
-    row.emplace_back(cell);
+    row.push_back(fixed_text(value, 1));
   }
   return row;
 }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "can_dbc/text/number_text.h"
 #include "estimator/physics/variator_geometry.h"
 #include "tools/sim/configuration.h"
 #include "tools/sim/resources.h"

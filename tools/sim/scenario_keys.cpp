@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "can_dbc/text/number_text.h"
 #include "estimator/physics/variator_geometry.h"
 #include "tools/sim/bus.h"
 

@@ -3,8 +3,9 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
-#include <charconv>
 #include <sstream>
+
+#include "can_dbc/text/number_text.h"
 
 namespace beltgrip::sim {
 
@@ -22,11 +23,6 @@ std::string found_text(const toml::node& node) {
 }
 
 }  // namespace
-
-std::string number_text(double value) {
-  char buffer[32];
-  return {buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr};
-}
 
 ScenarioLayer setting_layer(const std::string& key_and_value) {
   ScenarioLayer layer{"--set " + key_and_value, key_and_value};

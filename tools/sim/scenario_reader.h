@@ -52,7 +52,4 @@ class ScenarioReader {
   std::vector<std::string> errors_;
 };
 
-// Shortest text that reads back to the same number.
-std::string number_text(double value);
-
 }  // namespace beltgrip::sim

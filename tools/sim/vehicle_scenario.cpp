@@ -2,6 +2,7 @@
 
 #include <toml++/toml.h>
 
+#include "can_dbc/text/number_text.h"
 #include "tools/sim/configuration.h"
 #include "tools/sim/resources.h"
 #include "tools/sim/scenario_effects.h"

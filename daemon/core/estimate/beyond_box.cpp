@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "can_dbc/text/number_text.h"
 #include "can_dbc/text/unit_text.h"
-#include "daemon/core/base/rounded_text.h"
 
 namespace beltgrip::daemon {
 

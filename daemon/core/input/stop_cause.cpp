@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string_view>
 
+#include "can_dbc/text/number_text.h"
 #include "daemon/core/base/named.h"
-#include "daemon/core/base/rounded_text.h"
 
 namespace beltgrip::daemon {
 

@@ -1,35 +1,15 @@
 #include "daemon/core/observe/event.h"
 
-#include <array>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <utility>
 
+#include "can_dbc/text/number_text.h"
 #include "daemon/core/experiment/arming.h"
 #include "daemon/core/publish/names.h"
 #include "daemon/core/reasons/reasons.h"
 
 namespace beltgrip::daemon {
-
-namespace {
-
-std::string rounded(double value, int digits) {
-  std::array<char, 48> text;
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value,
-                                 std::chars_format::fixed, digits);
-  return {text.data(), end.ptr};
-}
-
-std::string hexadecimal(std::uint32_t value) {
-  std::array<char, 8> text;
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value, 16);
-  std::string out(text.data(), end.ptr);
-  for (char& c : out) c = c >= 'a' ? static_cast<char>(c - 'a' + 'A') : c;
-  return out;
-}
-
-}  // namespace
 
 EventLevel level_of(const Event& event) {
   return event.id == EventId::kFaultRaised ? EventLevel::kWarning : EventLevel::kInfo;
@@ -42,10 +22,10 @@ std::string result_text(const ExperimentResult& result) {
                      std::string(stop_reason_name(result.stop_reason));
   if (const std::string cause = why(result); !cause.empty()) text += " (" + cause + ")";
   if (result.peak.kind == estimator::PeakKind::kValue) {
-    text +=
-        ", mu_max " + rounded(result.peak.mu_max, 4) + " +- " + rounded(result.peak.mu_max_std, 4);
+    text += ", mu_max " + fixed_text(result.peak.mu_max, 4) + " +- " +
+            fixed_text(result.peak.mu_max_std, 4);
   } else if (has_bound(result)) {
-    text += ", mu_max above " + rounded(result.peak.mu_max, 4);
+    text += ", mu_max above " + fixed_text(result.peak.mu_max, 4);
   }
   const std::string_view remedy = remedy_of(result);
   return remedy.empty() ? text : text + "; to do: " + std::string(remedy);
@@ -54,7 +34,7 @@ std::string result_text(const ExperimentResult& result) {
 // What the event itself knows.
 std::string fault_figure(const Event& event) {
   if (event.cause.role) return std::string(role_name(*event.cause.role));
-  return event.identifier != 0 ? "0x" + hexadecimal(event.identifier) : "";
+  return event.identifier != 0 ? "0x" + hex_text(event.identifier) : "";
 }
 
 }  // namespace
@@ -66,8 +46,8 @@ std::string text_of(const Event& event, const std::string& figure) {
              std::string(state_name(State{event.to}));
     case EventId::kStop:
       return "MacroSlipStop, reason " + std::string(stop_reason_name(event.reason)) + " (" +
-             cause_text(event.reason, event.cause) + "), slip " + rounded(event.slip_percent, 2) +
-             " %, mu* " + rounded(event.mu_star, 4);
+             cause_text(event.reason, event.cause) + "), slip " +
+             fixed_text(event.slip_percent, 2) + " %, mu* " + fixed_text(event.mu_star, 4);
     case EventId::kResult:
       return result_text(event.result);
     case EventId::kInhibit:

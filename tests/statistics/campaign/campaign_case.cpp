@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <stdexcept>
 
+#include "can_dbc/text/number_text.h"
 #include "tools/sim/random.h"
 #include "tools/sim/vehicle_scenario.h"
 
@@ -103,11 +103,6 @@ std::string_view kind_name(FaultKind kind) {
   return {};
 }
 
-std::string number(double value) {
-  std::array<char, 40> text;
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-}
-
 class Drawer {
  public:
   explicit Drawer(const Uniform& uniform) : uniform_(uniform) {}
@@ -150,7 +145,7 @@ Surprise draw_surprise(const Uniform& uniform) {
 }
 
 std::string row(const char* key, double value) {
-  return std::string(key) + " = " + number(value) + "\n";
+  return std::string(key) + " = " + number_text(value) + "\n";
 }
 
 // Families, peak, fall and plateau of the belt.
@@ -260,8 +255,8 @@ std::string fault_head(Drawer& draw, const FaultRow& row) {
 std::string fault_size(Drawer& draw, const FaultRow& row) {
   if (row.sizes.empty()) return {};
   return "size = " +
-         number(row.sizes.size() == 2 ? draw.between(row.sizes[0], row.sizes[1])
-                                      : draw.one_of(row.sizes)) +
+         number_text(row.sizes.size() == 2 ? draw.between(row.sizes[0], row.sizes[1])
+                                           : draw.one_of(row.sizes)) +
          "\n";
 }
 
@@ -271,14 +266,14 @@ std::string fault_text(Drawer& draw, const FaultRow& row) {
   double for_s = draw.between(row.for_low_s, row.for_high_s);
   if (draw.chance(0.85)) {
     text += "after_request = true\nat_s = ";
-    text += number(draw.chance(0.6) ? draw.between(4.0, 9.0) : draw.between(0.0, 9.0)) + "\n";
+    text += number_text(draw.chance(0.6) ? draw.between(4.0, 9.0) : draw.between(0.0, 9.0)) + "\n";
   } else if (draw.chance(0.2)) {
     text += "at_s = -2.0\n";  // from the start to the end
     for_s = 1e6;
   } else {
-    text += "at_s = " + number(draw.between(0.0, 20.0)) + "\n";
+    text += "at_s = " + number_text(draw.between(0.0, 20.0)) + "\n";
   }
-  text += "for_s = " + number(for_s) + "\n";
+  text += "for_s = " + number_text(for_s) + "\n";
   return text + fault_size(draw, row);
 }
 

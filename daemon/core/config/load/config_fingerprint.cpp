@@ -1,19 +1,12 @@
 #include "daemon/core/config/load/config_fingerprint.h"
 
-#include <array>
-#include <charconv>
-
+#include "can_dbc/text/number_text.h"
 #include "daemon/core/config/options/config_model.h"
 #include "daemon/core/config/options/config_options.h"
 
 namespace beltgrip::daemon {
 
 namespace {
-
-std::string number_text(double value) {
-  std::array<char, 32> digits;
-  return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
-}
 
 // The margins of MinClampForce are not part of a measurement.
 bool decides(const Option& option) {

@@ -1,8 +1,7 @@
 // The commented default file, out of the tables of options.
-#include <array>
-#include <charconv>
 #include <cmath>
 
+#include "can_dbc/text/number_text.h"
 #include "daemon/core/config/options/config_options.h"
 #include "daemon/core/config/options/config_uds.h"
 
@@ -12,23 +11,11 @@ namespace {
 
 using Kind = OptionRow::Kind;
 
-std::string number_text(double value) {
-  std::array<char, 32> digits;
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value,
-                                 std::chars_format::general, 12)
-                       .ptr;
-  std::string text(digits.data(), end);
-  // A TOML number needs a point or an exponent; an exponent of two digits reads better as one.
+// A TOML number needs a point or an exponent.
+std::string toml_text(double value) {
+  std::string text = rounded_text(value, 12);
   if (text.find_first_of(".e") == std::string::npos) text += ".0";
   return text;
-}
-
-std::string hex_text(std::uint32_t value) {
-  std::array<char, 16> digits;
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value, 16).ptr;
-  std::string text(digits.data(), end);
-  for (char& c : text) c = static_cast<char>(c >= 'a' ? c - 'a' + 'A' : c);
-  return "0x" + text;
 }
 
 void add_comment(std::string& out, std::string_view text) {
@@ -44,10 +31,10 @@ std::string default_value(const OptionOf<Target>& option, Target& defaults) {
   if (!option.shown.empty()) return std::string(option.shown);
   switch (option.kind) {
     case Kind::kNumber:
-      return number_text(option.number(defaults) / option.factor);
+      return toml_text(option.number(defaults) / option.factor);
     case Kind::kInteger: {
       const auto value = static_cast<std::uint32_t>(option.get_integer(defaults));
-      return option.is_hexadecimal ? hex_text(value) : std::to_string(value);
+      return option.is_hexadecimal ? "0x" + hex_text(value) : std::to_string(value);
     }
     case Kind::kText:
       return in_quotes(option.text(defaults));
@@ -67,11 +54,11 @@ std::string range_text(const OptionRow& option) {
     case Kind::kNumber:
       if (std::isinf(option.maximum)) return {};
       return (option.unit.empty() ? "" : std::string(option.unit) + ", ") +
-             number_text(option.minimum) + " to " + number_text(option.maximum);
+             toml_text(option.minimum) + " to " + toml_text(option.maximum);
     case Kind::kInteger: {
       const auto text = [&](double value) {
         const auto integer = static_cast<std::uint32_t>(value);
-        return option.is_hexadecimal ? hex_text(integer) : std::to_string(integer);
+        return option.is_hexadecimal ? "0x" + hex_text(integer) : std::to_string(integer);
       };
       return (option.unit.empty() ? "" : std::string(option.unit) + ", ") + text(option.minimum) +
              " to " + text(option.maximum);
@@ -175,8 +162,7 @@ void add_sensors(std::string& out) {
         sensor ? estimator::typical_accuracy(*sensor).accuracy : estimator::ChannelAccuracy{};
     out += "# " + std::string(role_name(role)) + " = " +
            table_value(options, SensorText{shown.bias, shown.gain}) + "  # bias " +
-           number_text(options.front().minimum) + " to " + number_text(options.front().maximum) +
-           "\n";
+           toml_text(options.front().minimum) + " to " + toml_text(options.front().maximum) + "\n";
   }
 }
 
@@ -206,8 +192,8 @@ void add_options(std::string& out, std::string_view section) {
 std::string assumption_text(const Option& option) {
   for (const estimator::Assumption& each : estimator::assumptions()) {
     if (option.section != "variator" || option.key != each.key) continue;
-    return number_text(each.least) + " to " + number_text(each.most) + ' ' +
-           std::string(each.unit) + (each.logarithmic ? ", even in the logarithm" : "");
+    return toml_text(each.least) + " to " + toml_text(each.most) + ' ' + std::string(each.unit) +
+           (each.logarithmic ? ", even in the logarithm" : "");
   }
   return {};
 }

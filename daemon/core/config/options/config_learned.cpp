@@ -1,9 +1,9 @@
 #include "daemon/core/config/options/config_learned.h"
 
 #include <algorithm>
-#include <charconv>
 #include <functional>
 
+#include "can_dbc/text/number_text.h"
 #include "daemon/core/config/options/option_reader.h"
 
 namespace beltgrip::daemon {
@@ -22,14 +22,9 @@ std::vector<std::string> role_names() {
   return out;
 }
 
-std::string number(double value) {
-  char buffer[32];
-  return {buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr};
-}
-
 std::string list(const double* values, std::size_t count) {
   std::string out = "[";
-  for (std::size_t i = 0; i < count; ++i) out += (i == 0 ? "" : ", ") + number(values[i]);
+  for (std::size_t i = 0; i < count; ++i) out += (i == 0 ? "" : ", ") + number_text(values[i]);
   return out + "]";
 }
 

@@ -1,10 +1,9 @@
 #include "daemon/core/config/options/config_model.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 
+#include "can_dbc/text/number_text.h"
 #include "daemon/core/config/options/config_options.h"
 #include "daemon/core/config/options/option_reader.h"
 #include "daemon/core/config/toml/config_document.h"
@@ -79,9 +78,7 @@ const OptionRow* row_of(std::span<const OptionRow> options, std::string_view nam
 }
 
 std::string number(double value) {
-  char buffer[32];
-  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
-  std::string text(buffer, end);
+  std::string text = number_text(value);
   if (text.find_first_of(".en") == std::string::npos) text += ".0";
   return text;
 }

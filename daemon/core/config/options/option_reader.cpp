@@ -1,9 +1,9 @@
 #include "daemon/core/config/options/option_reader.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
+
+#include "can_dbc/text/number_text.h"
 
 namespace beltgrip::daemon {
 
@@ -16,15 +16,8 @@ bool is_endless(const OptionRow& option) {
 }
 
 std::string integer_text(double value, bool hexadecimal) {
-  std::array<char, 24> digits;
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(),
-                                 static_cast<std::int64_t>(value), hexadecimal ? 16 : 10)
-                       .ptr;
-  std::string text(digits.data(), end);
-  std::transform(text.begin(), text.end(), text.begin(), [](char c) {
-    return static_cast<char>(c >= 'a' && c <= 'f' ? c - 'a' + 'A' : c);
-  });
-  return hexadecimal && value != 0.0 ? "0x" + text : text;
+  if (hexadecimal && value != 0.0) return "0x" + hex_text(static_cast<std::uint32_t>(value));
+  return std::to_string(static_cast<std::int64_t>(value));
 }
 
 }  // namespace

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 
+#include "can_dbc/text/number_text.h"
 #include "daemon/core/config/toml/toml_bounds.h"
 
 namespace beltgrip::daemon {
@@ -69,7 +69,6 @@ const TomlNode* TomlNode::find(std::string_view child_key) const {
 
 std::string TomlNode::found() const {
   constexpr std::size_t kTextMax = 80;
-  std::array<char, 32> digits;
   switch (type) {
     case TomlType::kText: {
       std::string shown = text.size() > kTextMax ? text.substr(0, kTextMax) + "..." : text;
@@ -80,10 +79,8 @@ std::string TomlNode::found() const {
     }
     case TomlType::kInteger:
       return std::to_string(integer);
-    case TomlType::kNumber: {
-      const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
-      return {digits.data(), end};
-    }
+    case TomlType::kNumber:
+      return number_text(number);
     case TomlType::kFlag:
       return flag ? "true" : "false";
     default:

@@ -2,13 +2,13 @@
 // roles, units and DBC files that do not fit; what is not there yet; the default file. Every error
 // must name file, line and key, and all of them must be listed.
 #include "daemon/core/config/options/config.h"
+#include "can_dbc/text/number_text.h"
 #include "daemon/core/config/load/load_config.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <numbers>
@@ -20,11 +20,6 @@ namespace beltgrip::daemon {
 namespace {
 
 using test::TemporaryDirectory;
-
-std::string number(double value) {
-  std::array<char, 40> text;
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-}
 
 class ConfigTest : public testing::Test {
  protected:
@@ -132,16 +127,17 @@ TEST_F(ConfigTest, EveryNumberAtAndBeyondItsRange) {
     };
     const bool low_ok = key != "ratio_overdrive" && key != "primary_radius_overdrive_m";
     const bool high_ok = key != "ratio_low" && key != "primary_radius_low_m";
-    if (low_ok) expect_good(toml(number(option.minimum)));
-    if (high_ok && key != "stop_slope") expect_good(toml(number(option.maximum), option.maximum));
+    if (low_ok) expect_good(toml(number_text(option.minimum)));
+    if (high_ok && key != "stop_slope")
+      expect_good(toml(number_text(option.maximum), option.maximum));
     const double below = std::nextafter(option.minimum, -1e9);
     const double above = std::nextafter(option.maximum, 1e9);
     const std::vector<std::string> words{"a number from"};
     const int line = line_of(toml("1"), key + " = ");
     // Beyond its range the default stands for the cross-checks; only the range is reported.
     const auto alone = [&](const std::string& value) { return with(section, key + " = " + value); };
-    expect_error(alone(number(below)), name, words, line);
-    expect_error(alone(number(above)), name, words, line);
+    expect_error(alone(number_text(below)), name, words, line);
+    expect_error(alone(number_text(above)), name, words, line);
     expect_error(alone("nan"), name, words, line);
     expect_error(alone("inf"), name, words, line);
     expect_error(alone("\"1.0\""), name, words, line);
@@ -160,7 +156,7 @@ TEST_F(ConfigTest, EveryKeyOfATableBeyondItsRange) {
   using Kind = OptionRow::Kind;
   const auto wrong_values = [](const OptionRow& option) {
     std::vector<std::string> values{"2026-01-01"};
-    const auto beyond = [&](double value) { values.push_back(number(value)); };
+    const auto beyond = [&](double value) { values.push_back(number_text(value)); };
     if (option.kind == Kind::kNumber) {
       values.insert(values.end(), {"nan", "inf", "\"1\"", "[1]"});
       if (std::isfinite(option.minimum)) beyond(std::nextafter(option.minimum, -1e9));
@@ -578,13 +574,15 @@ TEST_F(ConfigTest, Sensors) {
       continue;
     }
     const double maximum = sensor_options(role_dimension(role)).front().maximum;
-    expect_good(with("sensors", name + " = { gain = 1, " + bias + " = " + number(maximum) + " }"));
+    expect_good(
+        with("sensors", name + " = { gain = 1, " + bias + " = " + number_text(maximum) + " }"));
     expect_good(with("sensors", name + " = { gain = 0, " + bias + " = 0 }"));
     expect_error(with("sensors", name + " = { gain = 1.01 }"), key + ".gain", {"1.01"});
     expect_error(with("sensors", name + " = { gain = -0.01 }"), key + ".gain", {"-0.01"});
     expect_error(with("sensors", name + " = { " + bias + " = -1 }"), key + "." + bias, {"-1"});
-    expect_error(with("sensors", name + " = { " + bias + " = " + number(maximum * 1.01) + " }"),
-                 key + "." + bias, {"a number from 0 to"});
+    expect_error(
+        with("sensors", name + " = { " + bias + " = " + number_text(maximum * 1.01) + " }"),
+        key + "." + bias, {"a number from 0 to"});
     expect_error(with("sensors", name + " = { " + bias + " = \"1\" }"), key + "." + bias,
                  {"\"1\""});
     expect_error(with("sensors", name + " = 1"), key, {"1"});
