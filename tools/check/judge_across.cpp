@@ -35,7 +35,8 @@ bool turns_with(const std::vector<double>& engine_this, const std::vector<double
 
 bool is_one(const std::vector<double>& values) {
   return values.size() >= kWindowsLeast && std::abs(quantile(values, 0.5) - 1.0) < kSameSpeed &&
-         share_of(values, [](double r) { return std::abs(r - 1.0) < 4.0 * kSameSpeed; }) > 0.8;
+         share_of(values, [](double r) { return std::abs(r - 1.0) < kSameSpeedOnce; }) >
+             kOneShaftLeast;
 }
 
 double correlation(const std::vector<double>& x, const std::vector<double>& y) {
@@ -355,7 +356,7 @@ void Across::lockup() {
   if (!is_bound(Role::kLockupClosed)) return;
   double standing_s = 0.0, closed_s = 0.0, braked_s = 0.0;
   for (const Window& window : windows_) {
-    if (!(window[Role::kLockupClosed] > 0.99)) continue;
+    if (!(window[Role::kLockupClosed] > kFlagOn)) continue;
     closed_s += kWindow_s;
     const double secondary = window[Role::kSecondarySpeed];
     if (std::isfinite(secondary) && std::abs(secondary) < kStanding_rad_s) standing_s += kWindow_s;
@@ -366,7 +367,7 @@ void Across::lockup() {
       turns_with(engine, ratio_of(Role::kEngineSpeed, Role::kSecondarySpeed, true)) &&
       std::abs(quantile(engine, 0.5) - 1.0) < kGearMost;
   const double together =
-      share_of(engine, [](double r) { return std::abs(r - 1.0) < 4.0 * kSameSpeed; });
+      share_of(engine, [](double r) { return std::abs(r - 1.0) < kSameSpeedOnce; });
   const bool apart = engine.size() >= kWindowsLeast && together < 0.5 &&
                      std::abs(quantile(engine, 0.5) - 1.0) < 1.0;
   if (standing_s >= kStandsClosed_s) {
@@ -392,7 +393,7 @@ void Across::lockup() {
   // Open, and yet one shaft all the time.
   std::vector<double> open;
   for (const Window& window : windows_) {
-    if (!(window[Role::kLockupClosed] < 0.01) || !(window[Role::kEngineSpeed] > 0.0)) continue;
+    if (!(window[Role::kLockupClosed] < kFlagOff) || !(window[Role::kEngineSpeed] > 0.0)) continue;
     if (!(window[Role::kPrimarySpeed] > kMoving_rad_s)) continue;
     open.push_back(window[Role::kEngineSpeed] / window[Role::kPrimarySpeed]);
   }
@@ -419,7 +420,7 @@ void Across::torque_sign() {
     const double pedal = window[Role::kAcceleratorPedal];
     const bool locked = !(window[Role::kLockupClosed] < 1.0);
     if (pedal > kPedalPressed) pressed.push_back(now);
-    if (pedal < kPedalReleased && locked && window[Role::kPrimarySpeed] > 100.0) {
+    if (pedal < kPedalReleased && locked && window[Role::kPrimarySpeed] > kOverrunLeast_rad_s) {
       released.push_back(now);
     }
   }
@@ -554,7 +555,8 @@ double Across::most_against_percent() const {
 void Across::carried() {
   std::vector<double> friction, slipping;
   for (const Window& window : windows_) {
-    if (!std::isfinite(window.mu_star) || !(std::abs(window[torque_role()]) > 10.0)) continue;
+    if (!std::isfinite(window.mu_star) || !(std::abs(window[torque_role()]) > kTorqueTold_Nm))
+      continue;
     friction.push_back(window.mu_star);
     if (window.slip_percent > kSlips_percent) slipping.push_back(window.mu_star);
   }
@@ -628,7 +630,7 @@ void Across::pressure_course() {
     const double primary = window[Role::kPrimarySpeed], secondary = window[Role::kSecondarySpeed];
     const double pressure = window[Role::kSecondaryPressure], torque = window[torque_role()];
     if (!(primary > kMoving_rad_s) || !(secondary > kMoving_rad_s) || !(pressure > 0.0)) continue;
-    if (!(std::abs(torque) > 10.0)) continue;
+    if (!(std::abs(torque) > kTorqueTold_Nm)) continue;
     rows.push_back({std::log(secondary / primary), std::log(std::abs(torque)), std::log(pressure)});
   }
   if (rows.size() < 8 * kWindowsLeast) return;
@@ -644,7 +646,7 @@ void Across::pressure_course() {
     rp += r * p / n, tp += t * p / n, pp += p * p / n;
   }
   const double determinant = rr * tt - rt * rt;
-  if (std::sqrt(rr) < kRatioSpread || determinant < 0.2 * rr * tt) return;
+  if (std::sqrt(rr) < kRatioSpread || determinant < kApartLeast * rr * tt) return;
   const double by_ratio = (rp * tt - tp * rt) / determinant;
   const double by_torque = (tp * rr - rp * rt) / determinant;
   const double rest = pp - by_ratio * rp - by_torque * tp;
@@ -671,7 +673,7 @@ void Across::pressure_command() {
   }
   if (share.size() < kWindowsLeast) return;
   const double usual = quantile(share, 0.5);
-  if (usual > 1.5 || usual < 1.0 / 1.5) {
+  if (usual > kCommandFactor || usual < 1.0 / kCommandFactor) {
     doubt(format("secondary_pressure is %.3g times its command: a unit, or another pressure?",
                  usual));
   }

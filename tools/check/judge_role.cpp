@@ -318,7 +318,7 @@ void Judge::answers() {
 void Judge::speed_level() {
   const bool secondary = binding_.role == Role::kSecondarySpeed;
   const double most = secondary ? kSecondaryMost_rad_s : kPrimaryMost_rad_s;
-  const double high = at(0.99), low = at(0.01);
+  const double high = at(kNearlyMost), low = at(kNearlyLeast);
   if (high > most) {
     const bool in_rad_s = binding_.unit == "rad/s";
     wrong(text(high) + (in_rad_s ? " (" + grouped(high * kPerMinute) + " 1/min)" : "") +
@@ -369,24 +369,26 @@ void Judge::level() {
     case Role::kSecondaryPressure:
     case Role::kPrimaryPressure:
     case Role::kSecondaryPressureCommand:
-      if (at(0.99) > kPressureMost_Pa) {
-        wrong(with_unit(at(0.99), 1e-6, "MPa") + ": beyond every CVT's pump; unit or scale?");
+      if (at(kNearlyMost) > kPressureMost_Pa) {
+        wrong(with_unit(at(kNearlyMost), 1e-6, "MPa") +
+              ": beyond every CVT's pump; unit or scale?");
       }
       if (at(0.5) < -kPressureLeast_Pa) {
         wrong("below zero for most of the time (" + text(at(0.5)) + "): offset or sign?");
-      } else if (at(0.99) < kPressureLeast_Pa && binding_.role == Role::kSecondaryPressure) {
-        wrong("never above " + with_unit(at(0.99), 1e-3, "kPa") + ": no belt is held so; unit?");
-      } else if (at(0.99) < kPressureUsual_Pa && binding_.role == Role::kSecondaryPressure) {
-        doubt("never above " + with_unit(at(0.99), 1e-3, "kPa") +
+      } else if (at(kNearlyMost) < kPressureLeast_Pa && binding_.role == Role::kSecondaryPressure) {
+        wrong("never above " + with_unit(at(kNearlyMost), 1e-3, "kPa") +
+              ": no belt is held so; unit?");
+      } else if (at(kNearlyMost) < kPressureUsual_Pa && binding_.role == Role::kSecondaryPressure) {
+        doubt("never above " + with_unit(at(kNearlyMost), 1e-3, "kPa") +
               ": less than a CVT has at idle (0.1 MPa and more); unit?");
       }
       break;
     case Role::kEngineTorque:
     case Role::kPrimaryTorque:
     case Role::kSecondaryTorque:
-      if (std::max(std::abs(at(0.99)), std::abs(at(0.01))) >
-          kTorqueMost_Nm * (binding_.role == Role::kSecondaryTorque ? 3.0 : 1.0)) {
-        wrong("from " + text(at(0.01)) + " to " + text(at(0.99)) +
+      if (std::max(std::abs(at(kNearlyMost)), std::abs(at(kNearlyLeast))) >
+          (binding_.role == Role::kSecondaryTorque ? kTorqueMostSecondary_Nm : kTorqueMost_Nm)) {
+        wrong("from " + text(at(kNearlyLeast)) + " to " + text(at(kNearlyMost)) +
               ": more than any belt carries; unit or scale?");
       }
       torque_in_percent();
@@ -397,15 +399,15 @@ void Judge::level() {
       }
       break;
     case Role::kVehicleSpeed:
-      if (at(0.99) > kSpeedMost_m_s) {
-        wrong(with_unit(at(0.99), 3.6, "km/h") + ": no such car goes so fast; unit?");
+      if (at(kNearlyMost) > kSpeedMost_m_s) {
+        wrong(with_unit(at(kNearlyMost), 3.6, "km/h") + ": no such car goes so fast; unit?");
       }
       break;
     case Role::kAcceleratorPedal:
-      if (course_.largest > 1.05 || course_.least < -0.05) {
+      if (course_.largest > 1.0 + kPedalBeyond || course_.least < -kPedalBeyond) {
         wrong("from " + text(course_.least) + " to " + text(course_.largest) +
               ": a pedal has 0 to 100 %; unit or scale?");
-      } else if (course_.largest > 0.0 && course_.largest <= 0.0101) {
+      } else if (course_.largest > 0.0 && course_.largest <= kPedalAsShare) {
         doubt("never above " + text(course_.largest) + ": a share of 1 read as percent?");
       }
       break;

@@ -31,6 +31,9 @@ inline constexpr double kRateMeasured = 0.95;
 // --- values of one role -------------------------------------------------------------------------
 // Chosen: a few values at the edge of the range are the signal's "not available" at start-up.
 inline constexpr double kInRangeLeast = 0.99;
+// Chosen: the shares of the values below which lie what counts as the least and the most; a few
+// wild ones do not.
+inline constexpr double kNearlyLeast = 0.01, kNearlyMost = 0.99;
 // Chosen: no engine of a passenger car turns faster, no secondary pulley at 250 km/h either
 // (variator-facts: some 48 1/min a km/h).
 inline constexpr double kPrimaryMost_rad_s = 1050.0, kSecondaryMost_rad_s = 1700.0;
@@ -43,6 +46,12 @@ inline constexpr double kPressureMost_Pa = 10e6;
 inline constexpr double kPressureLeast_Pa = 10e3;
 inline constexpr double kPressureUsual_Pa = 100e3;
 inline constexpr double kTorqueMost_Nm = 1000.0;
+// Chosen: three times as much, for the ratio of low gear.
+inline constexpr double kTorqueMostSecondary_Nm = 3000.0;
+// Chosen: by so much a pedal's ends may be set up wrongly.
+inline constexpr double kPedalBeyond = 0.05;
+// Derived: 1 %, which a pedal never exceeds that says 0 to 1 and is read as percent; with rounding.
+inline constexpr double kPedalAsShare = 0.0101;
 // Derived: ends of the ranges of torque in percent, from one byte (0.390625 or 0.4 % a bit, half a
 // percent with an offset, -125 to 130 of J1939); no engine's torque in Nm is coded to end there.
 inline constexpr double kPercentTops[] = {99.609375, 100.0, 102.0, 125.0, 127.5, 130.0};
@@ -95,6 +104,11 @@ inline constexpr double kInStopsLeast = 0.95, kExplains = 0.95;
 inline constexpr double kStaysLeast = 0.5, kPasses = 0.05;
 // Chosen: an engine with a closed lock-up turns with the primary pulley to within noise and delay.
 inline constexpr double kSameSpeed = 0.015;
+// Chosen: of single windows, which a gear change or slow sampling blurs; nearly all within four
+// times as much.
+inline constexpr double kSameSpeedOnce = 4.0 * kSameSpeed, kOneShaftLeast = 0.8;
+// Chosen: of the mean of a flag over a window: it was so for all of it.
+inline constexpr double kFlagOn = 0.99, kFlagOff = 0.01;
 // Measured (a real chain CVT, read every five seconds: spreads 0.34 and 1.46).
 inline constexpr double kSteadier = 3.0;
 inline constexpr double kGearMost =
@@ -115,6 +129,10 @@ inline constexpr double kTorqueSpread_Nm = 10.0;
 inline constexpr double kTorqueAgainst = -0.5;
 inline constexpr double kPedalPressed = 0.15, kPedalReleased = 0.02;
 inline constexpr double kTorqueSigned_Nm = 8.0;
+// Chosen: 955 1/min; slower, idle control drives the car with the pedal released.
+inline constexpr double kOverrunLeast_rad_s = 100.0;
+// Chosen: with less the zero of the torque is a large share of it.
+inline constexpr double kTorqueTold_Nm = 10.0;
 // Chosen: cruise control lets go of the wheels once or twice, not a driver's many times.
 inline constexpr int kTurnsOfTorque = 4;
 // Derived: at the belt's best friction (0.15) a belt would slip; as read beyond it, a unit or a
@@ -140,6 +158,10 @@ inline constexpr double kCarriedLeast = 0.015;
 inline constexpr double kPressureRises = 0.15;
 inline constexpr double kRatioSpread = 0.15;  // standard deviation of log(ratio), for that
 inline constexpr double kCorrelationSure = 0.5;
+// Chosen: ratio and torque tell apart while one explains no more than four fifths of the other.
+inline constexpr double kApartLeast = 0.2;
+// Chosen: a wrong unit is off by more (psi for kPa: 6.9 times), a regulator by less.
+inline constexpr double kCommandFactor = 1.5;
 
 // --- against what calibrate measures ------------------------------------------------------------
 inline constexpr double kConstantDeviations = 3.0;
