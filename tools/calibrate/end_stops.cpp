@@ -37,6 +37,10 @@ constexpr double kStdMax = 0.003;       // 0.3 % of slip: more is not worth writ
 constexpr int kVisitsMin = 4;
 constexpr double kDelayStdMax_s = 0.005;
 constexpr double kNewton_kN = 1e-3;
+constexpr double kNextCell_s = 1.5 * kCell_s;  // chosen: no cell is left out between the two
+// Chosen, of the usual scatter, and ln: normal noise leaves one cell in 16,000 beyond four sigmas.
+constexpr double kFarSigmas = 4.0, kFarLeast = 2e-4;
+constexpr double kAnywhere = 0.1;  // chosen, ln, one sigma: of what nothing is known before
 // Derived: the ratio at no force lies no further from the forces that were seen than they reach.
 // Measured (ten recordings of nothing but experiments, 1.1 to 1.5 times): errors up to 1.6 %,
 // because deformation and creep cannot be told apart there; drives have 2.2 times and more.
@@ -175,7 +179,7 @@ double neighbour_noise(const std::vector<Cell>& cells, const std::vector<double>
   int count = 0;
   for (std::size_t i = 1; i < cells.size(); ++i) {
     const bool next =
-        cells[i].log == cells[i - 1].log && cells[i].t_s - cells[i - 1].t_s < 1.5 * kCell_s;
+        cells[i].log == cells[i - 1].log && cells[i].t_s - cells[i - 1].t_s < kNextCell_s;
     if (!next) continue;
     squares += 0.5 * std::pow(residual[i] - residual[i - 1], 2.0);
     ++count;
@@ -218,7 +222,8 @@ std::vector<Cell> without_far(const std::vector<Cell>& cells, const std::vector<
   std::vector<double> sizes;
   sizes.reserve(residual.size());
   for (const double each : residual) sizes.push_back(std::abs(each));
-  const double limit = std::max(4.0 * estimator::kSigmaPerMedian * estimator::median(sizes), 2e-4);
+  const double limit =
+      std::max(kFarSigmas * estimator::kSigmaPerMedian * estimator::median(sizes), kFarLeast);
   std::vector<Cell> kept;
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (std::abs(residual[i]) <= limit) kept.push_back(cells[i]);
@@ -230,7 +235,7 @@ StopFit fit_stop(std::vector<Cell> cells, double ln_configured) {
   Eigen::VectorXd mean(static_cast<Eigen::Index>(kCoefficients));
   Eigen::VectorXd spread(static_cast<Eigen::Index>(kCoefficients));
   mean << 0.0, kDeformation_1_kN, kCreep, kCreepGrows, 0.0;
-  spread << 0.1, kDeformationStd_1_kN, kCreepStd, kCreepGrowsStd, 0.1;
+  spread << kAnywhere, kDeformationStd_1_kN, kCreepStd, kCreepGrowsStd, kAnywhere;
   StopFit out{.cells = std::move(cells), .fitted = {}};
   constexpr int kTrims = 4;
   for (int trim = 0; trim < kTrims; ++trim) {
