@@ -13,7 +13,11 @@ namespace {
 constexpr double kPiece_s = 4.0;
 constexpr double kSmooth_s = 0.3;  // half width of the local line that is taken out
 constexpr double kSpeedMin_rad_s = 20.0;
-constexpr int kSamplesMin = 60;  // per piece
+constexpr int kSamplesMin = 60;            // per piece
+constexpr double kSmoothSamplesMin = 8.0;  // chosen: of the local line
+constexpr double kPieceMin = 0.8;          // chosen, of kPiece_s
+constexpr double kRestMax = 0.1;           // chosen, of the speed: more is no tooth
+constexpr double kExcessMax = 50.0;        // chosen: one piece alone does not make a line
 // One sigma of what jitter of the clock and unfinished revolutions leave, share of the amplitude.
 constexpr double kAmplitudeShare = 3e-3;
 // Chosen, of a line: where the local straight line leaves less of it, it leaves the course of the
@@ -45,7 +49,7 @@ std::vector<double> smoothed(const Channel& speed, double period_s) {
     while (end < n && speed.t_s[end] <= speed.t_s[i] + reach_s) change(end++, 1.0);
     while (speed.t_s[first] < speed.t_s[i] - reach_s) change(first++, -1.0);
     const double determinant = s0 * s2 - s1 * s1;
-    if (s0 < 8.0 || determinant <= 0.0) continue;
+    if (s0 < kSmoothSamplesMin || determinant <= 0.0) continue;
     const double slope = (s0 * y1 - s1 * y0) / determinant;
     out[i] = (y0 - slope * s1) / s0 + slope * (speed.t_s[i] - origin_s);
   }
@@ -159,10 +163,10 @@ std::vector<Piece> pieces_of(const Channel& speed) {
     }
     const double span_s = speed.t_s[end - 1] - speed.t_s[begin];
     piece.period_s = period_s;
-    const bool usable = piece.rest.size() >= kSamplesMin && span_s > 0.8 * kPiece_s &&
+    const bool usable = piece.rest.size() >= kSamplesMin && span_s > kPieceMin * kPiece_s &&
                         std::isfinite(phi) && phi > kSpeedMin_rad_s * span_s &&
                         std::all_of(piece.rest.begin(), piece.rest.end(), [](double v) {
-                          return std::abs(v) < 0.1;  // NaN fails as well
+                          return std::abs(v) < kRestMax;  // NaN fails as well
                         });
     if (usable) out.push_back(std::move(piece));
     begin = end;
@@ -195,7 +199,7 @@ void add_piece(double here, const Noise& about, double left, OrderLine& out) {
   const double noise = about.mean;
   // The noise itself is a mean of a few: its inverse is biased by n / (n - 1).
   const double excess = here / noise * (about.count - 1.0) / about.count - 1.0;
-  out.excess += std::min(excess, 50.0);
+  out.excess += std::min(excess, kExcessMax);
   const double power = (here - noise) / (left * left);
   out.power += power;
   out.power_squares += power * power;

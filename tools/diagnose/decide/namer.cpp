@@ -24,6 +24,8 @@ constexpr int kRefined = 9;           // candidates refitted per step
 constexpr std::size_t kFromAfar = 5;  // of these, from afar
 constexpr double kPlain = 2.0;        // times the threshold: no chance
 constexpr double kFar = 1000.0;       // gain of a candidate: the machine alone is far from the data
+constexpr double kGainMin = 4.0;      // chosen: of a candidate, two sigmas
+constexpr double kNearShare = 0.4;    // chosen, of the linear loss, between kNear and kNearMax
 constexpr double kNearMax = 400.0;
 // Of the log evidence. Derived: e^-40 is a fiftieth of the last bit of a double (2^-52 = e^-36), so
 // that what is less probable by so much adds nothing to a sum; a larger number adds nothing either.
@@ -53,6 +55,8 @@ constexpr double kDisagreement = 0.05;   // p of a size that experiments do not 
 constexpr double kLeftOutMin = 0.0;      // of the log predictive density
 constexpr double kLeftOutPlain = 200.0;  // the same: beyond doubt, however few experiments show it
 constexpr double kRippleMin = 1e-4;      // of the speed: less is of no consequence for slip
+// Chosen, times the threshold: sums of exponential variables have heavier tails than the normal.
+constexpr double kRippleTail = 3.0;
 
 constexpr std::array kConstants{kDeformationPerkN, kLossConstant_Nm,          kLossPerSpeed_Nms,
                                 kLossPerkN_Nm,     kLnRatioOverdrive,         kLnRatioLow,
@@ -88,7 +92,7 @@ std::vector<int> shortlist(const std::vector<Score>& scores, int count, double i
   std::vector<int> out;
   for (std::size_t i = 0; i < scores.size() && static_cast<int>(out.size()) < count; ++i) {
     for (const Score* score : {&by_gain[i], &by_chi2[i]}) {
-      if (score->gain > 4.0 && score->in_curve < in_curve_max &&
+      if (score->gain > kGainMin && score->in_curve < in_curve_max &&
           std::find(barred.begin(), barred.end(), score->slot) == barred.end() &&
           std::find(out.begin(), out.end(), score->slot) == out.end()) {
         out.push_back(score->slot);
@@ -300,9 +304,9 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
         refine_replacement(engine, engine.replace(others, out.slot), others, Engine::kAnyWorth);
     const double loss = std::max(0.0, whole.log_likelihood - without.log_likelihood) * 2.0;
     std::size_t near = 0;
-    while (
-        near < ranked.size() && near < kRefined &&
-        (near < kNearest || -ranked[near].first.gain <= std::clamp(0.4 * loss, kNear, kNearMax))) {
+    while (near < ranked.size() && near < kRefined &&
+           (near < kNearest ||
+            -ranked[near].first.gain <= std::clamp(kNearShare * loss, kNear, kNearMax))) {
       ++near;
     }
     std::vector<std::optional<Hypothesis>> rivals(near);
@@ -624,7 +628,6 @@ std::vector<Ripple> find_ripples(const Campaign& campaign, double threshold) {
   }
   std::vector<Ripple> out;
   for (const auto& [shaft, line] : {std::pair{"primary", primary}, {"secondary", secondary}}) {
-    // Sums of exponential variables have heavier tails than the normal: three times the bound.
     // What the model knows of is no news, unless it is of another size.
     const auto known = campaign.known_ripples.find(shaft);
     const bool is_known = known != campaign.known_ripples.end();
@@ -632,9 +635,9 @@ std::vector<Ripple> find_ripples(const Campaign& campaign, double threshold) {
     // Some experiments may show a line that others do not: the amplitude's own scatter tells.
     const double sigmas = beyond / std::max(line.amplitude_sigma(), 1e-12);
     const double chi2 = is_known ? sigmas * sigmas : line.chi2();
-    out.push_back(
-        {shaft, line.amplitude(), line.amplitude_sigma(), chi2,
-         std::min(chi2, sigmas * sigmas) > 3.0 * threshold && std::abs(beyond) > kRippleMin});
+    out.push_back({shaft, line.amplitude(), line.amplitude_sigma(), chi2,
+                   std::min(chi2, sigmas * sigmas) > kRippleTail * threshold &&
+                       std::abs(beyond) > kRippleMin});
   }
   return out;
 }

@@ -20,6 +20,8 @@ constexpr double kPressureMost_Pa = 200e5;   // three times what variators have
 constexpr double kTorqueTold_Nm = 10.0;      // less may be losses and zero errors alone
 constexpr double kPowerLeast = 0.3;          // out over in: no variator loses or gains as much
 constexpr double kCopyNoise = 0.3;           // rms of the difference over that of the noise
+// Chosen, times the least change: one that is usually larger comes in many steps.
+constexpr double kFewSteps = 2.5;
 
 std::string text_of(double value) {
   char buffer[32];
@@ -251,7 +253,7 @@ Steps steps_of(const SignalTable& table) {
     if (held <= kLeakHeld || changes.empty()) continue;
     // A channel that is repeated until its next value comes moves by many steps then.
     const double least = *std::min_element(changes.begin(), changes.end());
-    if (estimator::median(changes) < 2.5 * least) return Steps::kLeak;
+    if (estimator::median(changes) < kFewSteps * least) return Steps::kLeak;
   }
   return Steps::kFine;
 }

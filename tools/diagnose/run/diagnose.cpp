@@ -30,6 +30,7 @@ constexpr std::size_t kLearningRunsMin = 6;  // fewer leave no level out
 constexpr int kRoundsMax = 2;                // of learning and naming
 constexpr double kDetectable = 5.0;          // sigmas: found with 90 % and more
 constexpr double kRealistic = 3.0;           // in usual sizes: an effect is hardly ever larger
+constexpr double kAbsorbed = 0.99;           // chosen, of a column: a constant by another name
 
 double quantile_975(double degrees) {
   double low = 0.0, high = 100.0;
@@ -729,9 +730,9 @@ class Run {
       if (seen || named(id)) continue;
       out().not_identifiable.push_back(
           {id, smallest[id],
-           smallest[id].empty()  ? "no other thing here than a friction curve that runs otherwise"
-           : absorbed[id] > 0.99 ? "absorbed by a fitted constant of the machine"
-                                 : "the experiments hardly move what it depends on"});
+           smallest[id].empty() ? "no other thing here than a friction curve that runs otherwise"
+           : absorbed[id] > kAbsorbed ? "absorbed by a fitted constant of the machine"
+                                      : "the experiments hardly move what it depends on"});
     }
   }
 
