@@ -16,6 +16,7 @@ using Eigen::VectorXd;
 
 constexpr double kAnyConstant = 1e-3;           // precision: of a constant that is not known at all
 constexpr double kOwnShareMin = 0.02;           // of a direction: less is the machine's constants
+constexpr double kFarMore = 1.5;                // chosen, times the usual variance
 constexpr int kScatterSteps = 6;                // from the fitted scatter to the usual
 constexpr std::array kLessScatter{0.25, 0.06};  // chosen, of the variance
 
@@ -76,7 +77,7 @@ CellBase cell_base(const Engine& engine) {
   // Where experiments seem to scatter far more than usual, that may be what a function explains.
   const Scatter usual = default_scatter();
   out.scatter.push_back(engine.scatter());
-  if ((engine.scatter().variance > 1.5 * usual.variance).any()) {
+  if ((engine.scatter().variance > kFarMore * usual.variance).any()) {
     for (int i = 1; i <= kScatterSteps; ++i) {
       const double share = static_cast<double>(i) / kScatterSteps;
       Scatter between = engine.scatter();

@@ -42,6 +42,11 @@ constexpr double kSameStep = 1e-3;  // apart by less of their length: both fail;
 // One sigma of curve_faults(), chosen. A fifth more: the same answers in all 24. A fifth less: in
 // one, whose fit has two places to end, the effect that is there is found and nothing is left.
 constexpr double kCurveFault = 0.1;
+constexpr double kHuberSigmas = 6.0;  // chosen: residuals beyond weigh less
+// Chosen: of the torque over the capacity, what all but three in a hundred stay below, and how far
+// from the nominal friction that may be.
+constexpr std::size_t kReachedPercent = 97;
+constexpr double kReachedMost = 5.0;
 // Of two starts for the machine, at the last coarse look, by its noise. Measured, in the 24
 // campaigns of tools/DIAGNOSE.md: what came first in the end was behind by 6.9 at most. A
 // fifth more or less of either number: the same bytes in all 24.
@@ -79,7 +84,8 @@ void reweigh(const Campaign& campaign, const ModelState& state, Whitening& white
         if (data.valid[static_cast<std::size_t>(k)]) size.push_back(std::abs(at.value[kind][k]));
       }
       std::vector<double> sorted = size;
-      const double bound = 6.0 * estimator::kSigmaPerMedian * estimator::median(sorted) + 1.0;
+      const double bound =
+          kHuberSigmas * estimator::kSigmaPerMedian * estimator::median(sorted) + 1.0;
       for (std::size_t i = 0; i < size.size(); ++i) {
         whitening.weight[e][kind][static_cast<Index>(i)] =
             size[i] > bound ? std::sqrt(bound / size[i]) : 1.0;
@@ -547,7 +553,9 @@ double Engine::ln_mu_reached() const {
   }
   const double nominal = state_.nuisance[kLnMuMax];
   if (seen.empty()) return nominal;
-  return nominal + std::log(std::clamp(estimator::at_rank(seen, seen.size() * 97 / 100), 0.2, 5.0));
+  return nominal +
+         std::log(std::clamp(estimator::at_rank(seen, seen.size() * kReachedPercent / 100),
+                             1.0 / kReachedMost, kReachedMost));
 }
 
 void Engine::update_noise() {

@@ -16,7 +16,11 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 constexpr int kDraws = 2000;
-constexpr double kBelow = 0.7, kAbout = 0.5;  // slip over slip at the peak
+constexpr double kBelow = 0.7, kAbout = 0.5;      // slip over slip at the peak
+constexpr double kPeakFrom = 0.8, kPeakTo = 1.5;  // chosen, the same: about the peak
+constexpr double kPeakSamplesMin = 5.0;           // chosen: of a mean about it
+// Chosen: where slip moves the torque by less of its noise, no slip is read from it.
+constexpr double kSteepMin = 0.2;
 constexpr double kAlone = 25.0;   // times the variance of a size, without one experiment
 constexpr double kStepMax = 0.5;  // in tolerances: what one experiment may move the fit by
 
@@ -114,7 +118,7 @@ Gain compare(const std::vector<SignalErrors>& before, const std::vector<SignalEr
   // Friction at the peak: rms over experiments of the mean departure.
   std::vector<std::pair<double, double>> peaks;
   for (std::size_t e = 0; e < before.size(); ++e) {
-    if (before[e].ln_mu_count < 5.0 || after[e].ln_mu_count < 5.0) continue;
+    if (before[e].ln_mu_count < kPeakSamplesMin || after[e].ln_mu_count < kPeakSamplesMin) continue;
     peaks.emplace_back(before[e].ln_mu_sum / before[e].ln_mu_count,
                        after[e].ln_mu_sum / after[e].ln_mu_count);
   }
@@ -284,7 +288,8 @@ SignalErrors signal_errors(const Campaign& campaign, int run, const ModelState& 
     // The distance vector runs along (slope s_slip^2, -s_torque^2); its ends on the axes are the
     // errors of one signal given the other.
     const double distance = at.value[kFrictionResidual][k] / at.weight[k];  // Nm, at given slip
-    if (x < kBelow && at.slope[k] > 0.0 && at.slope[k] * slip_sigma_share > 0.2 * torque_sigma) {
+    if (x < kBelow && at.slope[k] > 0.0 &&
+        at.slope[k] * slip_sigma_share > kSteepMin * torque_sigma) {
       const double slip_error_share = distance / at.slope[k];
       const double omega_s_error = data.omega_s.value[k] * slip_error_share;
       speed.squares += omega_s_error * omega_s_error;
@@ -294,7 +299,7 @@ SignalErrors signal_errors(const Campaign& campaign, int run, const ModelState& 
       torque.squares += distance * distance;
       torque.count += 1.0;
     }
-    if (x > 0.8 && x < 1.5) {
+    if (x > kPeakFrom && x < kPeakTo) {
       out.ln_mu_sum += distance / at.model_Nm[k];
       out.ln_mu_count += 1.0;
     }

@@ -23,6 +23,7 @@ using Eigen::VectorXd;
 
 constexpr int kLevel = 0, kTorqueZero = 2, kTorqueOutZero = 4;  // of the random effects
 constexpr double kHuber = 3.0;
+constexpr double kClipSigmas = 4.0;  // chosen: normal noise is hardly ever beyond
 constexpr double kScatterCap = 8.0;  // in usual scatters: beyond, it is an effect and not scatter
 
 // One sigma between healthy experiments: what replicates on rigs scatter by.
@@ -617,7 +618,8 @@ double clip_bound(const std::vector<double>& values) {
   for (const double v : values) {
     if (v != 0.0) size.push_back(std::abs(v));
   }
-  return (size.empty() ? 0.0 : 4.0 * estimator::kSigmaPerMedian * estimator::median(size)) + 1e-12;
+  return (size.empty() ? 0.0 : kClipSigmas * estimator::kSigmaPerMedian * estimator::median(size)) +
+         1e-12;
 }
 
 void LeftOver::add(const ExperimentData& data, std::size_t e, std::size_t q,
