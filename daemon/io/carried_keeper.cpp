@@ -9,10 +9,12 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "daemon/core/config/load/config_fingerprint.h"
+#include "daemon/io/json_text.h"
 
 namespace beltgrip::daemon {
 
@@ -95,7 +97,7 @@ Json read_file(const std::string& path) {
   std::error_code ignored;
   if (!file && !fs::exists(path, ignored)) return nullptr;
   if (!file) throw std::runtime_error(std::strerror(errno));
-  Json all = Json::parse(file);
+  Json all = json_of({std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()});
   if (all.at("version") != kVersion) throw std::runtime_error("it is of another version");
   if (!all.at("configurations").is_object()) throw std::runtime_error("it has no configurations");
   return all;
@@ -146,6 +148,8 @@ Json carried_json(const CarriedBounds& bounds) {
   }
   return all;
 }
+
+std::string carried_json_text(const CarriedBounds& bounds) { return carried_json(bounds).dump(); }
 
 Result<CarriedBounds> read_carried(const std::string& folder, const std::string& fingerprint) {
   try {

@@ -18,6 +18,7 @@ inline constexpr const char* kCarriedFile = "carried.json";
 
 // The groups of which something is known, with what is shown of each.
 nlohmann::ordered_json carried_json(const CarriedBounds& bounds);
+std::string carried_json_text(const CarriedBounds& bounds);
 
 // What the file in this folder has of a configuration, or with an empty fingerprint of the one that
 // was written last; nothing known where there is no file. Text: what is wrong with it.

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 
@@ -542,7 +541,7 @@ std::string summary_line(const ReplayResult& result) {
         .end_object();
   }
   json.end_array();
-  json.key("carried").raw(daemon::carried_json(result.carried).dump());
+  json.key("carried").raw(daemon::carried_json_text(result.carried));
   json.end_object();
   return json.take() + "\n";
 }

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "daemon/io/json_text.h"
 #include "tools/cli/failure.h"
 
 namespace beltgrip::cli {
@@ -18,7 +19,7 @@ constexpr std::string_view kBegin = "{";
 // The name of the log if the line is a summary; empty for an experiment, and where a signal ended
 // the run before the log's end. False: neither.
 bool read_line(const std::string& line, std::string& log) {
-  const auto values = nlohmann::json::parse(line, nullptr, false);
+  const auto values = daemon::json_if_any(line);
   if (!values.is_object() || !values.contains("type") || !values.contains("log")) return false;
   if (!values["log"].is_string()) return false;
   const bool whole = !values.value("stopped", false);

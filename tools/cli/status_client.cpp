@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/io/json_text.h"
 #include "tools/cli/failure.h"
 
 namespace beltgrip::cli {
@@ -74,7 +75,7 @@ Status ask_status(const std::string& path) {
     if (text.size() > kAnswerMost) throw Failure{kBadInput, path + ": an answer without end"};
   }
   if (text.empty()) throw Failure{kUnavailable, path + ": beltgripd did not answer within 5 s"};
-  auto values = nlohmann::ordered_json::parse(text, nullptr, false);
+  auto values = daemon::json_if_any(text);
   if (values.is_discarded()) throw Failure{kBadInput, path + ": the answer is not whole"};
   return {text, std::move(values)};
 }

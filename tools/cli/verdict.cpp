@@ -1,11 +1,13 @@
 #include "tools/cli/verdict.h"
-#include "can_dbc/text/format.h"
-#include "can_dbc/text/printable.h"
 
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "can_dbc/text/format.h"
+#include "can_dbc/text/printable.h"
+#include "daemon/io/json_text.h"
 #include "tools/cli/failure.h"
 #include "tools/cli/replay_run.h"
 #include "tools/text/json_writer.h"
@@ -63,8 +65,9 @@ Truth read_truth(const std::string& path) {
   if (!file) throw Failure{kNoInput, path + ": cannot be read"};
   Truth truth;
   try {
-    const auto json = nlohmann::json::parse(file);
-    const auto number = [](const nlohmann::json& value) {
+    const auto json =
+        daemon::json_of({std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()});
+    const auto number = [](const nlohmann::ordered_json& value) {
       return value.is_null() ? std::optional<double>() : value.get<double>();
     };
     truth.scenario = json.at("scenario").get<std::string>();
