@@ -1,7 +1,6 @@
 #include "tools/diagnose/infer/engine.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -724,7 +723,8 @@ bool Engine::is_constant(int slot) const {
       }
     }
   }
-  const double explained = along.dot(gram.completeOrthogonalDecomposition().solve(along));
+  // Of any solution, where constants do the same in part: what they leave open is orthogonal to it.
+  const double explained = along.dot(gram.ldlt().solve(along));
   return energy > 0.0 && explained > kSame * energy;
 }
 
