@@ -1,6 +1,5 @@
 #include "tools/diagnose/decide/unknown.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -211,12 +210,12 @@ MatrixXd GroupScores::information(const GroupColumns& group, const Fit& fit,
     if (!is_scatter_counted) continue;
     const MatrixXd ua = each.ua(Eigen::all, group.columns);
     const MatrixXd inverse = (1.0 / fit.scatter.variance).matrix().asDiagonal();
-    total -= ua.transpose() * (each.uu + inverse).llt().solve(ua);
+    total -= ua.transpose() * solved_llt(each.uu + inverse, ua);
   }
   for (Index j = 0; j < n_; ++j) total(j, j) += base_prior_.precision[j];
   const MatrixXd cross = total.topRightCorner(n_, 3);
   return total.bottomRightCorner(3, 3) -
-         cross.transpose() * total.topLeftCorner(n_, n_).ldlt().solve(cross);
+         cross.transpose() * solved_ldlt(total.topLeftCorner(n_, n_), cross);
 }
 
 double GroupScores::own_share(const GroupColumns& group, const VectorXd& direction) const {
@@ -225,7 +224,7 @@ double GroupScores::own_share(const GroupColumns& group, const VectorXd& directi
   for (Index j = 0; j < n_; ++j) plain(j, j) += kAnyConstant;
   const VectorXd mixed = plain.topRightCorner(n_, 3) * direction;
   const double energy = direction.dot(plain.bottomRightCorner(3, 3) * direction);
-  return (energy - mixed.dot(plain.topLeftCorner(n_, n_).ldlt().solve(mixed))) / energy;
+  return (energy - mixed.dot(solved_ldlt(plain.topLeftCorner(n_, n_), mixed))) / energy;
 }
 
 std::vector<double> GroupScores::accepted_chi2(const Fit& fit) const {
@@ -250,7 +249,7 @@ std::optional<UnknownGroup> GroupScores::score(std::size_t v, std::size_t inject
   out.share = none_.misfit > 0.0 ? (none_.misfit - fit.misfit) / none_.misfit : 0.0;
   const VectorXd value = fit.step.tail(3);
   const MatrixXd covariance = fit.covariance.bottomRightCorner(3, 3);
-  const double wald = value.dot(covariance.ldlt().solve(value));
+  const double wald = value.dot(solved_ldlt(covariance, value));
   const VectorXd direction = value / std::max(value.norm(), 1e-30);
   const double own = own_share(columns, direction);
   if (own < kOwnShareMin) return std::nullopt;

@@ -1,6 +1,5 @@
 #include "tools/diagnose/infer/engine.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -621,7 +620,7 @@ std::vector<RandomVector> Engine::offsets() const {
   columns.push_back(static_cast<int>(summaries_.front().aa.rows()) - 1);
   for (const Summary& each : summaries_) {
     const VectorXd right = each.ua(Eigen::all, columns) * full;
-    out.emplace_back(-(each.uu + inverse).llt().solve(right).array());
+    out.emplace_back(-solved_llt(each.uu + inverse, right).array());
   }
   return out;
 }
@@ -724,7 +723,7 @@ bool Engine::is_constant(int slot) const {
     }
   }
   // Of any solution, where constants do the same in part: what they leave open is orthogonal to it.
-  const double explained = along.dot(gram.ldlt().solve(along));
+  const double explained = along.dot(solved_ldlt(gram, along));
   return energy > 0.0 && explained > kSame * energy;
 }
 

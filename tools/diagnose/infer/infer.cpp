@@ -181,6 +181,19 @@ Whitening::Filter levinson(const std::vector<double>& covariance) {
 
 }  // namespace
 
+VectorXd solved_llt(const MatrixXd& matrix, const VectorXd& right) {
+  return matrix.llt().solve(right);
+}
+MatrixXd solved_llt(const MatrixXd& matrix, const MatrixXd& right) {
+  return matrix.llt().solve(right);
+}
+VectorXd solved_ldlt(const MatrixXd& matrix, const VectorXd& right) {
+  return matrix.ldlt().solve(right);
+}
+MatrixXd solved_ldlt(const MatrixXd& matrix, const MatrixXd& right) {
+  return matrix.ldlt().solve(right);
+}
+
 Scatter default_scatter() {
   Scatter out;
   for (int i = 0; i < kRandomEffects; ++i) {
@@ -415,7 +428,7 @@ std::array<VectorXd, kResidualKinds> white_residuals(const Campaign& campaign, i
   const Summary summary = summary_of(campaign, run, raw, whitening);
   const MatrixXd inverse = (1.0 / scatter.variance).matrix().asDiagonal();
   VectorXd weights(1 + kRandomEffects);
-  weights << 1.0, -(summary.uu + inverse).llt().solve(summary.ua.col(0));
+  weights << 1.0, -solved_llt(summary.uu + inverse, VectorXd(summary.ua.col(0)));
   const std::vector<WhiteBlock> blocks = whitened(campaign, run, raw, whitening);
   const std::vector<int> kinds = kinds_of(campaign);
   std::array<VectorXd, kResidualKinds> out;
@@ -584,11 +597,11 @@ Information information_on(const std::vector<Summary>& summaries, const std::vec
       total += each.aa(picked, picked);
       if (!with_scatter) continue;
       const MatrixXd ua = each.ua(Eigen::all, picked);
-      total -= ua.transpose() * (each.uu + inverse).llt().solve(ua);
+      total -= ua.transpose() * solved_llt(each.uu + inverse, ua);
     }
     for (Index j = 0; j < n; ++j) total(j, j) += prior.precision[j];
     const VectorXd cross = total.topRightCorner(n, 1);
-    return total(n, n) - cross.dot(total.topLeftCorner(n, n).ldlt().solve(cross));
+    return total(n, n) - cross.dot(solved_ldlt(total.topLeftCorner(n, n), cross));
   };
   return {perpendicular(true), perpendicular(false)};
 }
@@ -656,7 +669,7 @@ LeftOver left_over(const Campaign& campaign, const std::vector<RawColumns>& raw,
     const ExperimentData& data = campaign.runs[e];
     if (data.valid_count == 0) continue;
     const std::vector<WhiteBlock> blocks = whitened(campaign, static_cast<int>(e), raw[e], plain);
-    const VectorXd u = -(summaries[e].uu + inverse).llt().solve(summaries[e].ua * full);
+    const VectorXd u = -solved_llt(summaries[e].uu + inverse, VectorXd(summaries[e].ua * full));
     VectorXd weights(full.size() + u.size());
     weights << full, u;
     for (std::size_t i = 0; i < kinds.size(); ++i) {

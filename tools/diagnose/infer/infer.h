@@ -54,6 +54,13 @@ struct Summary {
   int samples = 0;
 };
 
+// Of symmetric equations, positive definite or (ldlt) not; compiled once, as the templates of a
+// decomposition cost the compiler seconds wherever they stand.
+Eigen::VectorXd solved_llt(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);
+Eigen::MatrixXd solved_llt(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
+Eigen::VectorXd solved_ldlt(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right);
+Eigen::MatrixXd solved_ldlt(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
+
 struct Scatter {
   RandomVector variance;
 };
