@@ -7,9 +7,9 @@
 namespace beltgrip::estimator {
 
 // Why a method or the daemon stops; the first reason wins. Wire values of
-// BeltGripStatus.StopReason: a new one has a row in the table of daemon/core/input/stop_cause, a
-// value in can_dbc/beltgrip.dbc, a bound in daemon/core/guard/tx_gate and a row in
-// tools/NO_RESULT.md.
+// BeltGripStatus.StopReason: a new one has a row in the tables of daemon/core/input/stop_cause (its
+// name and words) and daemon/core/reasons (what to do), a value in can_dbc/beltgrip.dbc, a bound in
+// daemon/core/guard/tx_gate and a row in tools/NO_RESULT.md.
 enum class StopReason : std::uint8_t {
   kNone,
   kSlope,
