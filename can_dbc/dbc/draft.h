@@ -16,6 +16,9 @@ namespace beltgrip::can::dbc {
 
 // Longer ones are refused: every further mention would be a copy.
 inline constexpr std::size_t kNameLengthMax = 1024;
+// The message of the signals that stand in none.
+inline constexpr std::string_view kIndependentMessage = "VECTOR__INDEPENDENT_SIG_MSG";
+inline constexpr std::uint32_t kIndependentId = 0xC000'0000U;
 
 // Of "m3": the signal's place in its message and the number, in the order of the signals.
 struct SelectorValue {

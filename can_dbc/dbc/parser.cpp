@@ -20,11 +20,8 @@ namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::uint32_t kExtendedFlag = 0x8000'0000U;
-constexpr std::string_view kIndependentMessage = "VECTOR__INDEPENDENT_SIG_MSG";
-constexpr std::uint32_t kIndependentId = 0xC000'0000U;
 constexpr std::size_t kExcerptLength = 24;  // of the text that a message quotes
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 // Reads the statements of a DBC text into a draft. Each handler starts behind its keyword; false:
 // it has said what is wrong, and the statement is kept as text.

@@ -24,8 +24,6 @@ constexpr std::size_t kDuplicatesMax = 8;
 // Copies of long text would multiply too.
 constexpr std::size_t kChoiceLengthMax = 255;
 constexpr std::size_t kLongNameLengthMax = 255;
-constexpr std::string_view kIndependentMessage = "VECTOR__INDEPENDENT_SIG_MSG";
-constexpr std::uint32_t kIndependentId = 0xC000'0000U;
 
 using Indices = std::span<const std::uint32_t>;
 

@@ -16,7 +16,6 @@ namespace {
 
 constexpr bool is_blank(char c) { return static_cast<unsigned char>(c) <= ' '; }
 constexpr bool is_line_break(char c) { return c == '\n' || c == '\r'; }
-constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
 constexpr bool is_word_char(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || is_digit(c) || c == '_';
 }

@@ -14,6 +14,8 @@
 
 namespace beltgrip::can::dbc {
 
+constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
 // Problems by offset; sorted and turned into lines and columns at the end.
 class ProblemList {
  public:

@@ -10,6 +10,7 @@
 namespace beltgrip::can {
 
 inline constexpr std::size_t kMaxPayload = 64;
+inline constexpr std::int64_t kSecond_ns = 1'000'000'000;  // of the instants of frames
 inline constexpr std::uint32_t kStandardIdMax = 0x7FF;
 inline constexpr std::uint32_t kExtendedIdMax = 0x1FFF'FFFF;
 

@@ -381,7 +381,6 @@ std::string frame_text(const CanFrame& frame) {
 }
 
 void CandumpWriter::write(std::int64_t t_ns, std::string_view interface, const CanFrame& frame) {
-  constexpr std::int64_t kSecond_ns = 1'000'000'000;
   line_.assign(1, '(');
   const bool negative = t_ns < 0;
   if (negative) line_ += '-';

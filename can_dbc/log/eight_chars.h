@@ -49,7 +49,7 @@ inline std::uint64_t first(int count) noexcept {
 }
 
 // Of the first `count` characters, 1 to 8, all of them digits.
-inline std::uint64_t decimal(std::uint64_t word, int count) noexcept {
+inline std::uint64_t decimal_of(std::uint64_t word, int count) noexcept {
   // Zeros in front make them eight; then pairs, fours and all eight are put together.
   const int missing = kChars * (kChars - count);
   std::uint64_t digits = ((word & first(count)) ^ (each('0') & first(count))) << missing;

@@ -14,8 +14,7 @@ constexpr std::size_t kRecordHeader = 16;
 constexpr std::uint32_t kMicroseconds = 0xA1B2'C3D4;
 constexpr std::uint32_t kLinkTypeBits = 0xFFFF;  // above them: length of a check sum
 constexpr std::uint32_t kPacketMost = 262'144;   // what capture programs hold of a packet at most
-constexpr std::uint32_t kKept = 128;             // more than any CAN packet
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::uint32_t kPacketKept = 128;       // more than any CAN packet
 
 class PcapParser : public BinaryParser {
  public:
@@ -39,11 +38,11 @@ class PcapParser : public BinaryParser {
       return broken(at, "a packet of " + std::to_string(held) +
                             " bytes, expected at most 262144: damaged from here on");
     }
-    const auto packet_bytes = input_.take(std::min(held, kKept));
+    const auto packet_bytes = input_.take(std::min(held, kPacketKept));
     if (!packet_bytes) return cut(at, input_, "a packet of " + std::to_string(held) + " bytes");
     const Packet packet = read_packet(link_type_, *packet_bytes, whole, big_, record);
     interface_ = std::to_string(packet.interface_index);
-    if (!input_.skip(held - std::min(held, kKept))) return cut(at, input_, "a packet");
+    if (!input_.skip(held - std::min(held, kPacketKept))) return cut(at, input_, "a packet");
     record.interface = interface_;
     record.t_ns = second * kSecond_ns + std::int64_t{part} * part_ns_;
     if (packet.kind == PacketKind::kBad) return bad(at, packet.reason);

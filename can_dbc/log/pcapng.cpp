@@ -33,10 +33,10 @@ constexpr std::uint32_t kByteOrder = 0x1A2B'3C4D;
 constexpr std::size_t kPacketFields = 20;
 constexpr std::size_t kInterfaceFields = 8;
 constexpr std::size_t kSectionFields = 16;
-constexpr std::size_t kKept = 4096;  // of a block: holds any CAN packet, and an interface's options
+constexpr std::size_t kBlockKept =
+    4096;  // of a block: holds any CAN packet, and an interface's options
 constexpr std::size_t kInterfacesMost = 1024;  // more are in no capture: bounds the memory
 constexpr std::size_t kNameMost = 64;
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::uint8_t kPowerOfTwo = 0x80;
 
 struct Interface {
@@ -105,7 +105,7 @@ class PcapngParser : public BinaryParser {
     }
     const std::size_t body = size - kBlockFrame;
     input_.take(kBlockHeader);
-    const std::size_t kept = std::min(body, kKept);
+    const std::size_t kept = std::min(body, kBlockKept);
     const auto bytes = input_.take(kept);
     if (!bytes) return cut(at_, input_, "a block of " + std::to_string(size) + " bytes");
     const RecordKind kind = read_block(type, Fields(*bytes, big_), record);
@@ -196,7 +196,7 @@ class PcapngParser : public BinaryParser {
     const Interface& interface = interfaces_[number];
     const std::uint32_t held = fields.u32(12);
     const std::size_t there = fields.size() - kPacketFields;
-    if (held > there && there < kKept - kPacketFields) {
+    if (held > there && there < kBlockKept - kPacketFields) {
       return reject("a packet of " + std::to_string(held) + " bytes in a block that has " +
                     std::to_string(there));
     }

@@ -9,7 +9,6 @@ namespace beltgrip::can::log_text {
 
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::size_t kStampLengthMax = 32;
 
 // Exactly `digits` digits from the front.

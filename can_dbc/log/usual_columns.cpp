@@ -117,7 +117,7 @@ class Columns {
     const std::uint64_t ends = no_digits(word);
     const int count = ends == 0 ? kChars : before(ends);
     if (count == 0) return 0;
-    value = decimal(word, count);
+    value = decimal_of(word, count);
     at_ += count;
     return count;
   }

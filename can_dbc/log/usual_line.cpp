@@ -23,7 +23,7 @@ const char* read_stamp(const char* at, std::int64_t& t_ns) noexcept {
   const std::uint64_t ends = no_digits(word);
   const int count = ends == 0 ? kChars : before(ends);
   if (count == 0) return nullptr;
-  std::uint64_t whole_s = decimal(word, count);
+  std::uint64_t whole_s = decimal_of(word, count);
   at += count;
   constexpr int kMore = 2;  // ten digits are enough for 200 years
   if (count == kChars) {
@@ -31,7 +31,6 @@ const char* read_stamp(const char* at, std::int64_t& t_ns) noexcept {
       whole_s = whole_s * 10 + static_cast<std::uint64_t>(*at++ - '0');
     }
   }
-  constexpr std::uint64_t kSecond_ns = 1'000'000'000;
   constexpr std::uint64_t kLongest_s = INT64_MAX / kSecond_ns - 2;
   if (*at != '.' || whole_s > kLongest_s) return nullptr;
   ++at;
@@ -41,15 +40,15 @@ const char* read_stamp(const char* at, std::int64_t& t_ns) noexcept {
   if (fraction_ends != 0) {
     constexpr int kMicroseconds = 6;
     if (before(fraction_ends) != kMicroseconds) return nullptr;
-    fraction_ns = decimal(fraction, kMicroseconds) * 1000;
+    fraction_ns = decimal_of(fraction, kMicroseconds) * 1000;
     at += kMicroseconds;
   } else {
     if (!is_digit(at[kChars])) return nullptr;
-    fraction_ns = decimal(fraction, kChars) * 10 + static_cast<std::uint64_t>(at[kChars] - '0');
+    fraction_ns = decimal_of(fraction, kChars) * 10 + static_cast<std::uint64_t>(at[kChars] - '0');
     at += kChars + 1;
   }
   if (at[0] != ')' || at[1] != ' ') return nullptr;
-  t_ns = static_cast<std::int64_t>(whole_s * kSecond_ns + fraction_ns);
+  t_ns = static_cast<std::int64_t>(whole_s) * kSecond_ns + static_cast<std::int64_t>(fraction_ns);
   return at + 2;
 }
 

@@ -10,8 +10,8 @@ namespace beltgrip::estimator {
 namespace {
 
 // Before the stop, in cells of the finest level.
-constexpr std::size_t kBeforeCell = 10, kBeforeCells = 5;
-constexpr double kFewest = 5.0;
+constexpr std::size_t kBeforeCell = 10, kCellsBefore = 5;
+constexpr double kWeightLeast = 5.0;
 
 }  // namespace
 
@@ -24,13 +24,13 @@ void FollowOn::Mean::add(double after_s, const Cell& cell) noexcept {
 
 void FollowOn::begin(const ExperimentRecord& record) noexcept {
   const History& history = record.history();
-  if (begun_ || history.size(0) < kBeforeCell + kBeforeCells) return;
+  if (begun_ || history.size(0) < kBeforeCell + kCellsBefore) return;
   begun_ = true;
   stop_t_s_ = record.duration_s();
   slip_noise_percent2_s_ = record.slip_noise_percent2_s();
   force_variance_N2_ = record.force().density(kMean_s) / kMean_s;
-  before_cells_s_ = history.cell_s(0) * static_cast<double>(kBeforeCells);
-  for (std::size_t i = kBeforeCell; i < kBeforeCell + kBeforeCells; ++i) {
+  before_cells_s_ = history.cell_s(0) * static_cast<double>(kCellsBefore);
+  for (std::size_t i = kBeforeCell; i < kBeforeCell + kCellsBefore; ++i) {
     const Cell& cell = history.cell(0, i);
     before_.add(cell.t_s - stop_t_s_, cell);
   }
@@ -66,7 +66,7 @@ double FollowOn::carried(double traction_per_Nm_N, double inertia_kg_m2) const n
 
 bool FollowOn::stood_still(double mu, double traction_per_Nm_N,
                            double inertia_kg_m2) const noexcept {
-  if (middle_.n < kFewest || late_.n < kFewest || !(force_ > 0.0)) return false;
+  if (middle_.n < kWeightLeast || late_.n < kWeightLeast || !(force_ > 0.0)) return false;
   if (clamped_again()) return false;
   if (carried(traction_per_Nm_N, inertia_kg_m2) < kStillCarried * mu) return false;
   // Slip gained around the stop, less what the later pace, so many times over, would have gained.

@@ -22,7 +22,7 @@ constexpr double kScale = 3.0;  // of m, in units of the largest mu* so far
 constexpr double kForceStep = 0.02;  // relative
 constexpr double kSlipStep_percent = 0.08;
 constexpr double kShortestPoint_s = 0.05;
-constexpr std::size_t kFewestPoints = 5;
+constexpr std::size_t kForecastPoints = 5;
 constexpr double kLeastPossible = 1e-3;
 // Curves that are less likely than the best by more than this do not count (of the logarithm), and
 // beyond the second are never looked at again: evidence does not turn round by so much.
@@ -229,12 +229,12 @@ void PeakForecast::fit(Curve& curve) const noexcept {
 }
 
 void PeakForecast::take_in() noexcept {
-  const bool enough = points_ >= kFewestPoints;
+  const bool enough = points_ >= kForecastPoints;
   for (int work = 0; work < work_per_step_ && next_ < left_; ++next_) {
     const std::size_t index = points_ == 1 ? next_ : order_[next_];
     Curve& curve = curves_[index];
     work += kWorkLook;
-    if (points_ > kFewestPoints && !(curve.log_likelihood >= best_before_ - kForgotten)) continue;
+    if (points_ > kForecastPoints && !(curve.log_likelihood >= best_before_ - kForgotten)) continue;
     order_[kept_++] = static_cast<std::uint16_t>(index);
     add_point(curve);
     work += kWorkAdd;

@@ -12,7 +12,7 @@ constexpr double kCell_s = 0.05;
 constexpr double kContradiction = 3.0;      // deviations by which a part may leave the line
 constexpr double kLineNoiseScale_s = 0.4;   // longer means scatter by what is not noise
 constexpr double kQuietSlip_percent = 0.2;  // slip that moves less does not move the value
-constexpr std::size_t kShortest = 4;        // cells in the first line
+constexpr std::size_t kCellsLeast = 4;      // cells in the first line
 // A bend makes the squares of means twice as long 16 times as large, white noise halves them,
 // rounding leaves them. Chosen: two deviations above rounding, with as few squares as are believed.
 // Measured (build/tests/campaign --from 980001 --seeds 1200 --nothing-wrong --noise lab, and 300
@@ -214,7 +214,7 @@ bool Trend::fits(const Line& line, std::size_t begin, std::size_t end,
     const double bound = kContradiction * std::sqrt(cell_variance / static_cast<double>(to - from));
     return std::abs(mean_deviation(line, from, to)) <= bound + 1e-12;
   };
-  for (std::size_t part = kShortest; part < length; part *= 2) {
+  for (std::size_t part = kCellsLeast; part < length; part *= 2) {
     if (!within(end - part, end) || !within(begin, begin + part)) return false;
   }
   const std::size_t third = length / 3;
@@ -237,14 +237,14 @@ int Trend::first_bent_scale() const noexcept {
 
 Line Trend::line() const noexcept {
   const std::size_t oldest = cells_ >= sums_.size() ? cells_ - sums_.size() + 1 : 0;
-  if (cells_ < oldest + kShortest) return {};
+  if (cells_ < oldest + kCellsLeast) return {};
   const int bent = course_ == Course::kBends ? first_bent_scale() : kScales;
   const std::size_t straight = std::size_t{1} << (bent - 1);
   const double noise_over_s = std::min(kLineNoiseScale_s, cell_s_ * static_cast<double>(straight));
   const double cell_variance = density(noise_over_s) / cell_s_;
   const std::size_t longest =
-      bent < kScales ? std::clamp(3 * straight, kShortest, cells_ - oldest) : cells_ - oldest;
-  std::size_t length = kShortest;
+      bent < kScales ? std::clamp(3 * straight, kCellsLeast, cells_ - oldest) : cells_ - oldest;
+  std::size_t length = kCellsLeast;
   Line best = through(cells_ - length, cells_, cell_variance);
   while (length < longest) {
     length = std::min(longest, length + std::max<std::size_t>(2, length / 2));

@@ -5,6 +5,7 @@ import os
 import pathlib
 import shlex
 import subprocess
+import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
@@ -17,6 +18,9 @@ class Relink:
 
     def compile(self, name, copy, target, *options):
         """`copy` as the build compiles the source `name`, without its warnings. Its errors; '': done."""
+        if str(ROOT / name) not in self.commands:
+            sys.exit(f"{self.build}: {name} is compiled together with others; "
+                     "configure with -DBELTGRIP_TOGETHER=OFF")
         line = self.commands[str(ROOT / name)][:]
         line[line.index("-o") + 1] = str(target)
         line[line.index("-c") + 1] = str(copy)

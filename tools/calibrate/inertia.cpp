@@ -17,8 +17,8 @@ namespace {
 
 using daemon::Role;
 
-constexpr double kCell_s = 0.1;
-constexpr double kGrid_s = 0.01;
+constexpr double kSlowCell_s = 0.1;
+constexpr double kShapeGrid_s = 0.01;
 constexpr int kPerCell = 10;
 constexpr double kBefore_s = 0.8, kAfter_s = 1.2;  // of a step
 constexpr double kStep_Nm = 15.0;
@@ -26,8 +26,8 @@ constexpr double kStepTime_s = 0.3;
 constexpr int kEventsMin = 6;
 constexpr double kRelativeStdMax = 0.2;
 constexpr double kDelayFirst_s = -0.05, kDelayLast_s = 0.2;
-constexpr double kDelayStdMax_s = 0.01;
-constexpr double kSpeedMin_rad_s = 60.0;
+constexpr double kInertiaDelayStdMax_s = 0.01;
+constexpr double kInertiaSpeedMin_rad_s = 60.0;
 constexpr double kLocked_rad_s = 5.0;  // between engine and pulley: the clutch is closed
 
 // One step of the torque on a grid: from kBefore_s before it to kAfter_s after, the torque on a
@@ -49,9 +49,9 @@ bool grid(const Series& series, double from_s, double step_s, int count,
 
 bool usable(const Series& primary, const Series& engine, const Series& torque, const Series& brake,
             double from_s, double to_s) {
-  for (double t = from_s; t <= to_s; t += 5.0 * kGrid_s) {
+  for (double t = from_s; t <= to_s; t += 5.0 * kShapeGrid_s) {
     const auto p = primary.at(t);
-    if (!p || *p < kSpeedMin_rad_s || !torque.at(t)) return false;
+    if (!p || *p < kInertiaSpeedMin_rad_s || !torque.at(t)) return false;
     // A load that comes and goes as fast as the torque passes for an inertia.
     if (!brake.empty() && brake.at(t).value_or(0.0) > 0.0) return false;
     if (engine.empty()) continue;
@@ -69,17 +69,17 @@ std::vector<Event> events(std::span<const diagnose::SignalTable> logs) {
         brake(log[Role::kBrakePressed]);
     if (primary.empty() || secondary.empty() || torque.empty()) continue;
     double next = torque.begin_s() + kBefore_s;
-    for (double t = next; t + kAfter_s + kDelayLast_s < torque.end_s(); t += 2.0 * kGrid_s) {
+    for (double t = next; t + kAfter_s + kDelayLast_s < torque.end_s(); t += 2.0 * kShapeGrid_s) {
       if (t < next) continue;
       const auto before = torque.at(t - 0.5 * kStepTime_s);
       const auto after = torque.at(t + 0.5 * kStepTime_s);
       if (!before || !after || std::abs(*after - *before) < kStep_Nm) continue;
       if (!usable(primary, engine, torque, brake, t - kBefore_s, t + kAfter_s)) continue;
       Event event;
-      const int count = static_cast<int>(std::lround((kBefore_s + kAfter_s) / kGrid_s));
+      const int count = static_cast<int>(std::lround((kBefore_s + kAfter_s) / kShapeGrid_s));
       const double reach_s = kBefore_s + kAfter_s + kDelayLast_s - kDelayFirst_s;
-      if (!grid(primary, t - kBefore_s, kGrid_s, count, event.primary) ||
-          !grid(secondary, t - kBefore_s, kGrid_s, count, event.secondary) ||
+      if (!grid(primary, t - kBefore_s, kShapeGrid_s, count, event.primary) ||
+          !grid(secondary, t - kBefore_s, kShapeGrid_s, count, event.secondary) ||
           !grid(torque, t - kBefore_s + kDelayFirst_s, kFine_s,
                 static_cast<int>(std::lround(reach_s / kFine_s)) + 1, event.torque)) {
         continue;
@@ -95,7 +95,8 @@ std::vector<Event> events(std::span<const diagnose::SignalTable> logs) {
 std::vector<double> delayed(const Event& event, double delay_s) {
   std::vector<double> values;
   for (std::size_t i = 0; i < event.primary.size(); ++i) {
-    const double place = (static_cast<double>(i) * kGrid_s + delay_s - kDelayFirst_s) / kFine_s;
+    const double place =
+        (static_cast<double>(i) * kShapeGrid_s + delay_s - kDelayFirst_s) / kFine_s;
     const auto before = std::min(static_cast<std::size_t>(place), event.torque.size() - 2);
     const double share = place - static_cast<double>(before);
     values.push_back(event.torque[before] +
@@ -160,8 +161,8 @@ Fitted fit_all(const std::vector<Event>& all, double delay_s) {
                            (mean(event.primary, i) + mean(event.primary, i + 1));
       result.ratio_low = std::min(result.ratio_low, ratio);
       result.ratio_high = std::max(result.ratio_high, ratio);
-      x(i, 0) = (mean(event.primary, i + 1) - mean(event.primary, i)) / kCell_s;
-      x(i, 1) = ratio * (mean(event.secondary, i + 1) - mean(event.secondary, i)) / kCell_s;
+      x(i, 0) = (mean(event.primary, i + 1) - mean(event.primary, i)) / kSlowCell_s;
+      x(i, 1) = ratio * (mean(event.secondary, i + 1) - mean(event.secondary, i)) / kSlowCell_s;
       y[i] = under_triangle(torque, i);
       load(i, 0) = ratio;
       load(i, 1) = ratio * (i - 0.5 * (cells - 1));
@@ -175,7 +176,7 @@ Fitted fit_all(const std::vector<Event>& all, double delay_s) {
       y -= column * (column.dot(y) / norm[j]);
     }
     for (int i = 0; i < cells; ++i) data.add(y[i], x.row(i).transpose(), static_cast<int>(e));
-    const double per_cell = 2.0 / (kPerCell * kCell_s * kCell_s) * (cells - 2);
+    const double per_cell = 2.0 / (kPerCell * kSlowCell_s * kSlowCell_s) * (cells - 2);
     noise(0, 0) += per_cell * noise_variance(event.primary);
     noise(1, 1) += per_cell * noise_variance(event.secondary) * ratio_square;
   }
@@ -212,12 +213,13 @@ BestDelay best_delay(const std::vector<Event>& all, double step_s) {
 // Between the delays tried: the parabola through the best and its neighbours. None: the best is
 // the first or the last.
 std::optional<double> between_delays_s(const BestDelay& best) {
-  const auto at = static_cast<std::size_t>(std::lround((best.delay_s - kDelayFirst_s) / kGrid_s));
+  const auto at =
+      static_cast<std::size_t>(std::lround((best.delay_s - kDelayFirst_s) / kShapeGrid_s));
   if (at == 0 || at + 1 == best.squares.size()) return std::nullopt;
   const double before = best.squares[at - 1], after = best.squares[at + 1];
   const double curvature = before - 2.0 * best.squares[at] + after;
   const double shift = curvature > 0.0 ? 0.5 * (before - after) / curvature : 0.0;
-  return best.delay_s + std::clamp(shift, -0.5, 0.5) * kGrid_s;
+  return best.delay_s + std::clamp(shift, -0.5, 0.5) * kShapeGrid_s;
 }
 
 // The events one half against the other: what the delay is worth.
@@ -226,9 +228,9 @@ double delay_std_s(const std::vector<Event>& all) {
   for (std::size_t half = 0; half < 2; ++half) {
     std::vector<Event> some;
     for (std::size_t i = half; i < all.size(); i += 2) some.push_back(all[i]);
-    halves_s[half] = best_delay(some, 0.5 * kGrid_s).delay_s;
+    halves_s[half] = best_delay(some, 0.5 * kShapeGrid_s).delay_s;
   }
-  return std::hypot(0.5 * (halves_s[0] - halves_s[1]), 0.5 * kGrid_s);
+  return std::hypot(0.5 * (halves_s[0] - halves_s[1]), 0.5 * kShapeGrid_s);
 }
 
 }  // namespace
@@ -254,7 +256,7 @@ std::vector<Finding> inertia(std::span<const diagnose::SignalTable> logs,
         format("%zu steps of the engine torque by %.0f Nm with the clutch closed, needs %d",
                all.size(), kStep_Nm, kEventsMin));
   }
-  const BestDelay tried = best_delay(all, kGrid_s);
+  const BestDelay tried = best_delay(all, kShapeGrid_s);
   if (!tried.fitted.fit.solved) return refuse("the steps do not determine an inertia");
   delay.value = between_delays_s(tried);
   if (!delay.value) {
@@ -272,11 +274,11 @@ std::vector<Finding> inertia(std::span<const diagnose::SignalTable> logs,
       (brake_known ? "" : ", brakes unknown: the role brake_pressed leaves their steps out");
   delay.std = delay_std_s(all);
   delay.text = "after the speeds; " + basis;
-  if (delay.std > kDelayStdMax_s) {
+  if (delay.std > kInertiaDelayStdMax_s) {
     delay.value.reset();
-    delay.text =
-        format("known to %.0f ms only, %.0f ms would do (", 1e3 * delay.std, 1e3 * kDelayStdMax_s) +
-        basis + ")";
+    delay.text = format("known to %.0f ms only, %.0f ms would do (", 1e3 * delay.std,
+                        1e3 * kInertiaDelayStdMax_s) +
+                 basis + ")";
   }
   const double value = best.fit.value[0];
   const double std = best.fit.std[0];

@@ -30,7 +30,7 @@ namespace {
 
 using calibrate::Finding;
 
-struct Options {
+struct CalibrateOptions {
   std::vector<std::string> logs;
   std::string config;
   std::string json;
@@ -154,7 +154,7 @@ std::string role_line(const daemon::Config& config, daemon::Role wanted, double 
 }
 
 std::string toml(const std::vector<Finding>& findings, const daemon::Config& config,
-                 const Options& options) {
+                 const CalibrateOptions& options) {
   std::string signals, sensors, variator, remarks;
   for (const Finding& each : findings) {
     if (!each.value) {
@@ -202,7 +202,7 @@ std::string toml(const std::vector<Finding>& findings, const daemon::Config& con
 
 // What is written must load: each finding alone, over the configuration that it is for.
 void keep_what_loads(std::vector<Finding>& findings, const daemon::Config& config,
-                     const Options& options) {
+                     const CalibrateOptions& options) {
   for (Finding& each : findings) {
     if (!each.value) continue;
     const std::string lines = toml({each}, config, options);
@@ -215,7 +215,7 @@ void keep_what_loads(std::vector<Finding>& findings, const daemon::Config& confi
   }
 }
 
-void run(const Options& options) {
+void run_calibrate(const CalibrateOptions& options) {
   if (options.json == "-" && options.out == "-") {
     throw Failure{kUsage, "calibrate: only one of --json and --out can be standard output"};
   }
@@ -259,7 +259,7 @@ void add_calibrate(command_line::Command app) {
   const command_line::Command command = app.add_subcommand(
       "calibrate",
       "End-stop ratios, zero of the pressure, inertia and delays from recorded drives");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateOptions>();
   command
       .add_option("LOG", options->logs,
                   "CAN logs of drives, or tables of signals (.csv), all of the same vehicle")
@@ -276,7 +276,7 @@ void add_calibrate(command_line::Command app) {
   command.add_flag("--quiet", options->quiet, kNoProgress);
   command.example(
       "beltgrip calibrate drive/trace.log --config drive/beltgrip.toml --out found.toml");
-  command.callback([options] { run(*options); });
+  command.callback([options] { run_calibrate(*options); });
 }
 
 }  // namespace beltgrip::cli

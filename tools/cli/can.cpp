@@ -17,7 +17,7 @@ namespace {
 
 using daemon::CanLink;
 
-struct Options {
+struct CanOptions {
   std::string interface;
   daemon::CanLinkSetting setting;
   bool json = false;
@@ -152,7 +152,7 @@ void add_can(command_line::Command app) {
   const command_line::Command can =
       app.add_subcommand("can", "Set up a CAN interface, or show its state");
   can.require_subcommand();
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CanOptions>();
   const auto subcommand = [&](const char* name, const char* help) {
     const command_line::Command command = can.add_subcommand(name, help);
     command.add_option("INTERFACE", options->interface, "A CAN interface").type_name("").required();

@@ -38,7 +38,7 @@ namespace beltgrip::cli {
 
 namespace {
 
-struct Options {
+struct CheckOptions {
   std::vector<std::string> logs;
   std::string config;
   std::string json;
@@ -197,7 +197,7 @@ check::Findings constants(const std::vector<std::string>& logs, const daemon::Co
   return check::judge_constants(calibrate::calibrate(tables, config), config, periods_s);
 }
 
-void run(const Options& options) {
+void run_check(const CheckOptions& options) {
   const bool live = options.live_s > 0.0;
   if (live && !options.logs.empty()) {
     throw Failure{kUsage, "check: found logs and --live, expected one of them"};
@@ -250,7 +250,7 @@ void add_check(command_line::Command app) {
   const command_line::Command command = app.add_subcommand(
       "check",
       "Does a configuration fit the car: every role, what belongs together, what is missing");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CheckOptions>();
   command
       .add_option("LOG", options->logs,
                   "CAN logs of drives, or tables of signals (.csv), all of the same vehicle")
@@ -268,7 +268,7 @@ void add_check(command_line::Command app) {
   command.add_flag("--quiet", options->quiet, kNoProgress);
   command.example("beltgrip check drive/trace.log --config drive/beltgrip.toml");
   command.example("beltgrip check --live 60 --config mycar.toml");
-  command.callback([options] { run(*options); });
+  command.callback([options] { run_check(*options); });
 }
 
 }  // namespace beltgrip::cli

@@ -26,7 +26,7 @@
 namespace beltgrip::cli {
 namespace {
 
-struct Options {
+struct DiagnoseOptions {
   std::string config, model, json, report, model_out, next_out;
   std::vector<std::string> logs, held_out;
   int jobs = 1;
@@ -35,7 +35,7 @@ struct Options {
 
 bool is_table(const std::string& path) { return path.ends_with(".csv"); }
 
-daemon::Config load(const Options& options) {
+daemon::Config load(const DiagnoseOptions& options) {
   const bool tables = std::all_of(options.logs.begin(), options.logs.end(), is_table) &&
                       std::all_of(options.held_out.begin(), options.held_out.end(), is_table);
   const daemon::ConfigResult result = daemon::load_config(
@@ -112,7 +112,7 @@ void show_progress(double share, const std::string& what) {
   if (share >= 1.0) std::fprintf(stderr, "\n");
 }
 
-void run(const Options& options) {
+void run_diagnose(const DiagnoseOptions& options) {
   end_in_good_order();
   const daemon::Config config = load(options);
   diagnose::Request request;
@@ -175,7 +175,7 @@ void run(const Options& options) {
 }  // namespace
 
 void add_diagnose(command_line::Command app) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<DiagnoseOptions>();
   const command_line::Command command = app.add_subcommand(
       "diagnose", "shows what the simulation gets wrong, names the cause, extends the model");
   command.add_option("LOG", options->logs, "one experiment each: .csv, or a log")
@@ -201,7 +201,7 @@ void add_diagnose(command_line::Command app) {
       .range(1, 256);
   command.example(
       "beltgrip diagnose run*.csv --config mycar.toml --report found.html --model-out model.toml");
-  command.callback([options] { run(*options); });
+  command.callback([options] { run_diagnose(*options); });
 }
 
 }  // namespace beltgrip::cli

@@ -38,7 +38,7 @@ using daemon::outcome_name;
 using daemon::stop_reason_name;
 using estimator::PeakKind;
 
-struct Options {
+struct HistoryOptions {
   std::string file;
   std::string config;
   std::vector<std::string> from;
@@ -243,12 +243,12 @@ std::string folder_of(const std::string& file) {
 }
 
 // What logs have, and of what history: in FILE, or for this answer alone.
-History read_logs(const Options& options, int& exit_code) {
+History read_logs(const HistoryOptions& options, int& exit_code) {
   if (options.config.empty()) throw Failure{kUsage, "history: --from needs --config"};
   const daemon::Config config = load_configuration(options.config, "");
   const std::optional<Scratch> scratch =
       options.file.empty() ? std::make_optional<Scratch>() : std::nullopt;
-  Options filled = options;
+  HistoryOptions filled = options;
   filled.file = scratch ? scratch->path() : folder_of(options.file);
   for (const std::string& line : fill_history(filled.file, options.from, config)) {
     text::complain(line);
@@ -259,7 +259,7 @@ History read_logs(const Options& options, int& exit_code) {
   return history;
 }
 
-void run(const Options& options) {
+void run_history(const HistoryOptions& options) {
   if (options.json == "-" && options.csv == "-") {
     throw Failure{kUsage, "history: only one of --json and --csv can be standard output"};
   }
@@ -287,7 +287,7 @@ void run(const Options& options) {
 void add_history(command_line::Command app) {
   const command_line::Command command = app.add_subcommand(
       "history", "The experiments that the daemon has kept, and what they say together");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<HistoryOptions>();
   command
       .add_option("FILE", options->file,
                   "history.db or its folder (default: the configuration's state_dir, else " +
@@ -310,7 +310,7 @@ void add_history(command_line::Command app) {
   command.example("beltgrip history --from drive/trace.log --config drive/beltgrip.toml");
   command.example("beltgrip history fleet/car17 --from car17/*.log.zst --config mycar.toml");
   command.example("beltgrip history --config mycar.toml --csv belt.csv");
-  command.callback([options] { run(*options); });
+  command.callback([options] { run_history(*options); });
 }
 
 }  // namespace beltgrip::cli

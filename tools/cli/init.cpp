@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::size_t kAlternativesShown = 2;
 
-struct Options {
+struct InitOptions {
   std::vector<std::string> dbc;
   std::vector<std::string> log;
   std::string interface = "can0";
@@ -264,7 +264,7 @@ void append_assumed(std::string& text, daemon::Role torque) {
   }
 }
 
-void run(const Options& options) {
+void run_init(const InitOptions& options) {
   check_interface(options.interface);
   Inputs inputs(options.dbc);
   inputs.add(options.log);
@@ -346,7 +346,7 @@ void run(const Options& options) {
 void add_init(command_line::Command app) {
   const command_line::Command command =
       app.add_subcommand("init", "Propose a configuration for DBC files");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<InitOptions>();
   command.add_option("DBC", options->dbc, "The vehicle's DBC files").type_name("").required();
   command
       .add_option(
@@ -362,7 +362,7 @@ void add_init(command_line::Command app) {
   command.add_flag("--force", options->force, "Replace a file that exists");
   command.example("beltgrip init drive/vehicle.dbc --out mycar.toml");
   command.example("beltgrip init drive/vehicle.dbc --log drive/trace.log");
-  command.callback([options] { run(*options); });
+  command.callback([options] { run_init(*options); });
 }
 
 }  // namespace beltgrip::cli

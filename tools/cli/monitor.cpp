@@ -16,7 +16,7 @@ namespace beltgrip::cli {
 
 namespace {
 
-struct Options {
+struct MonitorOptions {
   std::string source, config, interface, truth;
   bool plain = false, once = false, json = false, table = false;
   double speed = 1.0, from_s = 0.0, duration_s = 0.0;
@@ -32,7 +32,7 @@ bool is_log(const std::string& source) {
          std::filesystem::exists(source, none);
 }
 
-MonitorOutput output_of(const Options& options) {
+MonitorOutput output_of(const MonitorOptions& options) {
   if (options.plain + options.once + options.table > 1) {
     throw Failure{kUsage, "monitor: only one of --plain, --once, --table"};
   }
@@ -46,7 +46,7 @@ MonitorOutput output_of(const Options& options) {
   return MonitorOutput::kScreen;
 }
 
-void run(const Options& options) {
+void run_monitor(const MonitorOptions& options) {
   if (options.source.starts_with("inproc:")) {
     throw Failure{kUnavailable, "monitor: found " + options.source +
                                     ", a bus that no other process can be on, expected a "
@@ -96,7 +96,7 @@ void FrameLister::end() const {
 void add_monitor(command_line::Command app) {
   const command_line::Command command =
       app.add_subcommand("monitor", "What BeltGrip does, and why: a view of a bus or a log");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MonitorOptions>();
   command.add_option("SOURCE", options->source, "A SocketCAN interface, or a CAN log")
       .type_name("")
       .required();
@@ -131,7 +131,7 @@ void add_monitor(command_line::Command app) {
   command.example("beltgrip monitor can0 --config mycar.toml");
   command.example("beltgrip monitor drive/trace.log --config drive/beltgrip.toml --once");
   command.example("beltgrip monitor can0 --json --duration 60");
-  command.callback([options] { run(*options); });
+  command.callback([options] { run_monitor(*options); });
 }
 
 }  // namespace beltgrip::cli

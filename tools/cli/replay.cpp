@@ -29,7 +29,7 @@ namespace beltgrip::cli {
 
 namespace {
 
-struct Options {
+struct ReplayOptions {
   std::vector<std::string> logs;
   std::string config;
   std::string method;
@@ -60,7 +60,7 @@ struct Task {
   std::optional<Failure> failure;
 };
 
-void run_task(Task& task, const Options& options, const daemon::Config& config,
+void run_task(Task& task, const ReplayOptions& options, const daemon::Config& config,
               const ReplayOutputs& outputs) {
   try {
     task.result =
@@ -165,7 +165,7 @@ void print_speed(std::uint64_t frames, std::chrono::steady_clock::time_point beg
 }
 
 // The logs as one timeline onto a bus in real time; BeltGrip's own frames stay out.
-void play_logs(const Options& options) {
+void play_logs(const ReplayOptions& options) {
   end_streams_when_stopped(options.logs);
   if (!options.json.empty() || !options.trace.empty() || !options.signals.empty() ||
       !options.log_out.empty()) {
@@ -189,7 +189,7 @@ void play_logs(const Options& options) {
                static_cast<unsigned long long>(timeline->counters().frames));
 }
 
-void check_as_recorded(const Options& options, const daemon::Config& config) {
+void check_as_recorded(const ReplayOptions& options, const daemon::Config& config) {
   if (options.as_recorded && options.decide_anew) {
     throw Failure{kUsage, "replay: --as-recorded and --decide-anew exclude each other"};
   }
@@ -215,14 +215,16 @@ std::unique_ptr<signals::SignalWriter> signal_writer(const std::string& path, Ou
   return signals::make_mf4_writer(file.get(), signal_columns(config));
 }
 
-bool goes_log_by_log(const Options& options) { return options.logs.size() > 1 && !options.join; }
+bool goes_log_by_log(const ReplayOptions& options) {
+  return options.logs.size() > 1 && !options.join;
+}
 
-int outputs_on_stdout(const Options& options) {
+int outputs_on_stdout(const ReplayOptions& options) {
   return (options.json == "-") + (options.trace == "-") + (options.signals == "-") +
          (options.log_out == "-");
 }
 
-void check_together(const Options& options) {
+void check_together(const ReplayOptions& options) {
   if (options.speed) throw Failure{kUsage, "replay: --speed needs --bus"};
   if (options.config.empty()) throw Failure{kUsage, "replay: --config is required"};
   if (goes_log_by_log(options) &&
@@ -242,7 +244,7 @@ void check_together(const Options& options) {
 }
 
 // All logs in one, or each that an earlier run has not done.
-std::vector<Task> tasks_of(const Options& options, const ResumedLines* resumed) {
+std::vector<Task> tasks_of(const ReplayOptions& options, const ResumedLines* resumed) {
   std::vector<Task> tasks;
   if (!goes_log_by_log(options) && resumed == nullptr) {
     tasks.push_back({options.logs, {}, {}});
@@ -261,7 +263,7 @@ std::vector<Task> tasks_of(const Options& options, const ResumedLines* resumed) 
 // The files asked for beside the results.
 class Files {
  public:
-  Files(const Options& options, const Inputs& inputs, const daemon::Config& config) {
+  Files(const ReplayOptions& options, const Inputs& inputs, const daemon::Config& config) {
     if (!options.trace.empty()) trace_.emplace(options.trace, inputs);
     if (!options.signals.empty()) {
       signals_.emplace(options.signals, inputs);
@@ -291,7 +293,7 @@ class Files {
 // Takes the tasks as they end, in the order of their logs.
 class Ends {
  public:
-  Ends(const Options& options, std::size_t tasks, Progress& progress, Teller& teller,
+  Ends(const ReplayOptions& options, std::size_t tasks, Progress& progress, Teller& teller,
        ResumedLines* resumed)
       : options_(options), tasks_(tasks), progress_(progress), teller_(teller), resumed_(resumed) {}
 
@@ -335,7 +337,7 @@ class Ends {
     teller_.end(result);
   }
 
-  const Options& options_;
+  const ReplayOptions& options_;
   std::size_t tasks_, done_ = 0;
   Progress& progress_;
   Teller& teller_;
@@ -345,7 +347,7 @@ class Ends {
   bool any_ = false;
 };
 
-void run(const Options& options) {
+void run_replay(const ReplayOptions& options) {
   if (!options.bus.empty()) return play_logs(options);
   end_logs_when_stopped(options.logs);
   check_together(options);
@@ -397,7 +399,7 @@ void run(const Options& options) {
 void add_replay(command_line::Command app) {
   const command_line::Command command =
       app.add_subcommand("replay", "Run the daemon's pipeline over logs, the stamps are the clock");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReplayOptions>();
   command.add_option("LOG", options->logs, std::string(kLogKinds) + "; or tables of signals (.csv)")
       .type_name("")
       .required();
@@ -440,7 +442,7 @@ void add_replay(command_line::Command app) {
       "beltgrip replay drive/trace.log --config drive/beltgrip.toml --json results.json");
   command.example("beltgrip replay logs/*.log.zst --config mycar.toml --json fleet.jsonl --resume");
   command.example("candump -L can0 | beltgrip replay - --config mycar.toml");
-  command.callback([options] { run(*options); });
+  command.callback([options] { run_replay(*options); });
 }
 
 }  // namespace beltgrip::cli

@@ -22,6 +22,7 @@
 #include "tools/ports/record_port.h"
 #include "tools/ports/replay_port.h"
 #include "tools/table/table_log.h"
+#include "tools/text/joined.h"
 #include "tools/text/json_writer.h"
 #include "tools/text/seconds.h"
 #include "tools/text/snake_case.h"
@@ -173,12 +174,6 @@ class Sink final : public daemon::SampleSink {
   std::string phases_[4];
   std::string row_;
 };
-
-std::string joined(const std::vector<std::string>& paths) {
-  std::string name;
-  for (const std::string& path : paths) name += (name.empty() ? "" : "+") + path;
-  return name;
-}
 
 void describe_troubles(const can::LogStats& stats, const ports::TimelineCounters& counters,
                        ReplayResult& result) {
@@ -395,7 +390,7 @@ ReplayResult replay(const std::vector<std::string>& paths, const std::string& in
                     const daemon::Config& config, const ReplayOutputs& outputs,
                     AsRecorded as_recorded) {
   ReplayResult result;
-  result.log = joined(paths);
+  result.log = text::joined(paths, "+");
   const std::string further = further_interface(config);
   ports::ReplayPort::Receiver receiver;
   std::unique_ptr<can::CandumpWriter> writer;

@@ -27,7 +27,7 @@ namespace beltgrip::cli {
 
 namespace {
 
-struct Options {
+struct ReportOptions {
   std::vector<std::string> logs;
   std::string config, method, interface, history;
   double rate_Hz = 0.0;
@@ -76,7 +76,7 @@ std::string short_name(const std::string& log, const std::vector<std::string>& l
   return same > 1 ? log : name_of(log);
 }
 
-void report_logs(const Options& options) {
+void report_logs(const ReportOptions& options) {
   if (options.config.empty()) throw Failure{kUsage, "report: --config is required for logs"};
   end_logs_when_stopped(options.logs);
   Inputs inputs(options.logs);
@@ -129,13 +129,13 @@ void report_logs(const Options& options) {
   text::print(stdout, counted(experiments.size(), "experiment") + ": " + options.out + "\n");
 }
 
-void report_history(const Options& options) {
+void report_history(const ReportOptions& options) {
   const History history = read_history(options.history, options.config);
   write_file(options.out, {options.config, history.path}, history_page(history));
   text::print(stdout, counted(history.rows.size(), "experiment") + ": " + options.out + "\n");
 }
 
-void run(const Options& options) {
+void run_report(const ReportOptions& options) {
   if (options.logs.empty() == options.history.empty()) {
     throw Failure{kUsage, "report: expected logs, or --history FILE"};
   }
@@ -148,7 +148,7 @@ void run(const Options& options) {
 void add_report(command_line::Command app) {
   const command_line::Command command = app.add_subcommand(
       "report", "Drives and their experiments, or a belt's history, as one HTML file");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReportOptions>();
   command.add_option("LOG", options->logs, "Logs as for replay").type_name("");
   command.add_option("--config", options->config, "BeltGrip's configuration; required for logs")
       .type_name("FILE");
@@ -168,7 +168,7 @@ void add_report(command_line::Command app) {
       .capture_default_str();
   command.example("beltgrip report drive/trace.log --config drive/beltgrip.toml --out report.html");
   command.example("beltgrip report --history /var/lib/beltgrip --out belt.html");
-  command.callback([options] { run(*options); });
+  command.callback([options] { run_report(*options); });
 }
 
 }  // namespace beltgrip::cli

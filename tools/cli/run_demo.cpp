@@ -41,7 +41,7 @@ constexpr double kLateStart_s = 80.0;  // ten seconds before the peak
 constexpr double kRig_s = 20.0;
 constexpr std::int64_t kPace_ns = 10'000'000;
 
-struct Options {
+struct RunDemoOptions {
   ScenarioOptions scenario;
   std::string method;
 };
@@ -139,7 +139,7 @@ void stage(const daemon::Config& config, daemon::Duration shift,
 }
 
 // Virtual time, held back to real time: what is shown does not depend on how busy the machine is.
-void run_vehicle(const Options& options) {
+void run_vehicle(const RunDemoOptions& options) {
   const sim::VehicleScenario scenario = options.scenario.load_vehicle();
   const daemon::Config config =
       load_configuration_text(sim::vehicle_configuration(scenario, kBus, "vehicle.dbc"),
@@ -178,7 +178,7 @@ void run_vehicle(const Options& options) {
   results.print(stdout, port.vehicle());
 }
 
-void run_rig(const Options& options) {
+void run_rig(const RunDemoOptions& options) {
   const double start_s = options.scenario.start_s > 0.0 ? options.scenario.start_s : kLateStart_s;
   const double end_s =
       start_s + (options.scenario.duration_s > 0.0 ? options.scenario.duration_s : kRig_s);
@@ -211,7 +211,7 @@ void run_rig(const Options& options) {
                 make_truth(scenario, options.scenario.seed, first.t_ns, source.simulation()));
 }
 
-void run(const Options& options) {
+void run_run_demo(const RunDemoOptions& options) {
   return options.scenario.is_vehicle() ? run_vehicle(options) : run_rig(options);
 }
 
@@ -221,7 +221,7 @@ void add_run_demo(command_line::Command app) {
   const command_line::Command command = app.add_subcommand(
       "run-demo",
       "A simulated car, or rig, with the daemon's loop on one bus, in this process, in real time");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RunDemoOptions>();
   options->scenario.scenario = "demo";
   options->scenario.add_to(command);
   command.add_option("--method", options->method, "robust (default) or paper")
@@ -229,7 +229,7 @@ void add_run_demo(command_line::Command app) {
       .one_of({"robust", "paper"});
   command.example("beltgrip run-demo");
   command.example("beltgrip run-demo --scenario paper-rig --belt worn");
-  command.callback([options] { run(*options); });
+  command.callback([options] { run_run_demo(*options); });
 }
 
 }  // namespace beltgrip::cli

@@ -29,9 +29,7 @@ namespace beltgrip::cli {
 
 namespace {
 
-constexpr const char* kInterface = "vcan0";
-
-struct Options {
+struct SimulateOptions {
   ScenarioOptions scenario;
   std::string out_dir;
   std::string log_out;
@@ -101,7 +99,7 @@ class RigLog final : public can::LogReader {
 };
 
 // With results: the daemon's loop runs over the frames; else they are only written.
-Run run_rig(const Options& options, std::FILE* log, bool results) {
+Run run_rig(const SimulateOptions& options, std::FILE* log, bool results) {
   const sim::RigScenario scenario = options.scenario.load();
   const sim::RigScenario machine = options.machine(scenario);
   sim::RigSource source(machine, options.scenario.seed, options.scenario.start_s,
@@ -134,7 +132,7 @@ Run run_rig(const Options& options, std::FILE* log, bool results) {
   return run;
 }
 
-Run run_vehicle(const Options& options, std::FILE* log) {
+Run run_vehicle(const SimulateOptions& options, std::FILE* log) {
   const sim::VehicleScenario scenario = options.scenario.load_vehicle();
   const sim::VehicleScenario machine = options.machine(scenario);
   DriveResult drive =
@@ -148,7 +146,7 @@ Run run_vehicle(const Options& options, std::FILE* log) {
   return run;
 }
 
-void run_on_bus(const Options& options) {
+void run_on_bus(const SimulateOptions& options) {
   if (options.scenario.is_vehicle()) {
     return drive_on_bus(options.machine(options.scenario.load_vehicle()), options.scenario.seed,
                         options.bus, options.speed);
@@ -160,7 +158,7 @@ void run_on_bus(const Options& options) {
        [&](can::StampedFrame& frame) { return next_frame(source, frame); });
 }
 
-void run(const Options& options) {
+void run_simulate(const SimulateOptions& options) {
   const int places = !options.out_dir.empty() + !options.log_out.empty() + !options.bus.empty();
   const bool to_stdout = options.log_out == "-" || options.json == "-";
   if (places > 1 || (options.log_out == "-" && options.json == "-")) {
@@ -222,7 +220,7 @@ void add_simulate(command_line::Command app) {
   const command_line::Command command = app.add_subcommand(
       "simulate",
       "Drive a virtual vehicle, or a rig, with the daemon on the other side of its bus");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SimulateOptions>();
   options->scenario.add_to(command);
   command
       .add_option("--out-dir", options->out_dir,
@@ -253,7 +251,7 @@ void add_simulate(command_line::Command app) {
       .range(1e-3, 1e3);
   command.example("beltgrip simulate --scenario coast-overdrive --out-dir drive");
   command.example("beltgrip simulate --scenario coast-overdrive --bus vcan0");
-  command.callback([options] { run(*options); });
+  command.callback([options] { run_simulate(*options); });
 }
 
 }  // namespace beltgrip::cli

@@ -23,7 +23,6 @@ namespace beltgrip::cli {
 
 namespace {
 
-constexpr const char* kInterface = "vcan0";
 // Where a request has done harm, whatever the fault.
 constexpr double kSlipLimit_share = 0.10;
 constexpr double kSlipSpeedLimit_m_s = 0.8;

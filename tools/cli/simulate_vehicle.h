@@ -16,6 +16,8 @@
 
 namespace beltgrip::cli {
 
+inline constexpr const char* kInterface = "vcan0";  // of what runs on no bus
+
 // The plant's state has left the numbers: Failure with seed and time.
 [[noreturn]] void fail_not_finite(double t_s, std::uint64_t seed);
 

@@ -22,7 +22,7 @@ namespace beltgrip::cli {
 
 namespace {
 
-struct Options {
+struct StatusOptions {
   std::string interface;
   std::string socket;
   bool json = false;
@@ -31,7 +31,7 @@ struct Options {
   std::string prometheus;
 };
 
-std::string socket_of(const Options& options) {
+std::string socket_of(const StatusOptions& options) {
   return options.socket.empty() ? status_socket(options.interface) : options.socket;
 }
 
@@ -46,14 +46,14 @@ std::string in_words(const std::string& path, const Status& status, Text text) {
   }
 }
 
-void show(const Options& options) {
+void show(const StatusOptions& options) {
   const std::string path = socket_of(options);
   const Status status = ask_status(path);
   text::print(stdout, options.json ? status.text : in_words(path, status, status_text));
 }
 
 // The file is written in any case: who reads it learns that nobody answers.
-void write_metrics(const Options& options) {
+void write_metrics(const StatusOptions& options) {
   std::optional<Failure> unanswered;
   std::string text;
   try {
@@ -90,7 +90,7 @@ bool waited(double interval_s) {
 
 // JSON: a line at each turn. Words: a line at each change. A daemon that is not there is waited
 // for.
-void follow(const Options& options) {
+void follow(const StatusOptions& options) {
   end_in_good_order();
   std::string before;
   do {
@@ -113,7 +113,7 @@ void follow(const Options& options) {
   } while (waited(options.interval_s));
 }
 
-void run(const Options& options) {
+void run_status(const StatusOptions& options) {
   if (!options.prometheus.empty() && (options.follow || options.json)) {
     throw Failure{kUsage, "--prometheus writes once, expected neither --follow nor --json"};
   }
@@ -126,7 +126,7 @@ void run(const Options& options) {
 void add_status(command_line::Command app) {
   const command_line::Command command =
       app.add_subcommand("status", "What a running beltgripd sees and measures");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<StatusOptions>();
   command.add_option("INTERFACE", options->interface, "Its interface, where several run")
       .type_name("");
   command.add_option("--socket", options->socket, "Its socket, where it is not a service")
@@ -147,7 +147,7 @@ void add_status(command_line::Command app) {
   command.example("beltgrip status can0 --follow --json | mosquitto_pub -l -t car/beltgrip");
   command.example(
       "beltgrip status can0 --prometheus /var/lib/prometheus/node-exporter/beltgrip.prom");
-  command.callback([options] { run(*options); });
+  command.callback([options] { run_status(*options); });
 }
 
 }  // namespace beltgrip::cli

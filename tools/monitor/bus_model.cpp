@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "can_dbc/frame/can_frame.h"
 #include "can_dbc/text/format.h"
 #include "daemon/core/publish/names.h"
 #include "daemon/core/publish/own_frames.h"
@@ -14,7 +15,6 @@ namespace {
 
 using daemon::MonoTime;
 
-constexpr double kSecond_ns = 1e9;
 constexpr std::size_t kPointsMost =
     600;  // of a curve, more than cells to show them: then every other goes
 constexpr std::size_t kExperimentsKept = 50;
@@ -99,7 +99,7 @@ double Rate::per_second(MonoTime now) const {
        ++each) {
     sum += sums_[static_cast<std::size_t>(each % (kCells + 1))];
   }
-  return sum * kSecond_ns / static_cast<double>(((cell - from) * kCell).ns());
+  return sum * double{can::kSecond_ns} / static_cast<double>(((cell - from) * kCell).ns());
 }
 
 int frame_bits(const can::CanFrame& frame) {
@@ -238,7 +238,7 @@ void BusModel::take_status(MonoTime t, const OwnFrameView& frame) {
 
 void BusModel::show(View& view, MonoTime now) const {
   const auto seconds = [&](MonoTime since) {
-    return static_cast<double>((now - since).ns()) / kSecond_ns;
+    return static_cast<double>((now - since).ns()) / double{can::kSecond_ns};
   };
   const std::optional<double> bitrate = view.traffic.bitrate;
   view.traffic = traffic_;

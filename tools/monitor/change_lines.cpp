@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "can_dbc/frame/can_frame.h"
 #include "can_dbc/text/format.h"
 #include "can_dbc/text/printable.h"
 #include "tools/monitor/layout.h"
@@ -32,9 +33,9 @@ bool is_news(const std::string& phase) { return phase == "peak" || phase == "mac
 }  // namespace
 
 void ChangeLines::line(const View& view, const std::string& text) {
-  constexpr std::int64_t kSecond_ns = 1'000'000'000, kMicrosecond_ns = 1'000;
-  lines_ += format("(%lld.%06lld) ", static_cast<long long>(view.wall_ns / kSecond_ns),
-                   static_cast<long long>(view.wall_ns % kSecond_ns / kMicrosecond_ns)) +
+  constexpr std::int64_t kMicrosecond_ns = 1'000;
+  lines_ += format("(%lld.%06lld) ", static_cast<long long>(view.wall_ns / can::kSecond_ns),
+                   static_cast<long long>(view.wall_ns % can::kSecond_ns / kMicrosecond_ns)) +
             can::printable(view.source) + " " + can::printable(text) + "\n";
 }
 

@@ -7,7 +7,6 @@ namespace beltgrip::sim {
 
 namespace {
 
-constexpr std::uint32_t kClampIdentifier = 0x6A2;
 constexpr double kLockupCapacity_Nm = 400.0;
 constexpr double kLockupRamp_Nm_s = 150.0;   // while it closes
 constexpr double kLockupStart_rad_s = 20.0;  // in overrun it begins to close below this only

@@ -19,6 +19,8 @@
 
 namespace beltgrip::sim {
 
+inline constexpr std::uint32_t kClampIdentifier = 0x6A2;  // of the contract
+
 struct TcuInput {
   double omega_e_rad_s = 0.0;
   double omega_p_rad_s = 0.0;

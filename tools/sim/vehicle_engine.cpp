@@ -12,11 +12,11 @@ constexpr double kFuelCutHysteresis_rad_s = 15.0;
 constexpr double kIdleGain_Nm_s = 1.5;  // torque per rad/s below idle
 constexpr double kIdleTorqueMax_Nm = 60.0;
 constexpr double kRestart_s = 2.0;  // from a stall to the next start
-constexpr double kCoulombWidth_rad_s = 5.0;
+constexpr double kEngineCoulombWidth_rad_s = 5.0;
 }  // namespace
 
 double VehicleEngine::step(double accelerator, double omega_rad_s, double extra_Nm, double step_s) {
-  const double coulomb = std::tanh(omega_rad_s / kCoulombWidth_rad_s);
+  const double coulomb = std::tanh(omega_rad_s / kEngineCoulombWidth_rad_s);
   const double drag_Nm =
       std::max(0.0, parameters_.overrun_torque_Nm +
                         parameters_.overrun_slope_Nm_s * (omega_rad_s - kDragSpeed_rad_s)) *

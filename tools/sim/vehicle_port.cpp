@@ -12,7 +12,6 @@ namespace {
 constexpr std::int64_t kFrame_ns = 260'000;    // 8 bytes at 500 kbit/s, with stuffing
 constexpr double kArbitration_ns = 500'000.0;  // waits up to two other frames
 constexpr std::int64_t kForeignPeriod_ns = 10'000'000;
-constexpr std::uint32_t kClampIdentifier = 0x6A2;
 constexpr std::uint32_t kFloodIdentifier = 0x050;
 constexpr std::int64_t kFlood_ns = 10'000'000;
 // Error frames as in linux/can/error.h.

@@ -283,14 +283,13 @@ std::optional<FrameLayout> read_layout(File& file, const Block& group, std::size
 
 std::optional<std::int64_t> time_ns(const Number& time, std::string_view record,
                                     std::int64_t start_ns) {
-  constexpr double kSecond_ns = 1e9;
   constexpr double kRoundOff = 1e-9;  // of a factor such as 1e-6, told in binary
   constexpr double kMost_ns = 9e18;
-  const double factor_ns = time.factor * kSecond_ns;
+  const double factor_ns = time.factor * double{kSecond_ns};
   const double nearest = std::round(factor_ns);
   const bool decimal = nearest > 0.0 && std::abs(factor_ns - nearest) < kRoundOff * nearest;
   const double since_ns =
-      time.offset * kSecond_ns + time.raw(record) * (decimal ? nearest : factor_ns);
+      time.offset * double{kSecond_ns} + time.raw(record) * (decimal ? nearest : factor_ns);
   std::int64_t sum_ns = 0;
   if (!(std::abs(since_ns) < kMost_ns) ||
       __builtin_add_overflow(std::llround(since_ns), start_ns, &sum_ns)) {

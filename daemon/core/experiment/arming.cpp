@@ -7,6 +7,7 @@
 #include "daemon/core/experiment/force_floor.h"
 #include "daemon/core/experiment/ramp_rate.h"
 #include "estimator/physics/slip.h"
+#include "estimator/physics/units.h"
 #include "estimator/signal/signal_chain.h"
 
 namespace beltgrip::daemon {
@@ -40,7 +41,7 @@ constexpr double kFurther = 0.95;      // chosen: of the speed; is there more ro
 // its crossing. With the whole of it 34 of 60 drawn cars were not asked.
 constexpr double kFaultShare = 0.5;
 constexpr Duration kSlipMean = 500 * kMillisecond;
-constexpr double kPercent = 100.0;
+using estimator::kPercent;
 // A request begins at the own force and falls from there: what that falls by itself within the
 // actuator's answer must stay far inside the band in which a force counts as following. A coasting
 // car's own falls by some 50 N/s.

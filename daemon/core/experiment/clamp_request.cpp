@@ -1,4 +1,5 @@
 #include "daemon/core/experiment/clamp_request.h"
+#include "estimator/physics/units.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +10,7 @@ namespace beltgrip::daemon {
 using estimator::StopReason;
 
 namespace {
-constexpr double kPercent = 100.0;
+using estimator::kPercent;
 // What the slip since the start leaves out: slip at the start, and the deformation that is gone.
 constexpr double kSlipAtStart_share = 0.01;
 // And of a late peak more: at 57 % of its friction a belt has come 28 % of the way in slip.

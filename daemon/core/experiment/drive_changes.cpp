@@ -1,4 +1,5 @@
 #include "daemon/core/experiment/drive_changes.h"
+#include "estimator/physics/units.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,10 +9,10 @@ namespace beltgrip::daemon {
 using estimator::StopReason;
 
 namespace {
-constexpr double kPercent = 100.0;
+using estimator::kPercent;
 constexpr double kEver_s = 1e9;  // before the first
 // Chosen: of the pedal, above what a foot that holds it, or a cruise control, does in a second.
-constexpr double kPedalMoved = 0.03;
+constexpr double kPedalChanged = 0.03;
 constexpr double kPedalHeld_s = 1.0;
 // Chosen: a torque that comes every 10 ms is halved in its noise, and late by 20 ms.
 constexpr double kTorqueNow_s = 0.02;
@@ -49,11 +50,11 @@ Stop DriveChanges::step(const Now& now) noexcept {
   begun_ = true;
   last_ = now.t;
   const double pedal = std::abs(now.accelerator - accelerator_);
-  if (pedal > kPedalMoved) {
+  if (pedal > kPedalChanged) {
     return {StopReason::kDriver,
             {.what = "pedal moves by",
              .figure = kPercent * pedal,
-             .limit = kPercent * kPedalMoved,
+             .limit = kPercent * kPedalChanged,
              .unit = "%",
              .role = Role::kAcceleratorPedal}};
   }

@@ -1,4 +1,5 @@
 #include "daemon/core/experiment/fall_shown.h"
+#include "estimator/physics/units.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +8,8 @@ namespace beltgrip::daemon {
 
 namespace {
 
-constexpr double kPercent = 100.0;
-constexpr double kDeviations = 2.0;  // 95 % of a normal distribution
+using estimator::kPercent;
+constexpr double kDeviations95 = 2.0;  // 95 % of a normal distribution
 // Derived: of points that lie on a line evenly, a tenth of a point of slip, spread 0.1 / sqrt(12).
 constexpr double kSpreadLeast_percent = 0.03;
 constexpr std::size_t kPointsLeast = 10;  // chosen: fewer tell little of their own noise
@@ -32,7 +33,7 @@ void FallShown::add(double fall, double variance) noexcept {
 FallRange FallShown::range() const noexcept {
   if (!(weight_ > 0.0)) return {};
   const double mean = weighted_ / weight_;
-  const double wide = kDeviations / std::sqrt(weight_);
+  const double wide = kDeviations95 / std::sqrt(weight_);
   return {std::max(0.0, mean - wide), std::max(kLeast, kMargin * std::max(0.0, mean) + wide)};
 }
 

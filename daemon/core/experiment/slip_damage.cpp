@@ -8,7 +8,7 @@ namespace beltgrip::daemon {
 
 namespace {
 // Chosen: of a torque with 0.7 % of noise 0.15 % are left, and the mean is 70 ms late.
-constexpr double kMean_s = 0.035;   // each of two lags
+constexpr double kLag_s = 0.035;    // each of two lags
 constexpr double kRises = 1.0015;   // of the best before: more than the mean's noise
 constexpr double kForgets = 0.006;  // a single rise by so much forgets all, a smaller one its share
 }  // namespace
@@ -20,7 +20,7 @@ void SlipDamage::begin(MonoTime t, double mu_star) noexcept {
 }
 
 void SlipDamage::step(const Now& now) noexcept {
-  const double step_s = seconds(now.t - last_), share = std::min(1.0, step_s / kMean_s);
+  const double step_s = seconds(now.t - last_), share = std::min(1.0, step_s / kLag_s);
   last_ = now.t;
   mu_first_ += share * (now.mu_star - mu_first_);
   mu_mean_ += share * (mu_first_ - mu_mean_);

@@ -3,12 +3,14 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/physics/units.h"
+
 namespace beltgrip::daemon {
 
+using estimator::kPercent;
 using estimator::StopReason;
 
 Stop stop_of(SafetyVerdict verdict, double figure, double limit) noexcept {
-  constexpr double kPercent = 100.0;
   const auto percent = [&](const char* what) {
     return StopCause{
         .what = what, .figure = kPercent * figure, .limit = kPercent * limit, .unit = "%"};
@@ -63,7 +65,6 @@ Stop stop_of(SafetyVerdict verdict, double figure, double limit) noexcept {
 namespace {
 
 StopCause no_crossing(const Obstacle& obstacle) noexcept {
-  constexpr double kPercent = 100.0;
   constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
   switch (obstacle.wall) {
     case CrossingWall::kSlip:

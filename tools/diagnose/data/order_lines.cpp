@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kPiece_s = 4.0;
 constexpr double kSmooth_s = 0.3;  // half width of the local line that is taken out
-constexpr double kSpeedMin_rad_s = 20.0;
+constexpr double kLineSpeedMin_rad_s = 20.0;
 constexpr int kSamplesMin = 60;            // per piece
 constexpr double kSmoothSamplesMin = 8.0;  // chosen: of the local line
 constexpr double kPieceMin = 0.8;          // chosen, of kPiece_s
@@ -164,7 +164,7 @@ std::vector<Piece> pieces_of(const Channel& speed) {
     const double span_s = speed.t_s[end - 1] - speed.t_s[begin];
     piece.period_s = period_s;
     const bool usable = piece.rest.size() >= kSamplesMin && span_s > kPieceMin * kPiece_s &&
-                        std::isfinite(phi) && phi > kSpeedMin_rad_s * span_s &&
+                        std::isfinite(phi) && phi > kLineSpeedMin_rad_s * span_s &&
                         std::all_of(piece.rest.begin(), piece.rest.end(), [](double v) {
                           return std::abs(v) < kRestMax;  // NaN fails as well
                         });

@@ -258,10 +258,10 @@ void close_gaps(SignalTable& table) {
   std::vector<double> sorted = steps;
   const double pause_s =
       std::clamp(kPausePeriods * estimator::median(sorted), kPause_s, kPauseMost_s);
-  struct Stretch {
+  struct Shifted {
     double begin_s, shift_s;
   };
-  std::vector<Stretch> stretches{{all.front(), 0.0}};
+  std::vector<Shifted> stretches{{all.front(), 0.0}};
   for (std::size_t i = 0; i < steps.size(); ++i) {
     if (steps[i] <= pause_s + kRounding_s) continue;
     stretches.push_back({all[i + 1], stretches.back().shift_s + (steps[i] - pause_s)});

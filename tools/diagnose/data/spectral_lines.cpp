@@ -11,7 +11,7 @@
 namespace beltgrip::diagnose {
 namespace {
 
-constexpr double kPiece_s = 1.0 / PooledSpectrum::kStep_Hz;
+constexpr double kSpectrumPiece_s = 1.0 / PooledSpectrum::kStep_Hz;
 constexpr double kHighest = 0.45;  // of the sample rate: what lies above folds back
 constexpr double kMost_Hz = 40.0;
 // Below, ramps and steps have their own power.
@@ -19,8 +19,8 @@ constexpr double kLowest_Hz = 2.0;
 // The level on either side of a line, without the line. The higher one counts: the power of a
 // course falls all the way, and its steps are no lines.
 constexpr double kAround_Hz = 2.0, kOwn_Hz = 0.75;
-constexpr int kPiecesMin = 12;           // chosen: a mean of so many is known to a third
-constexpr std::size_t kSamplesMin = 60;  // per piece
+constexpr int kPiecesMin = 12;                   // chosen: a mean of so many is known to a third
+constexpr std::size_t kSpectrumSamplesMin = 60;  // per piece
 
 std::size_t bin_of(double frequency_Hz) {
   return static_cast<std::size_t>(std::lround(frequency_Hz / PooledSpectrum::kStep_Hz));
@@ -115,10 +115,11 @@ PooledSpectrum pooled_spectrum(const Channel& channel) {
   out.power.assign(bin_of(highest_Hz) + 1, 0.0);
   for (std::size_t begin = 0; begin < channel.t_s.size();) {
     std::size_t end = begin;
-    while (end < channel.t_s.size() && channel.t_s[end] < channel.t_s[begin] + kPiece_s) ++end;
+    while (end < channel.t_s.size() && channel.t_s[end] < channel.t_s[begin] + kSpectrumPiece_s)
+      ++end;
     const bool whole = end < channel.t_s.size() &&
-                       channel.t_s[end] - channel.t_s[begin] < kPiece_s + 3.0 * period_s;
-    if (whole && end - begin >= kSamplesMin) {
+                       channel.t_s[end] - channel.t_s[begin] < kSpectrumPiece_s + 3.0 * period_s;
+    if (whole && end - begin >= kSpectrumSamplesMin) {
       add_piece(channel, begin, end, out.power);
       ++out.pieces;
     }

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "can_dbc/text/number_text.h"
 #include "tools/diagnose/infer/conditions.h"
 
 namespace beltgrip::diagnose {
@@ -30,11 +31,7 @@ struct Ramp {
   double speed_rad_s = 0.0, torque_Nm = 0.0, oil_C = kUsualOil_C, ramp_share = kRampShare;
 };
 
-std::string number(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.5g", value);
-  return buffer;
-}
+std::string number(double value) { return rounded_text(value, 5); }
 
 // Farthest, by ratio or by difference, from all that was done.
 double farthest(std::span<const double> levels, const std::vector<double>& done, bool by_ratio) {

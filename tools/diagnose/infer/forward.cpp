@@ -11,7 +11,7 @@ using Eigen::ArrayXd;
 
 constexpr int kStepsPerSample = 5;
 constexpr int kPasses = 8;
-constexpr double kSettled = 1e-9;       // of speed and capacity, between two passes
+constexpr double kPassesAgree = 1e-9;   // of speed and capacity, between two passes
 constexpr double kBelowCapacity = 0.9;  // torque: begins only where the belt is at rest
 constexpr double kBelowPeak = 0.6;      // measured slip over slip at the peak, likewise
 constexpr double kInertiaMin = 0.01;    // kg m^2: no shaft has less
@@ -221,7 +221,7 @@ Forward run_forward(const Campaign& campaign, int run, const ModelState& state) 
       simulated.torque.value[k] += by_Nm;
     }
     out.grips = last.grips;
-    if (change < kSettled) break;
+    if (change < kPassesAgree) break;
     add_slow(speed, data.dt_s);
     if (torque_follows) add_slow(simulated.torque, data.dt_s);
   }

@@ -11,10 +11,10 @@ namespace {
 using Eigen::ArrayXd;
 using estimator::LearnedTerm;
 
-constexpr int kPassesMax = 6;     // function and machine in turn
-constexpr int kSettling = 10;     // steps of the machine beside the function
-constexpr double kStill = 0.1;    // of the row's unit: moves no more
-constexpr double kStepMax = 0.5;  // in tolerances: what a level may move the fit by
+constexpr int kPassesMax = 6;          // function and machine in turn
+constexpr int kSettling = 10;          // steps of the machine beside the function
+constexpr double kStill = 0.1;         // of the row's unit: moves no more
+constexpr double kLevelStepMax = 0.5;  // in tolerances: what a level may move the fit by
 
 static_assert(kCellKnots <= LearnedTerm::kKnotsMax);
 
@@ -93,7 +93,7 @@ void leave_out(const Engine& engine, const CellColumns& columns, const CellBase&
       }
     }
     const Eigen::VectorXd step = step_beside(columns, base, cell.mean - present, left_out);
-    const double share = std::min(1.0, kStepMax / std::max(step.cwiseAbs().maxCoeff(), 1e-12));
+    const double share = std::min(1.0, kLevelStepMax / std::max(step.cwiseAbs().maxCoeff(), 1e-12));
     ModelState state = engine.state();
     state.learned.back() =
         term_of(*cell.injection, abscissa, present + share * (cell.mean - present));

@@ -18,7 +18,7 @@ using Eigen::ArrayXd;
 constexpr double kLowest_Hz = 0.7, kHighest_Hz = 4.5, kStep_Hz = 0.05;
 constexpr double kAround_Hz = 0.6;  // the noise's level is the median so far about
 constexpr double kSmooth_s = 2.0;   // slower courses are no line
-constexpr int kSamplesMin = 100;
+constexpr int kLineSamplesMin = 100;
 constexpr double kLeast = 0.05;  // of the noise: less is rounding
 constexpr double kClip = 4.0;    // sigmas
 // Chosen, of the level about it: noise comes so far in 1 of 400. Tried on four healthy campaigns
@@ -46,7 +46,7 @@ ArrayXd fast_part(const ExperimentData& run, const ArrayXd& residual, int every)
     sizes.push_back(out[k]);
   }
   const double bound = kClip * robust_sigma(sizes);
-  if (!(bound > kClip * kLeast) || static_cast<int>(sizes.size()) < kSamplesMin) return {};
+  if (!(bound > kClip * kLeast) || static_cast<int>(sizes.size()) < kLineSamplesMin) return {};
   return out.max(-bound).min(bound);
 }
 
@@ -180,7 +180,7 @@ SpectralLine strongest_line(const Campaign& campaign, const ModelState& state) {
   std::array<Pool, kLooks.size()> pools;
   for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
     const ExperimentData& run = campaign.runs[e];
-    if (run.valid_count < kSamplesMin) continue;
+    if (run.valid_count < kLineSamplesMin) continue;
     Residuals at = residuals_of(campaign, static_cast<int>(e), state);
     move_to_foot(campaign, static_cast<int>(e), at);
     std::array<std::vector<bool>, kResidualKinds> is_driven;

@@ -4,37 +4,29 @@
 #include <cmath>
 #include <cstdio>
 
+#include "can_dbc/text/number_text.h"
 #include "tools/diagnose/data/baseline_tests.h"
 #include "tools/diagnose/report/finding_words.h"
 #include "tools/diagnose/report/json.h"
+#include "tools/text/joined.h"
 
 namespace beltgrip::diagnose {
 namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
-std::string number(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.4g", value);
-  return buffer;
+std::string range(double low, double high) {
+  return rounded_text(low) + " .. " + rounded_text(high);
 }
 
-std::string range(double low, double high) { return number(low) + " .. " + number(high); }
-
-std::string probability(double value) { return value > 0.999 ? "> 0.999" : number(value); }
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string out;
-  for (const std::string& each : words) out += (out.empty() ? "" : ", ") + each;
-  return out;
-}
+std::string probability(double value) { return value > 0.999 ? "> 0.999" : rounded_text(value); }
 
 std::string sizes(const Finding& finding) {
   std::string out;
   const auto add = [&](const std::string& text) { out += (out.empty() ? "" : "; ") + text; };
   for (const auto& [name, value] : finding.parameters) {
     const std::string unit(unit_of(finding.effect, name));
-    add(name + " = " + number(value.value) + " (" + range(value.low, value.high) + ")" +
+    add(name + " = " + rounded_text(value.value) + " (" + range(value.low, value.high) + ")" +
         (unit.empty() ? "" : " " + unit));
   }
   if (!finding.from_file.empty()) add("from " + finding.from_file + " on");
@@ -49,11 +41,11 @@ std::string sentence(const Finding& finding) {
   std::string out = name_of(finding) + ": " + finding.equation + ", " + sizes(finding) +
                     "; probability " + probability(finding.probability) + ".";
   if (finding.stability) {
-    out += " There in " + number(100.0 * *finding.stability) +
+    out += " There in " + rounded_text(100.0 * *finding.stability) +
            " % of the fits without one experiment.";
   }
   if (!finding.aliases.empty()) {
-    out += " These data cannot tell it from " + joined(finding.aliases) + ".";
+    out += " These data cannot tell it from " + text::joined(finding.aliases) + ".";
   }
   return out;
 }
@@ -65,7 +57,7 @@ void add_findings(report::HtmlPage& page, const Diagnosis& d,
   Rows rows;
   for (const Finding& finding : d.findings) {
     rows.push_back({name_of(finding), finding.equation, sizes(finding),
-                    probability(finding.probability), joined(finding.aliases),
+                    probability(finding.probability), text::joined(finding.aliases),
                     finding.separate_by});
   }
   page.table({"effect", "equation", "size (95 %)", "probability", "these data cannot tell it from",
@@ -98,8 +90,8 @@ report::Chart picture_of(const LearnedFinding& learned) {
     low.y[i] -= half;
     high.y[i] += half;
   }
-  return {learned.acts_on + " over " + joined(learned.depends_on),
-          joined(learned.depends_on),
+  return {learned.acts_on + " over " + text::joined(learned.depends_on),
+          text::joined(learned.depends_on),
           learned.acts_on + ", " + unit_at(learned.acts_on),
           {mean, low, high}};
 }
@@ -112,13 +104,14 @@ void add_learned(report::HtmlPage& page, const Diagnosis& d) {
   for (const LearnedFinding& each : d.learned) {
     page.paragraph(sentence(each) + ".");
     if (!each.aliases.empty()) {
-      page.paragraph("These data cannot tell it from " + joined(each.aliases) + ".");
+      page.paragraph("These data cannot tell it from " + text::joined(each.aliases) + ".");
     }
     charts.push_back(picture_of(each));
     if (!each.at_left_out_values) continue;
     rows.push_back({each.name, each.metric});
     for (const std::string& cell :
-         {number(each.at_left_out_values->before), number(each.at_left_out_values->after),
+         {rounded_text(each.at_left_out_values->before),
+          rounded_text(each.at_left_out_values->after),
           range(each.at_left_out_values->low, each.at_left_out_values->high)}) {
       rows.back().push_back(cell);
     }
@@ -172,7 +165,7 @@ void add_tests(report::HtmlPage& page, const Diagnosis& d) {
 
 void add_gain(std::vector<std::string>& row, const BeforeAfter& gain) {
   for (const std::string& cell :
-       {number(gain.before), number(gain.after), range(gain.low, gain.high)}) {
+       {rounded_text(gain.before), rounded_text(gain.after), range(gain.low, gain.high)}) {
     row.push_back(cell);
   }
 }
@@ -182,8 +175,8 @@ void add_errors(report::HtmlPage& page, const Diagnosis& d) {
   page.heading("The model as given against the data");
   Rows rows;
   for (const auto& [name, signal] : d.baseline) {
-    rows.push_back({name, number(signal.rmse), number(signal.noise_floor),
-                    number(100.0 * signal.unexplained_share) + " %"});
+    rows.push_back({name, rounded_text(signal.rmse), rounded_text(signal.noise_floor),
+                    rounded_text(100.0 * signal.unexplained_share) + " %"});
   }
   page.table({"signal, SI", "error, rms", "noise", "beyond the noise"}, rows);
   add_tests(page, d);
@@ -220,7 +213,7 @@ void add_errors(report::HtmlPage& page, const Diagnosis& d) {
   }
   rows.clear();
   for (const auto& [name, signal] : d.simulation) {
-    rows.push_back({name, number(signal.rmse), number(signal.noise_floor)});
+    rows.push_back({name, rounded_text(signal.rmse), rounded_text(signal.noise_floor)});
     if (signal.left_out) add_gain(rows.back(), *signal.left_out);
     rows.back().resize(head.size());
   }
@@ -249,7 +242,7 @@ void add_tables(report::HtmlPage& page, const Diagnosis& d) {
     for (const NotIdentifiable& each : d.not_identifiable) {
       std::string sizes;
       for (const auto& [name, value] : each.smallest_detectable) {
-        sizes += name + " " + number(value) + " ";
+        sizes += name + " " + rounded_text(value) + " ";
       }
       rows.push_back({each.effect, sizes, each.reason});
     }

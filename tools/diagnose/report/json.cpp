@@ -5,7 +5,9 @@
 #include <cstdio>
 #include <vector>
 
+#include "can_dbc/text/number_text.h"
 #include "tools/diagnose/report/finding_words.h"
+#include "tools/text/joined.h"
 #include "tools/text/json_writer.h"
 
 namespace beltgrip::diagnose {
@@ -27,12 +29,6 @@ const char* verdict_text(Verdict verdict) {
 
 void interval(text::JsonWriter& json, double low, double high) {
   json.key("ci95").begin_array().value(low).value(high).end_array();
-}
-
-std::string number(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.4g", value);
-  return buffer;
 }
 
 const char* kind_text(MisfitKind kind) {
@@ -238,28 +234,23 @@ void write_machine(text::JsonWriter& json, const Diagnosis& d) {
   json.end_object();
 }
 
-std::string joined(const std::vector<std::string>& words) {
-  std::string out;
-  for (const std::string& each : words) out += (out.empty() ? "" : ", ") + each;
-  return out;
-}
-
 }  // namespace
 
 std::string sentence(const Unexplained& left) {
   constexpr double kToldShare = 5e-4;  // less reads as none
-  const std::string share = number(100.0 * left.share) + " % of the misfit";
+  const std::string share = rounded_text(100.0 * left.share) + " % of the misfit";
   switch (left.kind) {
     case MisfitKind::kFunction:
       return "something that has no name here acts on " + left.acts_on + " and follows " +
-             joined(left.depends_on) + (left.share < kToldShare ? "" : " (" + share + ")");
+             text::joined(left.depends_on) + (left.share < kToldShare ? "" : " (" + share + ")");
     case MisfitKind::kLine:
       if (left.is_belt) {
-        return "a line at the belt's passage (" + number(left.frequency_Hz.value_or(0.0)) +
+        return "a line at the belt's passage (" + rounded_text(left.frequency_Hz.value_or(0.0)) +
                " Hz in the mean, with the speed): a place of the belt that runs otherwise";
       }
-      return "a line at " + number(left.frequency_Hz.value_or(0.0)) + " Hz in " + left.acts_on +
-             (left.depends_on.empty() ? "" : ", stronger with " + joined(left.depends_on));
+      return "a line at " + rounded_text(left.frequency_Hz.value_or(0.0)) + " Hz in " +
+             left.acts_on +
+             (left.depends_on.empty() ? "" : ", stronger with " + text::joined(left.depends_on));
     case MisfitKind::kBetweenRuns:
       return left.acts_on +
              " differs between experiments by more than it should and follows nothing recorded";
@@ -273,10 +264,11 @@ std::string sentence(const Unexplained& left) {
 std::string sentence(const LearnedFinding& learned) {
   const auto [least, most] = std::minmax_element(learned.values.begin(), learned.values.end());
   std::string out = "a cause without a name on " + learned.acts_on + " that follows " +
-                    joined(learned.depends_on) + " (" + number(*least) + " to " + number(*most) +
-                    ", learned at " + std::to_string(learned.levels) + " levels";
+                    text::joined(learned.depends_on) + " (" + rounded_text(*least) + " to " +
+                    rounded_text(*most) + ", learned at " + std::to_string(learned.levels) +
+                    " levels";
   for (const auto& [role, range] : learned.box) {
-    out += " of " + role + " from " + number(range[0]) + " to " + number(range[1]);
+    out += " of " + role + " from " + rounded_text(range[0]) + " to " + rounded_text(range[1]);
   }
   out += ")";
   if (!learned.law.empty()) out += ", " + learned.law;
@@ -285,7 +277,7 @@ std::string sentence(const LearnedFinding& learned) {
 
 std::string figure_text(const Rerun& rerun, const RerunFigure& figure) {
   const auto text = [&](const std::optional<Measured>& side) {
-    return side ? number((*side).*figure.value) : std::string("none");
+    return side ? rounded_text((*side).*figure.value) : std::string("none");
   };
   return text(rerun.before) + " -> " + text(rerun.after);
 }
@@ -341,8 +333,9 @@ std::string verdict_line(const Diagnosis& d) {
     case Verdict::kUnexplained:
       what = "unexplained";
   }
-  return what + " (" + std::to_string(d.experiments) + " experiments, " + number(0.1 * d.samples) +
-         " s usable)" + (d.complete ? "" : ", stopped before the end");
+  return what + " (" + std::to_string(d.experiments) + " experiments, " +
+         rounded_text(0.1 * d.samples) + " s usable)" +
+         (d.complete ? "" : ", stopped before the end");
 }
 
 namespace {
@@ -395,21 +388,21 @@ std::string headline(const Diagnosis& d) {
 std::string plain_text(const Diagnosis& d) {
   std::string out = "verdict: " + verdict_line(d) + "\n" + headline(d) + "\n";
   for (const auto& [name, signal] : d.baseline) {
-    out += "  " + name + ": the simulation is off by " + number(signal.rmse) + " rms, noise " +
-           number(signal.noise_floor) + "\n";
+    out += "  " + name + ": the simulation is off by " + rounded_text(signal.rmse) +
+           " rms, noise " + rounded_text(signal.noise_floor) + "\n";
   }
   for (const Finding& finding : d.findings) {
     out += finding.effect + (finding.role.empty() ? "" : " (" + finding.role + ")") + ": " +
            finding.equation + "\n";
     for (const auto& [name, value] : finding.parameters) {
       const std::string unit(unit_of(finding.effect, name));
-      out += "  " + name + " = " + number(value.value) + " [" + number(value.low) + ", " +
-             number(value.high) + "]" + (unit.empty() ? "" : " " + unit) + "\n";
+      out += "  " + name + " = " + rounded_text(value.value) + " [" + rounded_text(value.low) +
+             ", " + rounded_text(value.high) + "]" + (unit.empty() ? "" : " " + unit) + "\n";
     }
     if (!finding.from_file.empty()) out += "  from " + finding.from_file + " on\n";
-    out += "  probability " + number(finding.probability) + "\n";
+    out += "  probability " + rounded_text(finding.probability) + "\n";
     if (finding.stability) {
-      out += "  there in " + number(100.0 * *finding.stability) +
+      out += "  there in " + rounded_text(100.0 * *finding.stability) +
              " % of the fits without one experiment\n";
     }
     if (!finding.aliases.empty()) {
@@ -421,12 +414,12 @@ std::string plain_text(const Diagnosis& d) {
   for (const LearnedFinding& each : d.learned) {
     out += "learned: " + sentence(each) + "\n";
     if (!each.aliases.empty())
-      out += "  these data cannot tell it from: " + joined(each.aliases) + "\n";
+      out += "  these data cannot tell it from: " + text::joined(each.aliases) + "\n";
     if (const auto& change = each.at_left_out_values) {
-      out += "  " + each.metric + " at values of " + joined(each.depends_on) +
-             " that were left out: off by " + number(change->before) + " -> " +
-             number(change->after) + " [" + number(change->low) + ", " + number(change->high) +
-             "]\n";
+      out += "  " + each.metric + " at values of " + text::joined(each.depends_on) +
+             " that were left out: off by " + rounded_text(change->before) + " -> " +
+             rounded_text(change->after) + " [" + rounded_text(change->low) + ", " +
+             rounded_text(change->high) + "]\n";
     }
   }
   if (d.unexplained) out += "unexplained: " + sentence(*d.unexplained) + "\n";
@@ -434,18 +427,18 @@ std::string plain_text(const Diagnosis& d) {
     out += "on experiments not used for the fit (before -> after, 95 % of the difference):\n";
   }
   for (const auto& [name, gain] : d.held_out) {
-    out += "  " + name + ": " + number(gain.before) + " -> " + number(gain.after) + " [" +
-           number(gain.low) + ", " + number(gain.high) + "]\n";
+    out += "  " + name + ": " + rounded_text(gain.before) + " -> " + rounded_text(gain.after) +
+           " [" + rounded_text(gain.low) + ", " + rounded_text(gain.high) + "]\n";
   }
   for (const auto& [name, signal] : d.simulation) {
     if (!signal.left_out) continue;
-    out += "  " + name + ", simulated forward: " + number(signal.left_out->before) + " -> " +
-           number(signal.left_out->after) + " [" + number(signal.left_out->low) + ", " +
-           number(signal.left_out->high) + "]\n";
+    out += "  " + name + ", simulated forward: " + rounded_text(signal.left_out->before) + " -> " +
+           rounded_text(signal.left_out->after) + " [" + rounded_text(signal.left_out->low) + ", " +
+           rounded_text(signal.left_out->high) + "]\n";
   }
   if (d.mu_max) {
-    out += "  mu_max, relative error: " + number(d.mu_max->before) + " -> " +
-           number(d.mu_max->after) + "\n";
+    out += "  mu_max, relative error: " + rounded_text(d.mu_max->before) + " -> " +
+           rounded_text(d.mu_max->after) + "\n";
   }
   if (!d.reruns.empty()) {
     out += "by the estimator, told the model before -> after (";

@@ -77,7 +77,7 @@ const OptionRow* row_of(std::span<const OptionRow> options, std::string_view nam
   return nullptr;
 }
 
-std::string number(double value) {
+std::string decimal_text(double value) {
   std::string text = number_text(value);
   if (text.find_first_of(".en") == std::string::npos) text += ".0";
   return text;
@@ -224,11 +224,12 @@ std::string model_text(const ModelFile& model) {
   config.variator = model.variator;
   for (const Option& option : option_table()) {
     if (option.section != "variator") continue;
-    out += std::string(option.key) + " = " + number(option.number(config) / option.factor) + "\n";
+    out += std::string(option.key) + " = " + decimal_text(option.number(config) / option.factor) +
+           "\n";
   }
   const auto section = [&](const char* name, const std::map<std::string, double>& values) {
     out += "\n[" + std::string(name) + "]\n";
-    for (const auto& [key, value] : values) out += key + " = " + number(value) + "\n";
+    for (const auto& [key, value] : values) out += key + " = " + decimal_text(value) + "\n";
   };
   section("friction", model.friction);
   section("driveline", model.driveline);

@@ -89,7 +89,7 @@ void from_each_side(const Carried&, const AddSlot& add) {
 constexpr std::array kFarLags_s{0.2};
 constexpr std::array kFarPlays_N{120.0};
 
-constexpr Equation kEquations[] = {
+constexpr Equation kClampingEquations[] = {
     {"centrifugal_force", "coefficient_N_s2", apply_centrifugal_force},
     {"spring_force", "force_N", apply_spring_force},
     {"hydraulic_lag", "time_constant_s", apply_hydraulic_lag, of_each_input, false, nullptr,
@@ -101,6 +101,6 @@ constexpr Equation kEquations[] = {
 
 }  // namespace
 
-std::span<const Equation> clamping_equations() { return kEquations; }
+std::span<const Equation> clamping_equations() { return kClampingEquations; }
 
 }  // namespace beltgrip::diagnose

@@ -89,7 +89,7 @@ void by_each_force(const Carried&, const AddSlot& add) {
   add(0, "clamp force");
 }
 
-constexpr Equation kEquations[] = {
+constexpr Equation kDrivelineEquations[] = {
     {"inertia_torque", "inertia_kg_m2", apply_inertia_torque},
     {"torque_loss", "constant_Nm", apply_loss_constant},
     {"torque_loss", "per_kN_Nm", apply_loss_per_kN},
@@ -106,6 +106,6 @@ constexpr Equation kEquations[] = {
 
 }  // namespace
 
-std::span<const Equation> driveline_equations() { return kEquations; }
+std::span<const Equation> driveline_equations() { return kDrivelineEquations; }
 
 }  // namespace beltgrip::diagnose

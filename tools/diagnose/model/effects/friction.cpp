@@ -88,7 +88,7 @@ double fall_from_contract(double value, double peak_percent, double mu_max) {
   return value * peak_percent / mu_max;
 }
 
-constexpr Equation kEquations[] = {
+constexpr Equation kFrictionEquations[] = {
     {"friction_temperature", "per_K", apply_friction_temperature, only_with_temperature},
     {"friction_speed", "per_ln_speed", apply_friction_speed},
     {"friction_load", "exponent", apply_friction_load},
@@ -105,6 +105,6 @@ constexpr Equation kEquations[] = {
 
 }  // namespace
 
-std::span<const Equation> friction_equations() { return kEquations; }
+std::span<const Equation> friction_equations() { return kFrictionEquations; }
 
 }  // namespace beltgrip::diagnose

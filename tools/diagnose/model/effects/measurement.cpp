@@ -46,7 +46,7 @@ void of_each_channel(const Carried&, const AddSlot& add) {
   }
 }
 
-constexpr Equation kEquations[] = {
+constexpr Equation kMeasurementEquations[] = {
     {"torque_bias", "bias_Nm", apply_torque_bias},
     {"torque_gain", "gain", apply_torque_gain},
     {"torque_delay", "delay_s", apply_torque_delay},
@@ -61,6 +61,6 @@ constexpr Equation kEquations[] = {
 
 }  // namespace
 
-std::span<const Equation> measurement_equations() { return kEquations; }
+std::span<const Equation> measurement_equations() { return kMeasurementEquations; }
 
 }  // namespace beltgrip::diagnose
