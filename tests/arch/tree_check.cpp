@@ -163,6 +163,24 @@ void check_includes(const SourceFile& file, const std::string& code,
   }
 }
 
+// clang-tidy asks this of a source that is compiled alone, not of one of eight.
+void check_usings(const SourceFile& file, const std::string& code,
+                  std::vector<std::string>& found) {
+  static const std::regex declared(
+      R"(^[ \t]*(?:using\s+(?!namespace\b|enum\b)[\w:]+::(\w+)\s*;|namespace\s+(\w+)\s*=))",
+      std::regex::ECMAScript | std::regex::multiline);
+  for (std::sregex_iterator each(code.begin(), code.end(), declared), end; each != end; ++each) {
+    const std::string name = (*each)[1].matched ? (*each)[1].str() : (*each)[2].str();
+    const std::regex word("(^|[^\\w:.>])" + name + "\\b", std::regex::multiline);
+    std::string rest = code;
+    rest.erase(static_cast<std::size_t>(each->position()),
+               static_cast<std::size_t>(each->length()));
+    if (!std::regex_search(rest, word)) {
+      found.push_back(at_line(file, code, each->position()) + name + " (declared, never used)");
+    }
+  }
+}
+
 }  // namespace
 
 std::string blank_comments_and_strings(std::string_view text) {
@@ -226,6 +244,7 @@ std::vector<std::string> check_tree(const std::vector<SourceFile>& files) {
     if (!is_cpp(file.path)) continue;
     const std::string code = blank_comments_and_strings(file.text);
     check_includes(file, code, found);
+    if (file.path.ends_with(".cpp")) check_usings(file, code, found);
     for (const TextRule& rule : kCodeRules) {
       if (starts_with_any(file.path, rule.prefixes) && !starts_with_any(file.path, rule.except)) {
         find_all(file, code, std::string(rule.pattern), rule.why, found);

@@ -107,6 +107,11 @@ INSTANTIATE_TEST_SUITE_P(
                     Planted{"daemon/core/loop/pipeline.cpp",
                             "now.clamp.secondary_force_N = report.request_force_N;"}));
 
+INSTANTIATE_TEST_SUITE_P(Usings, Violation,
+                         testing::Values(Planted{"can_dbc/a.cpp", "using beltgrip::Used;"},
+                                         Planted{"tools/cli/a.cpp", "  using a::B; int c::B = 0;"},
+                                         Planted{"tools/cli/a.cpp", "namespace fs = std::fs;"}));
+
 // In pieces, so that they are not found in this file.
 INSTANTIATE_TEST_SUITE_P(Texts, Violation,
                          testing::Values(Planted{"README.md", std::string("see http://deb") +
@@ -145,6 +150,9 @@ INSTANTIATE_TEST_SUITE_P(
                     Planted{"daemon/io/socket_port.cpp", "#include <sys/socket.h>"},
                     Planted{"tools/sim/a.cpp",
                             "#include \"estimator/physics/variator_geometry.h\""},
+                    Planted{"tools/cli/a.cpp", "using a::B;\nB b;"},
+                    Planted{"tools/cli/a.cpp", "namespace fs = std::fs;\nfs::path p;"},
+                    Planted{"tools/cli/a.cpp", "using namespace a::b;\nusing enum a::E;"},
                     Planted{"README.md", "the framework/work of vcan"}));
 
 TEST(Blank, KeepsLinesAndCode) {

@@ -11,7 +11,6 @@ namespace beltgrip::diagnose {
 namespace {
 
 using Eigen::ArrayXd;
-using Eigen::Index;
 
 constexpr double kVaried = 0.05;      // of its middle; less may be the channel's own noise
 constexpr double kMovesShare = 0.06;  // of the span: an experiment that moves it less has one value

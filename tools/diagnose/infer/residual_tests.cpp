@@ -11,7 +11,6 @@ namespace {
 
 using Eigen::ArrayXd;
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kResting_Pa_s = 2e3;  // clamp force: slower is no direction
