@@ -22,21 +22,6 @@ void demote_order(std::vector<Cell>& cells) {
                         [&](const Cell& cell) { return !is_order(cell); });
 }
 
-// A function of what a named effect follows, beside it; the one with the largest gain. Where that
-// is there still, the cause follows the same and is another.
-const Cell* own_shape(const Engine& engine, const std::vector<Cell>& cells) {
-  const Cell* out = nullptr;
-  for (const Cell& cell : cells) {  // the best first
-    const bool is_own =
-        std::any_of(engine.accepted().begin(), engine.accepted().end(), [&](int slot) {
-          return engine.campaign().slots[static_cast<std::size_t>(slot)].row->depends_on ==
-                 cell.abscissa.variable->name;
-        });
-    if (is_own && (out == nullptr || cell.gain() > out->gain())) out = &cell;
-  }
-  return out;
-}
-
 // Of the residuals that wander by as much as matters.
 double least_whiteness(const Engine& engine) {
   const auto by_kind = wander(engine, engine.state());
@@ -94,6 +79,19 @@ double decades(double p) { return -std::log10(std::max(p, 1e-300)); }
 
 }  // namespace
 
+const Cell* own_shape(const Campaign& campaign, const std::vector<int>& accepted,
+                      const std::vector<Cell>& cells) {
+  const Cell* out = nullptr;
+  for (const Cell& cell : cells) {
+    const bool is_own = std::any_of(accepted.begin(), accepted.end(), [&](int slot) {
+      return campaign.slots[static_cast<std::size_t>(slot)].row->depends_on ==
+             cell.abscissa.variable->name;
+    });
+    if (is_own && (out == nullptr || cell.gain() > out->gain())) out = &cell;
+  }
+  return out;
+}
+
 bool Criticism::passed() const {
   return std::all_of(tests.begin(), tests.end(),
                      [](const JudgedTest& each) { return each.passed(); });
@@ -117,7 +115,7 @@ Criticism criticise(const Engine& engine, Steps steps) {
     if (cell.smooth_gain > thresholds::kSmoothBeside) law = std::max(law, cell.law_gain);
     smooth = std::max(smooth, cell.smooth_gain);
   }
-  if (const Cell* own = own_shape(engine, out.cells)) out.own = *own;
+  if (const Cell* own = own_shape(engine.campaign(), engine.accepted(), out.cells)) out.own = *own;
   const ScatterRatios ratio = scatter_ratios(engine, out.base.scatter);
   const ScatterRatios unusual = scatter_ratios(engine, default_scatter());
   using namespace thresholds;
@@ -140,16 +138,30 @@ Criticism criticise(const Engine& engine, Steps steps) {
   return out;
 }
 
-bool may_be_scatter(const Cell& cell, const Criticism& criticism, bool has_balance) {
+namespace {
+
+// What is followed differs between experiments rather than within each of them.
+bool differs_between(const Abscissa& abscissa) {
   constexpr double kBetween = 0.5;  // chosen, of the span: what their means cover at least
-  const Abscissa& abscissa = cell.abscissa;
   double least = abscissa.high, most = abscissa.low;
   for (std::size_t e = 0; e < abscissa.x.size(); ++e) {
     if (abscissa.x[e].size() == 0) continue;
     least = std::min(least, abscissa.mean[e]);
     most = std::max(most, abscissa.mean[e]);
   }
-  if (most - least < kBetween * (abscissa.high - abscissa.low)) return false;
+  return most - least >= kBetween * (abscissa.high - abscissa.low);
+}
+
+}  // namespace
+
+bool repeats_within(const Criticism& criticism) {
+  return !criticism.cells.empty() &&
+         (!criticism.test("law_cell").passed() || !criticism.test("smooth_cell").passed()) &&
+         !differs_between(criticism.cells.front().abscissa);
+}
+
+bool may_be_scatter(const Cell& cell, const Criticism& criticism, bool has_balance) {
+  if (!differs_between(cell.abscissa)) return false;
   if (cell.gain() <= thresholds::kCellBesideScatter) return false;
   const auto fails = [&](const char* name) { return !criticism.test(name).passed(); };
   const bool any = fails("unusual_scatter");  // does not say of what

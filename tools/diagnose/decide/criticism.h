@@ -35,6 +35,13 @@ struct Criticism {
 // own: those tests are left out.
 Criticism criticise(const Engine& engine, Steps steps);
 
+// A function of what a named effect follows, beside it; the one with the largest gain. Where that
+// is there still, the cause follows the same and is another. Null: no effect is named that follows
+// what a cell does.
+const Cell* own_shape(const Campaign& campaign, const std::vector<int>& accepted,
+                      const std::vector<Cell>& cells);
+// Something stands out that follows what changes within each experiment: no scatter between them.
+bool repeats_within(const Criticism& criticism);
 // Where the scatter between experiments fails: the cell may be what it is, for it acts where they
 // scatter, and what it follows differs between them rather than within.
 bool may_be_scatter(const Cell& cell, const Criticism& criticism, bool has_balance);

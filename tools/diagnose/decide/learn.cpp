@@ -166,6 +166,8 @@ bool is_shadowed(const Campaign& campaign, const std::vector<int>& accepted,
   const Unexplained still = what_is_left(with, campaign.has_balance);
   // A line is no function's shadow, and no function takes it away.
   if (still.kind == MisfitKind::kLine) return false;
+  // By what experiments differ, nothing repeats within each of them.
+  if (still.kind == MisfitKind::kBetweenRuns && repeats_within(without)) return false;
   const std::string& left = still.acts_on;
   return std::any_of(accepted.begin(), accepted.end(), [&](int slot) {
     return acts_there(*campaign.slots[static_cast<std::size_t>(slot)].row, left, campaign);

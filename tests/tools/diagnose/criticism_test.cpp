@@ -1,0 +1,135 @@
+// What the tests of the residuals come to, from tests and functions given by hand.
+#include "tools/diagnose/decide/criticism.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tools/diagnose/decide/learn.h"
+#include "tools/diagnose/infer/index_variables.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+const IndexVariable* variable(std::string_view name) {
+  const auto all = index_variables();
+  return &*std::find_if(all.begin(), all.end(),
+                        [&](const IndexVariable& each) { return each.name == name; });
+}
+
+// Of two experiments, with these means between 0 and 1.
+Cell cell(Injection injection, std::string_view follows, double gain, double mean_first,
+          double mean_second) {
+  Cell out;
+  out.injection =
+      &*std::find_if(kInjections.begin(), kInjections.end(),
+                     [&](const InjectionRow& row) { return row.injection == injection; });
+  out.abscissa.variable = variable(follows);
+  out.abscissa.high = 1.0;
+  out.abscissa.x = {Eigen::ArrayXd::Constant(2, mean_first),
+                    Eigen::ArrayXd::Constant(2, mean_second)};
+  out.abscissa.mean = {mean_first, mean_second};
+  out.law_gain = gain;
+  return out;
+}
+
+// All tests pass but those given.
+Criticism failing(const std::vector<std::string>& names, std::vector<Cell> cells = {}) {
+  Criticism out;
+  out.cells = std::move(cells);
+  for (const char* name : {"law_cell", "smooth_cell", "own_shape", "line", "channel_line",
+                           "belt_passage", "whiteness", "scatter_friction", "scatter_ratio",
+                           "scatter_torque", "unusual_scatter", "unusual_friction"}) {
+    const bool fails = std::find(names.begin(), names.end(), name) != names.end();
+    out.tests.push_back({name, fails ? 10.0 : 0.0, 1.0});
+  }
+  return out;
+}
+
+// A campaign whose slots are one of each of these effects.
+Campaign with_effects(const std::vector<std::string_view>& ids) {
+  Campaign out;
+  for (const std::string_view id : ids) {
+    const auto rows = effect_rows();
+    const auto row = std::find_if(rows.begin(), rows.end(),
+                                  [&](const EffectRow& each) { return each.id == id; });
+    EXPECT_NE(row, rows.end()) << id;
+    out.slots.push_back({&*row, 0, {}});
+  }
+  return out;
+}
+
+TEST(OwnShape, IsTheBestOfWhatANamedEffectFollows) {
+  const Campaign campaign = with_effects({"friction_temperature", "torque_gain"});
+  const std::vector<Cell> cells{cell(Injection::kFriction, "torque", 20.0, 0.1, 0.1),
+                                cell(Injection::kFriction, "oil_temperature", 5.0, 0.1, 0.1),
+                                cell(Injection::kTorque, "oil_temperature", 9.0, 0.1, 0.1)};
+  ASSERT_EQ(campaign.slots[0].row->depends_on, "oil_temperature");
+  EXPECT_EQ(own_shape(campaign, {0}, cells), &cells[2]);
+  EXPECT_EQ(own_shape(campaign, {}, cells), nullptr);
+  EXPECT_EQ(own_shape(campaign, {0}, {cells[0]}), nullptr);
+}
+
+TEST(OwnShape, AloneIsToldAsWhatItFollows) {
+  Criticism left = failing({"own_shape"});
+  left.own = cell(Injection::kFriction, "oil_temperature", 9.0, 0.1, 0.1);
+  const Unexplained told = what_is_left(left, true);
+  EXPECT_EQ(told.acts_on, "friction");
+  EXPECT_EQ(told.depends_on, std::vector<std::string>{"oil_temperature"});
+  EXPECT_EQ(told.kind, MisfitKind::kFunction);
+}
+
+TEST(RepeatsWithin, WhatFollowsAVariableThatChangesInEachExperiment) {
+  const Cell within = cell(Injection::kRatio, "time", 900.0, 0.5, 0.5);
+  const Cell between = cell(Injection::kFriction, "oil_temperature", 900.0, 0.1, 0.9);
+  EXPECT_TRUE(repeats_within(failing({"law_cell"}, {within, between})));
+  EXPECT_TRUE(repeats_within(failing({"smooth_cell"}, {within})));
+  EXPECT_FALSE(repeats_within(failing({"law_cell"}, {between, within})));
+  EXPECT_FALSE(repeats_within(failing({"scatter_friction"}, {within})));  // it does not stand out
+  EXPECT_FALSE(repeats_within(failing({"law_cell"})));
+}
+
+// The same scatter is left with and without a name. It is what the name was made of where all that
+// it explains lies between experiments, and something else where it explains what repeats in each.
+TEST(IsShadowed, ByScatterOnlyWhatDoesNotRepeat) {
+  const Campaign campaign = with_effects({"clamp_hysteresis"});
+  const Criticism left = failing({"scatter_friction"});
+  const Cell within = cell(Injection::kRatio, "time", 900.0, 0.5, 0.5);
+  const Cell between = cell(Injection::kFriction, "oil_temperature", 900.0, 0.1, 0.9);
+  EXPECT_TRUE(
+      is_shadowed(campaign, {0}, failing({"law_cell", "scatter_friction"}, {between}), left));
+  EXPECT_TRUE(is_shadowed(campaign, {0}, failing({"scatter_friction"}, {within}), left));
+  EXPECT_FALSE(
+      is_shadowed(campaign, {0}, failing({"law_cell", "scatter_friction"}, {within}), left));
+}
+
+TEST(IsShadowed, NotByWhatActsElsewhereNorByWhatIsHealed) {
+  Campaign campaign = with_effects({"torque_gain"});
+  campaign.has_balance = true;
+  const Criticism without = failing({"scatter_friction"});
+  EXPECT_FALSE(is_shadowed(campaign, {0}, without, failing({"scatter_friction"})));
+  EXPECT_FALSE(is_shadowed(with_effects({"friction_load"}), {0}, without, failing({})));
+  EXPECT_FALSE(is_shadowed(campaign, {}, without, without));
+}
+
+// One shaft is held and gives way a little, the other one slips: what moves there is no cause.
+TEST(Acceleration, IsNoneWhereAShaftIsHeld) {
+  ExperimentData run;
+  constexpr int kSamples = 50;
+  const Eigen::ArrayXd ramp = Eigen::ArrayXd::LinSpaced(kSamples, -1.0, 1.0);
+  run.t_s = ramp;
+  run.valid.assign(kSamples, true);
+  run.valid_count = kSamples;
+  const auto moves = [&](GridSignal& speed, double mean_rad_s, double by_share) {
+    speed.slow = mean_rad_s * (1.0 + 0.5 * by_share * ramp);
+    speed.slow_slope = Eigen::ArrayXd::Constant(kSamples, mean_rad_s * by_share);
+  };
+  moves(run.omega_p, 150.0, 0.10);
+  moves(run.omega_s, 300.0, 0.002);
+  EXPECT_TRUE((variable("acceleration")->value(run, 0) == 0.0).all());
+  moves(run.omega_s, 300.0, 0.08);
+  EXPECT_TRUE((variable("acceleration")->value(run, 0) == run.omega_p.slow_slope).all());
+}
+
+}  // namespace
+}  // namespace beltgrip::diagnose
