@@ -1,10 +1,9 @@
-// Streaming readers of CAN logs and the candump writer. Memory flat in the length of the log; one
+// Streaming readers of CAN logs. Memory flat in the length of the log; one
 // line, or record of a binary log, at a time. A broken one is counted and reported with its place,
 // never fatal. Tools only.
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
 #include <limits>
 #include <memory>
 #include <string>
@@ -62,19 +61,5 @@ bool is_head_of_frames(std::string_view line);
 struct LogOpenError {
   std::string text;  // one line: path and reason
 };
-
-// candump -L format: (1700000000.000000) vcan0 123#0011. Nine digits when a stamp needs them.
-class CandumpWriter {
- public:
-  explicit CandumpWriter(std::FILE* out) : out_(out) {}
-  void write(std::int64_t t_ns, std::string_view interface, const CanFrame& frame);
-
- private:
-  std::FILE* out_;
-  std::string line_;  // reused: no allocation per frame
-};
-
-// One frame in candump's compact notation, "123#0011", "00000123##10011", "123#R8", "20000004#..."
-std::string frame_text(const CanFrame& frame);
 
 }  // namespace beltgrip::can

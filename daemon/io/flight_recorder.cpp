@@ -14,7 +14,7 @@
 #include <system_error>
 #include <utility>
 
-#include "can_dbc/log/can_log.h"
+#include "can_dbc/log/candump_writer.h"
 #include "can_dbc/text/number_text.h"
 
 namespace beltgrip::daemon {
@@ -297,14 +297,11 @@ void FlightRecorder::write(const RecordItem& item) {
       write_line(item.t, "start");
       break;
     case RecordKind::kFrame: {
-      if (item.frame.dropped_before != 0) {
-        write_line(item.t, "lost " + std::to_string(item.frame.dropped_before));
-      }
-      std::string line =
-          stamp_text(item.t.ns() + wall_offset_ns_) + ' ' +
-          interfaces_[std::min<std::size_t>(item.frame.bus, interfaces_.size() - 1)] + ' ' +
-          can::frame_text(item.frame.frame);
-      line += item.frame.own_echo ? " T\n" : "\n";
+      if (item.number != 0) write_line(item.t, "lost " + std::to_string(item.number));
+      std::string line = stamp_text(item.t.ns() + wall_offset_ns_) + ' ' +
+                         interfaces_[std::min<std::size_t>(item.bus, interfaces_.size() - 1)] +
+                         ' ' + can::frame_text(item.frame);
+      line += item.own_echo ? " T\n" : "\n";
       file_->write(line);
       break;
     }

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "can_dbc/log/can_log.h"
+#include "can_dbc/log/candump_writer.h"
 #include "can_dbc/log/format.h"
 #include "tests/can_dbc/log/both_ways.h"
 

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "can_dbc/log/can_log.h"
+#include "can_dbc/log/candump_writer.h"
 
 namespace beltgrip::test {
 

@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "can_dbc/dbc/message_codec.h"
-#include "can_dbc/log/can_log.h"
+#include "can_dbc/log/candump_writer.h"
 #include "can_dbc/text/number_text.h"
 #include "can_dbc/text/printable.h"
 #include "tools/cli/dbc_file.h"

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "can_dbc/log/can_log.h"
+#include "can_dbc/log/candump_writer.h"
 #include "can_dbc/text/format.h"
 #include "daemon/core/loop/loop.h"
 #include "daemon/core/observe/reasons_now.h"

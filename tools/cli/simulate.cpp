@@ -8,6 +8,7 @@
 #include <string>
 
 #include "can_dbc/log/can_log.h"
+#include "can_dbc/log/candump_writer.h"
 #include "tools/cli/bus.h"
 #include "tools/cli/command.h"
 #include "tools/cli/configuration.h"

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "can_dbc/log/can_log.h"
+#include "can_dbc/log/candump_writer.h"
 #include "tools/cli/bus.h"
 #include "tools/cli/configuration.h"
 #include "tools/cli/failure.h"

@@ -7,7 +7,12 @@ void RecordTap::frame(const RxFrame& frame) noexcept {
     after_ = sampled_;
     push({.t = sampled_ + kNanosecond, .kind = RecordKind::kAfter});
   }
-  push({.t = frame.t, .kind = RecordKind::kFrame, .frame = frame});
+  push({.t = frame.t,
+        .kind = RecordKind::kFrame,
+        .own_echo = frame.own_echo,
+        .bus = frame.bus,
+        .number = frame.dropped_before,
+        .frame = frame.frame});
 }
 
 void RecordTap::learned(MonoTime t, const estimator::LearnedFriction& learned) noexcept {

@@ -16,7 +16,7 @@ namespace beltgrip::daemon {
 // Of a sample t is when it was due.
 enum class RecordKind : std::uint8_t {
   kStart,    // the first sample will be at t
-  kFrame,    // frame
+  kFrame,    // frame, own_echo; `number` were lost before it
   kAfter,    // frames that follow came after the sample at t - 1 ns, whatever their stamps say
   kLate,     // the sample at t was taken at `now`
   kBus,      // from the sample at t on: state of bus
@@ -32,11 +32,12 @@ struct RecordItem {
   MonoTime now = MonoTime::origin();
   RecordKind kind = RecordKind::kMark;
   bool in_experiment = false;
+  bool own_echo = false;
   std::uint8_t bus = 0;
   BusState state = BusState::kActive;
   SendResult sent = SendResult::kSent;
   std::uint32_t number = 0;
-  RxFrame frame = {};
+  can::CanFrame frame = {};
 };
 
 struct RecordRings {

@@ -1,4 +1,5 @@
 #include "can_dbc/log/can_log.h"
+#include "can_dbc/log/candump_writer.h"
 
 #include <gtest/gtest.h>
 

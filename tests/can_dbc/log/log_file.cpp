@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "can_dbc/log/candump_writer.h"
+
 namespace beltgrip::test {
 
 ReadLog read_log(const std::string& path) {
