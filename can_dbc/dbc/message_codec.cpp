@@ -117,6 +117,11 @@ class MessageCodec::Builder {
     for (const std::uint32_t signal : selection.order) {
       if (!selected_by[signal].empty()) add_selector(signal, selected_by[signal]);
     }
+    codec_.of_eight_ = codec_.others_.empty() && codec_.always_.bytes <= kWord &&
+                       std::all_of(codec_.blocks_.begin(), codec_.blocks_.end(),
+                                   [](const Block& block) { return block.bytes <= kWord; }) &&
+                       std::all_of(codec_.selectors_.begin(), codec_.selectors_.end(),
+                                   [](const Selector& selector) { return selector.direct; });
   }
 
  private:
@@ -227,7 +232,7 @@ class MessageCodec::Builder {
             .sign = is_signed ? std::uint64_t{1} << (definition.length - 1) : 0,
             .scale = definition.scale,
             .offset = definition.offset,
-            .signal = signal,
+            .place = static_cast<std::uint32_t>(signal * sizeof(DecodedSignal)),
             .first_byte = layout.first_byte,
             .shift = layout.shift};
   }
@@ -244,13 +249,24 @@ MessageCodec::MessageCodec(const MessageDef& definition) { Builder(*this, defini
 // What follows is inline, and without the library's assertions on an index where it is the
 // Builder's own: they took as long as the signals of a frame.
 
+// A payload of eight bytes, of a message that needs nothing else: no question is left.
+[[gnu::always_inline]] inline void MessageCodec::decode_eight(const Block& block,
+                                                              std::uint64_t little,
+                                                              DecodedMessage& out) const noexcept {
+  decode_flat(block, {{}, little, __builtin_bswap64(little)}, out.signals_.data());
+  const Presence* const last = presences_.data() + block.presence_end;
+  for (const Presence* each = presences_.data() + block.presence; each != last; ++each) {
+    out.present_.data()[each->word] |= each->bits;
+  }
+}
+
 // All signals of the block lie in the payload, which has at most eight bytes.
 [[gnu::always_inline]] inline void MessageCodec::decode_flat(const Block& block, const Words& words,
                                                              DecodedSignal* out) const noexcept {
   const auto decode_all = [&](std::uint32_t begin, std::uint32_t end, std::uint64_t word) {
     const Step* const last = steps_.data() + end;
     for (const Step* step = steps_.data() + begin; step != last; ++step) {
-      out[step->signal] = step->of(word, step->shift);
+      step->at(out) = step->of(word, step->shift);
     }
   };
   decode_all(block.little, block.big, words.little);
@@ -268,8 +284,8 @@ MessageCodec::MessageCodec(const MessageDef& definition) { Builder(*this, defini
     const auto bits_before = static_cast<std::int32_t>(8 * base);
     std::uint64_t word = 0;
     std::memcpy(&word, words.payload.data() + base, kWord);
-    out[step.signal] = i < block.big ? step.of(word, step.shift - bits_before)
-                                     : step.of(__builtin_bswap64(word), step.shift + bits_before);
+    step.at(out) = i < block.big ? step.of(word, step.shift - bits_before)
+                                 : step.of(__builtin_bswap64(word), step.shift + bits_before);
   }
 }
 
@@ -287,7 +303,7 @@ MessageCodec::MessageCodec(const MessageDef& definition) { Builder(*this, defini
                                                               DecodedMessage& out) const noexcept {
   if (block.bytes > words.payload.size()) {
     for (std::uint32_t i = block.little; i != block.big_end; ++i) {
-      decode_one(steps_[i].signal, words, out);
+      decode_one(steps_[i].signal(), words, out);
     }
   } else {
     if (words.payload.size() <= kWord) {
@@ -332,10 +348,8 @@ void MessageCodec::bring_near() const noexcept {
   can::bring_near(others_);
 }
 
-void MessageCodec::decode(std::span<const std::uint8_t> payload,
-                          DecodedMessage& out) const noexcept {
-  assert(out.size() >= signals_.size());
-  out.clear();
+[[gnu::noinline]] void MessageCodec::decode_any(std::span<const std::uint8_t> payload,
+                                                DecodedMessage& out) const noexcept {
   Words words{.payload = payload};
   if (payload.size() <= kWord) {
     words.little = word_of(payload);
@@ -343,9 +357,22 @@ void MessageCodec::decode(std::span<const std::uint8_t> payload,
   }
   decode_block(always_, words, out);
   for (const Selector& selector : selectors_) {
-    const std::uint64_t present = out.present_.data()[selector.signal / DecodedMessage::kBits];
-    if ((present & DecodedMessage::bit(selector.signal)) != 0)
-      decode_selected(selector, words, out);
+    if (out.has_unchecked(selector.signal)) decode_selected(selector, words, out);
+  }
+}
+
+void MessageCodec::decode(std::span<const std::uint8_t> payload,
+                          DecodedMessage& out) const noexcept {
+  assert(out.size() >= signals_.size());
+  out.clear();
+  if (payload.size() != kWord || !of_eight_) return decode_any(payload, out);
+  std::uint64_t little = 0;
+  std::memcpy(&little, payload.data(), kWord);
+  decode_eight(always_, little, out);
+  for (const Selector& selector : selectors_) {
+    if (!out.has_unchecked(selector.signal)) continue;
+    const std::uint64_t value = out.signals_.data()[selector.signal].raw & selector.mask;
+    decode_eight(blocks_.data()[cases_.data()[selector.cases + value].block], little, out);
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -60,6 +61,9 @@ class DecodedMessage {
     return std::uint64_t{1} << (signal % kBits);
   }
 
+  bool has_unchecked(std::size_t signal) const noexcept {
+    return (present_.data()[signal / kBits] & bit(signal)) != 0;
+  }
   void clear() noexcept {
     std::uint64_t* const words = present_.data();
     words[0] = words[1] = 0;
@@ -90,13 +94,19 @@ class MessageCodec {
     std::uint64_t sign = 0;  // its top bit; 0: unsigned
     double scale = 1.0;
     double offset = 0.0;
-    std::uint32_t signal = 0;
+    std::uint32_t place = 0;  // of the signal, in bytes: one addition and no shift for each
     std::uint32_t first_byte = 0;
     // To the right, of the eight bytes from byte 0 on as one number, the first of them lowest
     // (little endian) or highest (big). From a later byte on less by 8 a byte (little), or more
     // (big).
     std::int32_t shift = 0;
 
+    std::uint32_t signal() const noexcept {
+      return static_cast<std::uint32_t>(place / sizeof(DecodedSignal));
+    }
+    DecodedSignal& at(DecodedSignal* out) const noexcept {
+      return *reinterpret_cast<DecodedSignal*>(reinterpret_cast<std::byte*>(out) + place);
+    }
     DecodedSignal of(std::uint64_t word, std::int32_t right) const noexcept {
       const std::uint64_t raw = (((word >> right) & mask) ^ sign) - sign;
       const double scaled = static_cast<double>(static_cast<std::int64_t>(raw)) * scale;
@@ -136,6 +146,8 @@ class MessageCodec {
   };
   class Builder;
 
+  void decode_any(std::span<const std::uint8_t> payload, DecodedMessage& out) const noexcept;
+  void decode_eight(const Block& block, std::uint64_t little, DecodedMessage& out) const noexcept;
   void decode_flat(const Block& block, const Words& words, DecodedSignal* out) const noexcept;
   void decode_long(const Block& block, const Words& words, DecodedSignal* out) const noexcept;
   void decode_one(std::uint32_t signal, const Words& words, DecodedMessage& out) const noexcept;
@@ -145,6 +157,8 @@ class MessageCodec {
 
   std::vector<SignalCodec> signals_;  // in the definition's order
   Block always_;
+  // Every signal has a flat form in eight bytes, and every selector a case for each value.
+  bool of_eight_ = false;
   std::vector<Selector> selectors_;  // every one before those that it selects
   std::vector<Block> blocks_;
   std::vector<Case> cases_;
