@@ -15,6 +15,7 @@ namespace beltgrip::can {
 namespace {
 
 constexpr std::size_t kWord = sizeof(std::uint64_t);
+constexpr std::uint32_t kFirstByteMost = 4000;        // of a flat step: its bits are counted in 16
 constexpr std::uint32_t kAlways = ~std::uint32_t{0};  // not multiplexed
 constexpr std::uint32_t kNever = kAlways - 1;         // selector unknown or in a circle
 
@@ -215,13 +216,13 @@ class MessageCodec::Builder {
     return block;
   }
 
-  // Not so: floats, 64 bits without a sign, nine bytes.
+  // Not so: floats, 64 bits without a sign, nine bytes, and what no frame is long enough for.
   bool is_flat(std::uint32_t signal) const {
     const SignalDef& definition = definition_.signals[signal];
     const BitLayout layout(definition);
     const bool too_large = definition.type != ValueType::kSigned && definition.length == 64;
     return !codec_.signals_[signal].is_float() && !too_large &&
-           layout.end_byte - layout.first_byte <= kWord;
+           layout.end_byte - layout.first_byte <= kWord && layout.first_byte <= kFirstByteMost;
   }
 
   Step step_of(std::uint32_t signal) const {
@@ -233,8 +234,8 @@ class MessageCodec::Builder {
             .scale = definition.scale,
             .offset = definition.offset,
             .place = static_cast<std::uint32_t>(signal * sizeof(DecodedSignal)),
-            .first_byte = layout.first_byte,
-            .shift = layout.shift};
+            .first_byte = static_cast<std::uint16_t>(layout.first_byte),
+            .shift = static_cast<std::int16_t>(layout.shift)};
   }
 
   static std::uint32_t size_of(const auto& list) { return static_cast<std::uint32_t>(list.size()); }
@@ -280,7 +281,7 @@ MessageCodec::MessageCodec(const MessageDef& definition) { Builder(*this, defini
   const auto last = static_cast<std::uint32_t>(words.payload.size() - kWord);
   for (std::uint32_t i = block.little; i != block.big_end; ++i) {
     const Step& step = steps_[i];
-    const std::uint32_t base = std::min(step.first_byte, last);
+    const std::uint32_t base = std::min<std::uint32_t>(step.first_byte, last);
     const auto bits_before = static_cast<std::int32_t>(8 * base);
     std::uint64_t word = 0;
     std::memcpy(&word, words.payload.data() + base, kWord);
@@ -344,9 +345,12 @@ MessageCodec::MessageCodec(const MessageDef& definition) { Builder(*this, defini
 void MessageCodec::bring_near() const noexcept {
   can::bring_near(steps_);
   can::bring_near(presences_);
-  can::bring_near(signals_);
+  if (of_eight_) return;
+  bring_signals_near();
   can::bring_near(others_);
 }
+
+void MessageCodec::bring_signals_near() const noexcept { can::bring_near(signals_); }
 
 [[gnu::noinline]] void MessageCodec::decode_any(std::span<const std::uint8_t> payload,
                                                 DecodedMessage& out) const noexcept {

@@ -81,8 +81,9 @@ class MessageCodec {
 
   std::size_t signal_count() const noexcept { return signals_.size(); }
   const SignalCodec& signal(std::size_t index) const noexcept { return signals_[index]; }
-  // What decode() will need, before it is called.
+  // What decode() will need, before it is called; and what else it leads to.
   void bring_near() const noexcept;
+  void bring_signals_near() const noexcept;
   // out[i] is the i-th signal of the definition. Precondition: out.size() >= signal_count().
   void decode(std::span<const std::uint8_t> payload, DecodedMessage& out) const noexcept;
 
@@ -95,11 +96,11 @@ class MessageCodec {
     double scale = 1.0;
     double offset = 0.0;
     std::uint32_t place = 0;  // of the signal, in bytes: one addition and no shift for each
-    std::uint32_t first_byte = 0;
+    std::uint16_t first_byte = 0;
     // To the right, of the eight bytes from byte 0 on as one number, the first of them lowest
     // (little endian) or highest (big). From a later byte on less by 8 a byte (little), or more
     // (big).
-    std::int32_t shift = 0;
+    std::int16_t shift = 0;
 
     std::uint32_t signal() const noexcept {
       return static_cast<std::uint32_t>(place / sizeof(DecodedSignal));
@@ -155,17 +156,18 @@ class MessageCodec {
   void decode_selected(const Selector& selector, const Words& words,
                        DecodedMessage& out) const noexcept;
 
-  std::vector<SignalCodec> signals_;  // in the definition's order
+  // First what most frames need, so that it lies together.
   Block always_;
   // Every signal has a flat form in eight bytes, and every selector a case for each value.
   bool of_eight_ = false;
+  std::vector<Step> steps_;
+  std::vector<SignalCodec> signals_;  // in the definition's order
+  std::vector<Presence> presences_;
   std::vector<Selector> selectors_;  // every one before those that it selects
   std::vector<Block> blocks_;
   std::vector<Case> cases_;
   std::vector<Range> ranges_;
-  std::vector<Step> steps_;
   std::vector<std::uint32_t> others_;  // signals without a flat form
-  std::vector<Presence> presences_;
 };
 
 }  // namespace beltgrip::can

@@ -246,7 +246,7 @@ class FramesAhead {
       for (; found_ < due(1); ++found_) {
         Frame& frame = at(found_);
         frame.message = frame.in_time ? decoder_.message_of(frame.record.frame) : nullptr;
-        if (frame.message != nullptr) can::bring_near(frame.message, sizeof(ChosenMessage));
+        if (frame.message != nullptr) can::bring_near(frame.message, ChosenMessage::kNear);
       }
       for (; expected_ < due(2); ++expected_) {
         const ChosenMessage* const message = at(expected_).message;

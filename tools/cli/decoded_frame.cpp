@@ -73,12 +73,15 @@ void append_seconds(std::string& line, std::int64_t t_ns) {
 
 std::string json_text(std::string_view text) { return text::JsonWriter().value(text).take(); }
 
+std::int64_t whole_key(const can::DecodedSignal& signal) {
+  return static_cast<std::int64_t>(signal.raw);
+}
+
 // Where the signal's value table has its value; nothing: nowhere, whatever the table.
 std::optional<std::int64_t> table_key(const DecodedFrame& frame, std::size_t signal) {
   const can::SignalCodec& codec = frame.message.codec.signal(signal);
-  const std::uint64_t raw = frame.values[signal].raw;
-  if (!codec.is_float()) return static_cast<std::int64_t>(raw);
-  const double value = codec.value_of(raw);
+  if (!codec.is_float()) return whole_key(frame.values[signal]);
+  const double value = codec.value_of(frame.values[signal].raw);
   constexpr double kExactWhole = 9007199254740992.0;  // 2^53
   if (!(std::fabs(value) <= kExactWhole) || value != std::trunc(value)) return std::nullopt;
   return static_cast<std::int64_t>(value);
@@ -96,11 +99,11 @@ class JsonFrames : public FrameWriter {
     append_interface(frame.record.interface, out);
     out += R"(,"id":)";
     append_number(out, frame.record.frame.id.value);
-    out += texts.head;
+    out += texts.head();
     for_each_present(frame, texts, out, [&](std::size_t i) {
       const double value = frame.values[i].physical;
       if (std::isfinite(value)) {
-        append_value(out, value, frame.message.decimals[i]);
+        append_value(out, value, texts.keys[i].decimals);
       } else {
         out += "null";
       }
@@ -124,71 +127,88 @@ class JsonFrames : public FrameWriter {
   void expect_soon(const ChosenMessage& message) const override {
     if (message.number >= texts_.size()) return;
     const Texts& texts = texts_[message.number];
-    for (const std::string* text : {&texts.head, &texts.pieces}) can::bring_near(*text);
+    can::bring_near(texts.all);
     can::bring_near(texts.keys);
     can::bring_near(texts.labels);
     can::bring_near(texts.of_labels);
-    can::bring_near(message.decimals);
+    if (with_raw_) message.codec.bring_signals_near();
   }
 
  private:
-  // Pieces of one text, so that they lie together.
-  struct Piece {
-    std::uint32_t begin = 0;
-    std::uint32_t size = 0;
+  struct Key {
+    std::uint32_t end = 0;       // in Texts::all; it begins where the key before ends
+    std::uint32_t decimals = 0;  // of the signal's values, as text::decimals_of() has it
   };
   struct Label {
     std::int64_t key = 0;
-    Piece member;  // "name":"text"
+    std::uint32_t begin = 0, end = 0;  // in Texts::all: "name":"text"
   };
   struct Labels {
     std::uint32_t signal = 0;
+    bool is_float = false;
     std::uint32_t first = 0, end = 0;  // in Texts::of_labels, by their keys
   };
-  // What never changes of a message.
-  struct Texts {
-    std::string head;            // ,"extended":false,"message":"X","signals":{
-    std::string pieces;          // all that the others are pieces of
-    std::vector<Piece> keys;     // "name": of each signal
+  // What never changes of a message: little of it, and together, as with many messages each frame
+  // waits for the memory of its own.
+  struct alignas(64) Texts {
+    // ,"extended":false,"message":"X","signals":{ then of each signal ,"name": then the labels
+    std::string all;
+    std::uint32_t head_end = 0;
+    std::vector<Key> keys;       // of each signal
     std::vector<Labels> labels;  // of the signals that have any
     std::vector<Label> of_labels;
 
-    Piece add(const std::string& text) {
-      pieces += text;
-      return {static_cast<std::uint32_t>(pieces.size() - text.size()),
-              static_cast<std::uint32_t>(text.size())};
+    std::uint32_t size() const { return static_cast<std::uint32_t>(all.size()); }
+    std::string_view head() const { return {all.data(), head_end}; }
+    // With the comma before it.
+    std::string_view key(std::size_t i) const {
+      const std::uint32_t begin = i == 0 ? head_end : keys[i - 1].end;
+      return {all.data() + begin, keys[i].end - begin};
     }
-    std::string_view text(Piece piece) const {
-      return std::string_view(pieces).substr(piece.begin, piece.size);
+    std::string_view text(const Label& label) const {
+      return {all.data() + label.begin, label.end - label.begin};
     }
   };
 
   const Texts& texts_of(const ChosenMessage& message) {
     if (message.number >= texts_.size()) texts_.resize(message.number + 1);
     Texts& texts = texts_[message.number];
-    if (!texts.head.empty()) return texts;
+    if (texts.head_end == 0) fill(texts, message);
+    return texts;
+  }
+
+  static void fill(Texts& texts, const ChosenMessage& message) {
     const can::MessageDef& definition = *message.definition;
-    texts.head = R"(,"extended":)" + std::string(definition.id.extended ? "true" : "false") +
-                 R"(,"message":)" + json_text(definition.name) + R"(,"signals":{)";
+    texts.all = R"(,"extended":)" + std::string(definition.id.extended ? "true" : "false") +
+                R"(,"message":)" + json_text(definition.name) + R"(,"signals":{)";
+    texts.head_end = texts.size();
     for (const can::SignalDef& signal : definition.signals) {
-      const std::string key = json_text(signal.name) + ':';
-      texts.keys.push_back(texts.add(key));
+      texts.all += ',' + json_text(signal.name) + ':';
+      texts.keys.push_back({texts.size(), message.decimals[texts.keys.size()]});
+    }
+    for (std::uint32_t i = 0; i < definition.signals.size(); ++i) {
+      const can::SignalDef& signal = definition.signals[i];
       if (signal.values.empty()) continue;
       const auto first = static_cast<std::uint32_t>(texts.of_labels.size());
       for (const auto& [value, text] : signal.values) {
-        texts.of_labels.push_back({value, texts.add(key + json_text(text))});
+        const std::uint32_t begin = texts.size();
+        texts.all += json_text(signal.name) + ':' + json_text(text);
+        texts.of_labels.push_back({value, begin, texts.size()});
       }
-      texts.labels.push_back({static_cast<std::uint32_t>(texts.keys.size() - 1), first,
+      texts.labels.push_back({i, message.codec.signal(i).is_float(), first,
                               static_cast<std::uint32_t>(texts.of_labels.size())});
     }
-    return texts;
+    texts.all.shrink_to_fit();
+    texts.of_labels.shrink_to_fit();
   }
 
   static void append_labels(const DecodedFrame& frame, const Texts& texts, std::string& out) {
     bool first = true;
     for (const Labels& labels : texts.labels) {
       if (!frame.values.has(labels.signal)) continue;
-      const std::optional<std::int64_t> key = table_key(frame, labels.signal);
+      const std::optional<std::int64_t> key = labels.is_float
+                                                  ? table_key(frame, labels.signal)
+                                                  : whole_key(frame.values[labels.signal]);
       if (!key) continue;
       const Label* const end = texts.of_labels.data() + labels.end;
       const Label* const found = std::lower_bound(
@@ -197,7 +217,7 @@ class JsonFrames : public FrameWriter {
       if (found == end || found->key != *key) continue;
       if (!first) out += ',';
       first = false;
-      out += texts.text(found->member);
+      out += texts.text(*found);
     }
   }
 
@@ -206,9 +226,8 @@ class JsonFrames : public FrameWriter {
                                Write write) {
     bool first = true;
     frame.values.for_each_present([&](std::size_t i) {
-      if (!first) out += ',';
+      out += first ? texts.key(i).substr(1) : texts.key(i);
       first = false;
-      out += texts.text(texts.keys[i]);
       write(i);
     });
   }
@@ -321,6 +340,7 @@ class CsvFrames : public FrameWriter {
   void expect_soon(const ChosenMessage& message) const override {
     can::bring_near(message.columns);
     can::bring_near(message.decimals);
+    if (with_raw_) message.codec.bring_signals_near();
   }
 
  private:

@@ -14,15 +14,18 @@
 namespace beltgrip::cli {
 
 // A message of a DBC that is to be decoded: which of its signals are wanted.
-struct ChosenMessage {
+// First what most frames need.
+struct alignas(64) ChosenMessage {
   const can::MessageDef* definition = nullptr;
+  std::size_t number = 0;             // among all messages of all DBC files
+  bool names_repeat = false;          // among its signals
+  std::vector<std::size_t> unwanted;  // signals
   can::MessageCodec codec;
   std::vector<bool> wanted;            // beside the definition's signals
-  std::vector<std::size_t> unwanted;   // the others
   std::vector<unsigned> decimals;      // of each signal's values, as text::decimals_of() has it
-  std::size_t number = 0;              // among all messages of all DBC files
   std::vector<std::uint32_t> columns;  // in CSV: of each wanted signal
-  bool names_repeat = false;           // among its signals
+
+  static constexpr std::size_t kNear = 192;  // bytes that a frame without a selector needs
 };
 
 struct DecodedFrame {
