@@ -26,6 +26,12 @@ double wedge_factor(double half_angle_rad) {
   return (1.0 + cosine * cosine) / std::sin(2.0 * half_angle_rad);
 }
 
+// From here on the nearest number is 1.
+constexpr double kSaturated = 22.0;
+double tanh_of(double x) {
+  return std::abs(x) >= kSaturated ? std::copysign(1.0, x) : std::tanh(x);
+}
+
 // A 3 by 3 system by elimination with pivots, for several right sides; the matrix I - gamma h J is
 // regular.
 class Elimination {
@@ -36,7 +42,10 @@ class Elimination {
       for (std::size_t r = i + 1; r < 3; ++r) {
         if (std::abs(a_[r][i]) > std::abs(a_[pivot_[i]][i])) pivot_[i] = r;
       }
-      std::swap(a_[i], a_[pivot_[i]]);
+      if (pivot_[i] != i) {
+        std::swap(a_[i], a_[pivot_[i]]);
+        swaps_ = true;
+      }
       for (std::size_t r = i + 1; r < 3; ++r) {
         factor_[i][r] = a_[r][i] / a_[i][i];
         for (std::size_t c = i; c < 3; ++c) a_[r][c] -= factor_[i][r] * a_[i][c];
@@ -44,8 +53,15 @@ class Elimination {
     }
   }
   std::array<double, 3> solve(std::array<double, 3> b) const {
+    return swaps_ ? solve<true>(b) : solve<false>(b);
+  }
+
+ private:
+  // Without swaps, as mostly, all places are known and nothing goes through memory.
+  template <bool kSwaps>
+  std::array<double, 3> solve(std::array<double, 3> b) const {
     for (std::size_t i = 0; i < 3; ++i) {
-      std::swap(b[i], b[pivot_[i]]);
+      if (kSwaps) std::swap(b[i], b[pivot_[i]]);
       for (std::size_t r = i + 1; r < 3; ++r) b[r] -= factor_[i][r] * b[i];
     }
     for (std::size_t i = 3; i-- > 0;) {
@@ -55,9 +71,9 @@ class Elimination {
     return b;
   }
 
- private:
   std::array<std::array<double, 3>, 3> a_, factor_{};
   std::array<std::size_t, 3> pivot_{};
+  bool swaps_ = false;
 };
 
 }  // namespace
@@ -112,7 +128,7 @@ const VehiclePlant::RatioGeometry& VehiclePlant::ratio_geometry() {
   if (place_.ratio != state_.ratio) {
     place_ = {state_.ratio,
               std::clamp(std::log(variator_.ratio_overdrive / state_.ratio) / ln_span_, 0.0, 1.0),
-              primary_radius_m(state_.ratio)};
+              primary_radius_m(state_.ratio), std::log(state_.ratio)};
   }
   return place_;
 }
@@ -128,7 +144,7 @@ VehiclePlant::StepConstants VehiclePlant::step_constants(const DrivelineInput& i
   held.curve.mu_max *=
       (1.0 + low_share * (belt_.low_mu_factor - 1.0)) * (1.0 - input.wear) *
       std::max(0.2, 1.0 + belt_.temperature_per_K * (input.oil_degC - kReferenceTemperature_degC)) *
-      std::max(0.2, 1.0 + belt_.speed_per_ln * std::log(speed)) *
+      std::max(0.2, 1.0 + belt_.speed_per_ln * ln_speed_.of(speed)) *
       std::pow(force, -belt_.load_exponent) *
       friction_factor(effects_, {input.oil_degC, state_.omega_p_rad_s, input.secondary_force_N,
                                  low_share, input.time_s, input.slip_energy_kJ, experiment_}) *
@@ -139,7 +155,7 @@ VehiclePlant::StepConstants VehiclePlant::step_constants(const DrivelineInput& i
   const double learned_ratio =
       learned_at(learned_, estimator::LearnedPoint::kRatio, input.conditions);
   held.ratio = state_.ratio * (1.0 + end_stop) * (1.0 + learned_ratio) *
-               std::exp(low_share > 0.5 ? crept_ : -crept_) *
+               (crept_ == 0.0 ? 1.0 : std::exp(low_share > 0.5 ? crept_ : -crept_)) *
                (1.0 - variator_.deformation_per_N * input.secondary_force_N -
                 effects_.deformation_per_kN * kN - effects_.deformation_per_kN2 * kN * kN -
                 (variator_.deformation_per_Nm + effects_.tilt_per_Nm) * output_.belt_torque_Nm);
@@ -163,41 +179,39 @@ VehiclePlant::Slip VehiclePlant::slip_of(double ratio, double omega_p_rad_s, dou
   return {difference / least, ratio / least, -1.0 / least};
 }
 
+VehiclePlant::Loads VehiclePlant::loads(const DrivelineInput& input) const {
+  const double speed_per_omega = body_.wheel_radius_m / body_.final_drive;
+  const double weight_N = body_.mass_kg * kGravity_m_s2;
+  return {.primary_Nm = variator_.primary_loss_Nm + effects_.loss_constant_Nm +
+                        (variator_.primary_loss_Nm_per_N + 1e-3 * effects_.loss_per_kN_Nm) *
+                            input.secondary_force_N,
+          .learned_Nm = learned_at(learned_, estimator::LearnedPoint::kTorque, input.conditions),
+          .speed_per_omega = speed_per_omega,
+          .coulomb_Nm = variator_.secondary_loss_Nm + input.brake_Nm +
+                        weight_N * body_.rolling_resistance * speed_per_omega,
+          .air = 0.5 * kAirDensity_kg_m3 * body_.drag_area_m2 * speed_per_omega,
+          .grade_Nm = weight_N * body_.grade_percent / 100.0 * speed_per_omega};
+}
+
+template <bool kWithJacobian>
 VehiclePlant::Rates VehiclePlant::rates(const std::array<double, 3>& omega,
-                                        const DrivelineInput& input,
-                                        const StepConstants& held) const {
+                                        const DrivelineInput& input, const StepConstants& held,
+                                        const Loads& loads) const {
   const Slip slip = slip_of(held.ratio, omega[1], omega[2]);
   const FrictionPoint friction = friction_at(held.curve, slip.value);
   const double belt = held.torque_per_mu * friction.mu;
-  const double belt_per_p = held.torque_per_mu * friction.slope * slip.per_p;
-  const double belt_per_s = held.torque_per_mu * friction.slope * slip.per_s;
 
   const double difference = omega[0] - omega[1];
-  const double t = std::tanh(difference / kClutchWidth_rad_s);
+  const double t = tanh_of(difference / kClutchWidth_rad_s);
   const double clutch =
       input.lockup_capacity_Nm * t + kConverter_Nm_s2 * difference * std::abs(difference);
-  const double clutch_slope = input.lockup_capacity_Nm * (1.0 - t * t) / kClutchWidth_rad_s +
-                              2.0 * kConverter_Nm_s2 * std::abs(difference);
 
-  const double loss =
-      variator_.primary_loss_Nm + effects_.loss_constant_Nm +
-      (variator_.primary_loss_Nm_per_N + 1e-3 * effects_.loss_per_kN_Nm) * input.secondary_force_N +
-      effects_.loss_per_rad_s_Nm * omega[1] +
-      learned_at(learned_, estimator::LearnedPoint::kTorque, input.conditions);
-  const double tp = std::tanh(omega[1] / kCoulombWidth_rad_s);
-  const double ts = std::tanh(omega[2] / kCoulombWidth_rad_s);
-  const double speed_per_omega = body_.wheel_radius_m / body_.final_drive;
-  const double speed = omega[2] * speed_per_omega;
-  const double weight_N = body_.mass_kg * kGravity_m_s2;
-  const double coulomb_Nm = variator_.secondary_loss_Nm + input.brake_Nm +
-                            weight_N * body_.rolling_resistance * speed_per_omega;
-  const double air = 0.5 * kAirDensity_kg_m3 * body_.drag_area_m2 * speed_per_omega;
-  const double road =
-      coulomb_Nm * ts + variator_.secondary_loss_Nm_s * omega[2] + air * speed * std::abs(speed) +
-      weight_N * body_.grade_percent / 100.0 * speed_per_omega + input.disturbance_Nm;
-  const double road_slope = coulomb_Nm * (1.0 - ts * ts) / kCoulombWidth_rad_s +
-                            variator_.secondary_loss_Nm_s +
-                            2.0 * air * std::abs(speed) * speed_per_omega;
+  const double loss = loads.primary_Nm + effects_.loss_per_rad_s_Nm * omega[1] + loads.learned_Nm;
+  const double tp = tanh_of(omega[1] / kCoulombWidth_rad_s);
+  const double ts = tanh_of(omega[2] / kCoulombWidth_rad_s);
+  const double speed = omega[2] * loads.speed_per_omega;
+  const double road = loads.coulomb_Nm * ts + variator_.secondary_loss_Nm_s * omega[2] +
+                      loads.air * speed * std::abs(speed) + loads.grade_Nm + input.disturbance_Nm;
 
   Rates r;
   const double je = engine_inertia_kg_m2_;
@@ -205,27 +219,38 @@ VehiclePlant::Rates VehiclePlant::rates(const std::array<double, 3>& omega,
   const double js = secondary_inertia_kg_m2_;
   r.value = {(input.engine_torque_Nm - clutch) / je, (clutch - loss * tp - belt) / jp,
              (belt / held.ratio - road) / js};
-  r.jacobian[0] = {-clutch_slope / je, clutch_slope / je, 0.0};
-  r.jacobian[1] = {clutch_slope / jp,
-                   (-clutch_slope - loss * (1.0 - tp * tp) / kCoulombWidth_rad_s - belt_per_p) / jp,
-                   -belt_per_s / jp};
-  r.jacobian[2] = {0.0, belt_per_p / held.ratio / js, (belt_per_s / held.ratio - road_slope) / js};
+  if constexpr (kWithJacobian) {
+    const double belt_per_p = held.torque_per_mu * friction.slope * slip.per_p;
+    const double belt_per_s = held.torque_per_mu * friction.slope * slip.per_s;
+    const double clutch_slope = input.lockup_capacity_Nm * (1.0 - t * t) / kClutchWidth_rad_s +
+                                2.0 * kConverter_Nm_s2 * std::abs(difference);
+    const double road_slope = loads.coulomb_Nm * (1.0 - ts * ts) / kCoulombWidth_rad_s +
+                              variator_.secondary_loss_Nm_s +
+                              2.0 * loads.air * std::abs(speed) * loads.speed_per_omega;
+    r.jacobian[0] = {-clutch_slope / je, clutch_slope / je, 0.0};
+    r.jacobian[1] = {
+        clutch_slope / jp,
+        (-clutch_slope - loss * (1.0 - tp * tp) / kCoulombWidth_rad_s - belt_per_p) / jp,
+        -belt_per_s / jp};
+    r.jacobian[2] = {0.0, belt_per_p / held.ratio / js,
+                     (belt_per_s / held.ratio - road_slope) / js};
+  }
   return r;
 }
 
 void VehiclePlant::shift(const DrivelineInput& input, double step_s) {
-  const double force_ratio =
-      std::max(input.primary_force_N, 1.0) / std::max(input.secondary_force_N, 1.0);
+  const double ln_force_ratio =
+      std::log(std::max(input.primary_force_N, 1.0) / std::max(input.secondary_force_N, 1.0));
   const double capacity_Nm =
       2.0 * output_.mu_max * input.secondary_force_N * output_.primary_radius_m / cos_wedge_;
   const double load = std::clamp(output_.belt_torque_Nm / std::max(capacity_Nm, 1.0), -1.0, 1.0);
   const double equilibrium =
-      variator_.force_ratio_slope * std::log(state_.ratio) + variator_.force_ratio_load * load;
+      variator_.force_ratio_slope * ratio_geometry().ln_ratio + variator_.force_ratio_load * load;
   const double rate = std::max(state_.omega_p_rad_s, 0.0) * variator_.shift_gain * wedge_factor_ *
-                      state_.ratio * (std::log(force_ratio) - equilibrium);
+                      state_.ratio * (ln_force_ratio - equilibrium);
   state_.ratio =
       std::clamp(state_.ratio + rate * step_s, variator_.ratio_low, variator_.ratio_overdrive);
-  creep(std::log(force_ratio), step_s);
+  creep(ln_force_ratio, step_s);
 }
 
 // Held by the stop, the ratio gives way as the force ratio falls from where it was at arrival.
@@ -266,7 +291,8 @@ void VehiclePlant::step(const DrivelineInput& input, double step_s) {
   const StepConstants held = step_constants(input);
   const double gamma_h = (1.0 - std::sqrt(0.5)) * step_s;
   const std::array<double, 3> x{state_.omega_e_rad_s, state_.omega_p_rad_s, state_.omega_s_rad_s};
-  const Rates first = rates(x, input, held);
+  const Loads fixed = loads(input);
+  const Rates first = rates<true>(x, input, held, fixed);
   std::array<std::array<double, 3>, 3> w{};
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
@@ -277,7 +303,7 @@ void VehiclePlant::step(const DrivelineInput& input, double step_s) {
   const std::array<double, 3> k1 = elimination.solve(first.value);
   std::array<double, 3> trial{};
   for (std::size_t i = 0; i < 3; ++i) trial[i] = x[i] + step_s * k1[i];
-  Rates second = rates(trial, input, held);
+  Rates second = rates<false>(trial, input, held, fixed);
   for (std::size_t i = 0; i < 3; ++i) second.value[i] -= 2.0 * k1[i];
   const std::array<double, 3> k2 = elimination.solve(second.value);
   state_.omega_e_rad_s += step_s * (1.5 * k1[0] + 0.5 * k2[0]);

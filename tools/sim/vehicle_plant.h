@@ -14,6 +14,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include "estimator/physics/learned_effects.h"
@@ -91,13 +92,34 @@ class VehiclePlant {
     double ratio = std::numeric_limits<double>::quiet_NaN();  // at which
     double low_share = 0.0;                                   // of the way to the low end stop
     double radius_m = 0.0;                                    // of the primary pulley
+    double ln_ratio = 0.0;
+  };
+  // The logarithm of what is often asked twice.
+  class Logarithm {
+   public:
+    double of(double x) {
+      if (x != x_) {
+        x_ = x;
+        ln_ = std::log(x);
+      }
+      return ln_;
+    }
+
+   private:
+    double x_ = 1.0, ln_ = 0.0;
+  };
+  // Torques that stay fixed during one step, and factors of the others.
+  struct Loads {
+    double primary_Nm, learned_Nm, speed_per_omega, coulomb_Nm, air, grade_Nm;
   };
   const RatioGeometry&
   ratio_geometry();  // at the present ratio; kept, since it stands for most steps
   StepConstants step_constants(const DrivelineInput& input);
   static Slip slip_of(double ratio, double omega_p_rad_s, double omega_s_rad_s);
+  Loads loads(const DrivelineInput& input) const;
+  template <bool kWithJacobian>
   Rates rates(const std::array<double, 3>& omega, const DrivelineInput& input,
-              const StepConstants& held) const;
+              const StepConstants& held, const Loads& loads) const;
   void shift(const DrivelineInput& input, double step_s);
   void creep(double ln_force_ratio, double step_s);
   void observe(const DrivelineInput& input);
@@ -114,6 +136,7 @@ class VehiclePlant {
   double cos_wedge_;
   double wedge_factor_;
   RatioGeometry place_;
+  Logarithm ln_speed_;
   double ln_span_;                       // of the ratios
   std::array<double, kRadii> radius_m_;  // over ln(ratio) between the end stops
   DrivelineState state_;
