@@ -221,8 +221,9 @@ class MessageCodec::Builder {
     const SignalDef& definition = definition_.signals[signal];
     const BitLayout layout(definition);
     const bool too_large = definition.type != ValueType::kSigned && definition.length == 64;
+    if (layout.first_byte > kFirstByteMost) return false;
     return !codec_.signals_[signal].is_float() && !too_large &&
-           layout.end_byte - layout.first_byte <= kWord && layout.first_byte <= kFirstByteMost;
+           layout.end_byte - layout.first_byte <= kWord;
   }
 
   Step step_of(std::uint32_t signal) const {

@@ -205,6 +205,51 @@ TEST(MessageCodec, DecodesAnyMessageAsBitsPickedOneByOne) {
   }
 }
 
+// Nothing but whole numbers inside eight bytes, and selectors of a few bits: a way of its own.
+TEST(MessageCodec, DecodesEightBytesAsBitsPickedOneByOne) {
+  for (unsigned seed = 0; seed < 600; ++seed) {
+    SCOPED_TRACE(seed);
+    Drawn drawn(seed);
+    MessageDef message;
+    const std::size_t count = 1 + drawn.below(seed % 10 == 0 ? 150 : 20);
+    for (std::size_t i = 0; i < count; ++i) {
+      SignalDef signal = drawn.signal(i, 8);
+      const bool is_little = signal.byte_order == ByteOrder::kLittle;
+      const std::uint32_t before =
+          is_little ? signal.start_bit : signal.start_bit / 8 * 8 + 7 - signal.start_bit % 8;
+      const std::uint64_t most = seed % 3 == 0 ? 4 : drawn.below(4) == 0 ? 63 : 6;
+      signal.length =
+          static_cast<std::uint32_t>(1 + drawn.below(std::min<std::uint64_t>(most, 64 - before)));
+      if (signal.type == ValueType::kFloat32) signal.type = ValueType::kUnsigned;
+      message.signals.push_back(signal);
+    }
+    if (seed % 4 != 0) drawn.select(message, seed % 4 == 1 ? 3 : 12);
+    const MessageCodec codec(message);
+    DecodedMessage values(count);
+    for (const std::size_t length : {8, 8, 7, 8, 12, 8}) {
+      expect_as_naive(message, codec, drawn.payload(length, seed % 2 == 0), values);
+      if (HasFatalFailure()) return;
+    }
+  }
+}
+
+// Behind every payload there is, and behind what the bits of a step are counted in.
+TEST(MessageCodec, NeverFindsWhatBeginsBehindAnyPayload) {
+  MessageDef message;
+  message.signals = {byte_signal("near", 0), byte_signal("far", 5'000),
+                     byte_signal("farther", 70'000)};
+  const MessageCodec codec(message);
+  DecodedMessage values(message.signals.size());
+  std::vector<std::uint8_t> payload(5'001, 7);
+  codec.decode(payload, values);
+  EXPECT_TRUE(values.has(0) && values.has(1));
+  EXPECT_EQ(values[1].raw, 7U);
+  payload.resize(70'001, 9);
+  codec.decode(payload, values);
+  EXPECT_TRUE(values.has(0) && values.has(1) && values.has(2));
+  EXPECT_EQ(values[0].raw + values[1].raw + values[2].raw, 7U + 7U + 9U);
+}
+
 // Tables of all cases would be as long as the squares of what two selectors choose: gigabytes.
 TEST(MessageCodec, DecodesManyOverlappingRangesWithoutATableOfThemAll) {
   Drawn drawn(1);
