@@ -1,6 +1,7 @@
 #include "estimator/signal/trend.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "estimator/signal/slow_noise.h"
@@ -38,7 +39,8 @@ constexpr double kFading = 0.4;
 }  // namespace
 
 Trend::Trend(double sample_rate_hz, std::size_t cells, Course course)
-    : sums_(cells + 1),
+    : kept_(cells + 1),
+      sums_(std::bit_ceil(kept_)),
       course_(course),
       per_cell_(static_cast<int>(std::max(1.0, std::ceil(kCell_s * sample_rate_hz - 1e-6)))),
       cell_s_(per_cell_ / sample_rate_hz) {}
@@ -71,8 +73,8 @@ void Trend::add(double t_s, double value, double slip_percent) noexcept {
   const double t = t_s - origin_t_;
   const double y = value - origin_y_;
   const Sums& before = sums(cells_);
-  sums_[(cells_ + 1) % sums_.size()] = {before.t + t, before.y + y, before.tt + t * t,
-                                        before.ty + t * y};
+  sums_[(cells_ + 1) & (sums_.size() - 1)] = {before.t + t, before.y + y, before.tt + t * t,
+                                              before.ty + t * y};
   ++cells_;
   for (int i = 0; i < kScales; ++i) {
     Scale& scale = scales_[static_cast<std::size_t>(i)];
@@ -200,7 +202,8 @@ Line Trend::through(std::size_t begin, std::size_t end, double cell_variance) co
           .valid = true};
 }
 
-double Trend::mean_deviation(const Line& line, std::size_t begin, std::size_t end) const noexcept {
+inline double Trend::mean_deviation(const Line& line, std::size_t begin,
+                                    std::size_t end) const noexcept {
   const Sums& a = sums(begin);
   const Sums& b = sums(end);
   const double n = static_cast<double>(end - begin);
@@ -210,15 +213,18 @@ double Trend::mean_deviation(const Line& line, std::size_t begin, std::size_t en
 bool Trend::fits(const Line& line, std::size_t begin, std::size_t end,
                  double cell_variance) const noexcept {
   const std::size_t length = end - begin;
-  const auto within = [&](std::size_t from, std::size_t to) {
-    const double bound = kContradiction * std::sqrt(cell_variance / static_cast<double>(to - from));
-    return std::abs(mean_deviation(line, from, to)) <= bound + 1e-12;
+  const auto bound = [&](std::size_t cells) {
+    return kContradiction * std::sqrt(cell_variance / static_cast<double>(cells)) + 1e-12;
+  };
+  const auto within = [&](std::size_t from, std::size_t cells, double most) {
+    return std::abs(mean_deviation(line, from, from + cells)) <= most;
   };
   for (std::size_t part = kCellsLeast; part < length; part *= 2) {
-    if (!within(end - part, end) || !within(begin, begin + part)) return false;
+    const double most = bound(part);
+    if (!within(end - part, part, most) || !within(begin, part, most)) return false;
   }
   const std::size_t third = length / 3;
-  return third == 0 || within(end - 2 * third, end - third);
+  return third == 0 || within(end - 2 * third, third, bound(third));
 }
 
 int Trend::first_bent_scale() const noexcept {
@@ -236,7 +242,7 @@ int Trend::first_bent_scale() const noexcept {
 }
 
 Line Trend::line() const noexcept {
-  const std::size_t oldest = cells_ >= sums_.size() ? cells_ - sums_.size() + 1 : 0;
+  const std::size_t oldest = cells_ >= kept_ ? cells_ - kept_ + 1 : 0;
   if (cells_ < oldest + kCellsLeast) return {};
   const int bent = course_ == Course::kBends ? first_bent_scale() : kScales;
   const std::size_t straight = std::size_t{1} << (bent - 1);

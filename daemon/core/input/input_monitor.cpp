@@ -77,6 +77,7 @@ InputMonitor::InputMonitor(const Config& config) : config_(config), uds_(config)
 
 void InputMonitor::bind(const RoleBinding& binding) {
   Row& row = this->row(binding.role);
+  if (row.binding == nullptr) bound_[bound_count_++] = static_cast<std::uint8_t>(binding.role);
   row.binding = &binding;
   row.quality = SignalQuality::kMissing;
   row.is_flag = role_dimension(binding.role) == can::Dimension::kNone;
@@ -279,7 +280,6 @@ Duration InputMonitor::stale_limit(const Row& row) noexcept {
 }
 
 SignalQuality InputMonitor::judge(const Row& row, MonoTime t) const noexcept {
-  if (row.binding == nullptr) return SignalQuality::kUnbound;
   if (row.history.empty()) return SignalQuality::kMissing;
   if (t - row.heard > stale_limit(row)) return SignalQuality::kStale;
   return row.period ? SignalQuality::kValid : SignalQuality::kLearning;
@@ -363,7 +363,8 @@ void InputMonitor::watch_courses(MonoTime t) noexcept {
 
 void InputMonitor::update(MonoTime t, FaultSet& faults) noexcept {
   if (!began_) began_ = t;
-  for (Row& each : rows_) {
+  for (const std::uint8_t i : bound()) {
+    Row& each = rows_[i];
     each.quality = judge(each, t);
     // Intervals from before a message stopped say nothing of its period.
     if (each.quality == SignalQuality::kStale && each.learns) each.interval_count = 0;
@@ -379,8 +380,8 @@ void InputMonitor::update(MonoTime t, FaultSet& faults) noexcept {
     faults.raise(Fault::kInputFrozen, t);
   }
   // What comes next need not go on from there.
-  for (Row& each : rows_) {
-    if (each.quality != SignalQuality::kValid) each.gate.reset();
+  for (const std::uint8_t i : bound()) {
+    if (rows_[i].quality != SignalQuality::kValid) rows_[i].gate.reset();
   }
 
   for (const Role role : required()) {

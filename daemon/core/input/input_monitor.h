@@ -155,6 +155,7 @@ class InputMonitor {
 
   Row& row(Role role) noexcept { return rows_[static_cast<std::size_t>(role)]; }
   const Row& row(Role role) const noexcept { return rows_[static_cast<std::size_t>(role)]; }
+  std::span<const std::uint8_t> bound() const noexcept { return {bound_.data(), bound_count_}; }
   void bind(const RoleBinding& binding);
   void guard(Message& message) noexcept;
   void bind_identifier(const Message& message, std::uint8_t index) noexcept;
@@ -173,6 +174,8 @@ class InputMonitor {
 
   Config config_;  // the bindings' home
   std::array<Row, kRoleCount> rows_{};
+  std::array<std::uint8_t, kRoleCount> bound_{};  // rows with a binding
+  std::size_t bound_count_ = 0;
   std::array<Message, kRoleCount> messages_{};
   std::uint8_t message_count_ = 0;
   // Bus and identifier -> message.

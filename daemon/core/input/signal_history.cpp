@@ -1,6 +1,7 @@
 #include "daemon/core/input/signal_history.h"
 
 #include <algorithm>
+#include <array>
 
 namespace beltgrip::daemon {
 
@@ -44,13 +45,15 @@ bool SignalHistory::value_at(MonoTime t, Duration reach, double& value) const no
   const Duration span = last.t - at(count - 1).t;
   // Stamps relative to the newest, in units of the time they span.
   double mean_x = 0.0;
+  std::array<double, kLine> stamps;
   for (std::size_t age = 0; age < count; ++age) {
-    mean_x += fraction(at(age).t - last.t, span);
+    stamps[age] = fraction(at(age).t - last.t, span);
+    mean_x += stamps[age];
   }
   mean_x /= static_cast<double>(count);
   double xx = 0.0, xy = 0.0;
   for (std::size_t age = 0; age < count; ++age) {
-    const double x = fraction(at(age).t - last.t, span) - mean_x;
+    const double x = stamps[age] - mean_x;
     xx += x * x;
     xy += x * (at(age).value - last.value);  // any constant: the x add up to nothing
   }

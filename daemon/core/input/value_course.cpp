@@ -34,7 +34,9 @@ constexpr double kLeastChance = 1e-6;  // of a single value
 
 }  // namespace
 
-void ValueCourse::reset() noexcept { *this = ValueCourse(step_, has_inertia_); }
+void ValueCourse::reset() noexcept {
+  if (count_ > 0) *this = ValueCourse(step_, has_inertia_);
+}
 
 void ValueCourse::close_run(MonoTime t, double value) noexcept {
   const double change = value - value_;
@@ -44,7 +46,7 @@ void ValueCourse::close_run(MonoTime t, double value) noexcept {
   // Within a run nothing turns back.
   const double quiet = static_cast<double>(run_);
   known_ = std::min(known_ + 1.0 + quiet, kRemembered);
-  const double left = std::max(0.0, 1.0 - quiet / known_);
+  const double left = run_ == 0 ? 1.0 : std::max(0.0, 1.0 - quiet / known_);
   const double before = run_ == 0 ? change_ : 0.0;
   // A shaft that swings for a while is not to be taken for less noise long after.
   const double most = kTurnMost * std::max(turns_, resolution_ * resolution_);
@@ -54,7 +56,7 @@ void ValueCourse::close_run(MonoTime t, double value) noexcept {
   scatter_ = left * scatter_ + (1.0 - left) * std::abs(drift_);
   scatter_ += (std::abs(change - drift_) - scatter_) / known_;
   if (has_inertia_) {
-    drift_ *= std::max(0.0, 1.0 - quiet / kDrift);
+    if (run_ > 0) drift_ *= std::max(0.0, 1.0 - quiet / kDrift);
     drift_ += (change - drift_) / std::min(known_, kDrift);
   }
   if (t - span_ >= kSpan) {
