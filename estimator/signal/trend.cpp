@@ -202,12 +202,15 @@ Line Trend::through(std::size_t begin, std::size_t end, double cell_variance) co
           .valid = true};
 }
 
+// Both means by one division.
 inline double Trend::mean_deviation(const Line& line, std::size_t begin,
                                     std::size_t end) const noexcept {
+  using Two [[gnu::vector_size(2 * sizeof(double))]] = double;
   const Sums& a = sums(begin);
   const Sums& b = sums(end);
   const double n = static_cast<double>(end - begin);
-  return origin_y_ + (b.y - a.y) / n - line.at(origin_t_ + (b.t - a.t) / n);
+  const Two mean = (Two{b.t, b.y} - Two{a.t, a.y}) / Two{n, n};
+  return origin_y_ + mean[1] - line.at(origin_t_ + mean[0]);
 }
 
 bool Trend::fits(const Line& line, std::size_t begin, std::size_t end,

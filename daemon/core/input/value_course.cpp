@@ -52,9 +52,12 @@ void ValueCourse::close_run(MonoTime t, double value) noexcept {
   const double most = kTurnMost * std::max(turns_, resolution_ * resolution_);
   const double turn = std::clamp(-(before - drift_) * (change - drift_), -most, most);
   turns_ = left * turns_ - (1.0 - left) * std::min(most, drift_ * drift_);
-  turns_ += (turn - turns_) / known_;
   scatter_ = left * scatter_ + (1.0 - left) * std::abs(drift_);
-  scatter_ += (std::abs(change - drift_) - scatter_) / known_;
+  // Both by one division.
+  using Two [[gnu::vector_size(2 * sizeof(double))]] = double;
+  const Two news = Two{turn - turns_, std::abs(change - drift_) - scatter_} / Two{known_, known_};
+  turns_ += news[0];
+  scatter_ += news[1];
   if (has_inertia_) {
     if (run_ > 0) drift_ *= std::max(0.0, 1.0 - quiet / kDrift);
     drift_ += (change - drift_) / std::min(known_, kDrift);
