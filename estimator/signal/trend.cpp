@@ -40,7 +40,8 @@ constexpr double kFading = 0.4;
 
 Trend::Trend(double sample_rate_hz, std::size_t cells, Course course)
     : kept_(cells + 1),
-      sums_(std::bit_ceil(kept_)),
+      mask_(std::bit_ceil(kept_) - 1),
+      sums_(mask_ + 1),
       course_(course),
       per_cell_(static_cast<int>(std::max(1.0, std::ceil(kCell_s * sample_rate_hz - 1e-6)))),
       cell_s_(per_cell_ / sample_rate_hz) {}
@@ -73,8 +74,7 @@ void Trend::add(double t_s, double value, double slip_percent) noexcept {
   const double t = t_s - origin_t_;
   const double y = value - origin_y_;
   const Sums& before = sums(cells_);
-  sums_[(cells_ + 1) & (sums_.size() - 1)] = {before.t + t, before.y + y, before.tt + t * t,
-                                              before.ty + t * y};
+  sums_[(cells_ + 1) & mask_] = {before.t + t, before.y + y, before.tt + t * t, before.ty + t * y};
   ++cells_;
   for (int i = 0; i < kScales; ++i) {
     Scale& scale = scales_[static_cast<std::size_t>(i)];
