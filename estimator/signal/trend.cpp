@@ -1,7 +1,6 @@
 #include "estimator/signal/trend.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "estimator/signal/slow_noise.h"
@@ -39,15 +38,13 @@ constexpr double kFading = 0.4;
 }  // namespace
 
 Trend::Trend(double sample_rate_hz, std::size_t cells, Course course)
-    : kept_(cells + 1),
-      mask_(std::bit_ceil(kept_) - 1),
-      sums_(mask_ + 1),
+    : sums_(cells + 1),
       course_(course),
       per_cell_(static_cast<int>(std::max(1.0, std::ceil(kCell_s * sample_rate_hz - 1e-6)))),
       cell_s_(per_cell_ / sample_rate_hz) {}
 
 void Trend::reset() noexcept {
-  cells_ = 0;
+  cells_ = round_ = 0;
   filled_ = 0;
   sum_t_ = sum_y_ = sum_slip_percent_ = 0.0;
   scales_ = {};
@@ -74,8 +71,9 @@ void Trend::add(double t_s, double value, double slip_percent) noexcept {
   const double t = t_s - origin_t_;
   const double y = value - origin_y_;
   const Sums& before = sums(cells_);
-  sums_[(cells_ + 1) & mask_] = {before.t + t, before.y + y, before.tt + t * t, before.ty + t * y};
   ++cells_;
+  if (cells_ - round_ == sums_.size()) round_ = cells_;
+  sums_[cells_ - round_] = {before.t + t, before.y + y, before.tt + t * t, before.ty + t * y};
   for (int i = 0; i < kScales; ++i) {
     Scale& scale = scales_[static_cast<std::size_t>(i)];
     scale.sum += y;
@@ -245,7 +243,7 @@ int Trend::first_bent_scale() const noexcept {
 }
 
 Line Trend::line() const noexcept {
-  const std::size_t oldest = cells_ >= kept_ ? cells_ - kept_ + 1 : 0;
+  const std::size_t oldest = cells_ >= sums_.size() ? cells_ - sums_.size() + 1 : 0;
   if (cells_ < oldest + kCellsLeast) return {};
   const int bent = course_ == Course::kBends ? first_bent_scale() : kScales;
   const std::size_t straight = std::size_t{1} << (bent - 1);

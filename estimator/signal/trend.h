@@ -94,17 +94,19 @@ class Trend {
   static constexpr int kScales = 9;  // up to 256 cells
   void add(double t_s, double value, double slip_percent) noexcept;
   double slow_variance_of(Squares Scale::*squares) const noexcept;
-  const Sums& sums(std::size_t cell) const noexcept { return sums_[cell & mask_]; }
+  // Of one that is kept: without a division.
+  const Sums& sums(std::size_t cell) const noexcept {
+    return sums_[cell >= round_ ? cell - round_ : cell + sums_.size() - round_];
+  }
   Line through(std::size_t begin, std::size_t end, double cell_variance) const noexcept;
   bool fits(const Line& line, std::size_t begin, std::size_t end,
             double cell_variance) const noexcept;
   int first_bent_scale() const noexcept;  // kScales: none
   double mean_deviation(const Line& line, std::size_t begin, std::size_t end) const noexcept;
 
-  std::size_t kept_;  // cells and the one before them
-  std::size_t mask_;  // a place in sums_, of which there are a power of two: no division
   std::vector<Sums> sums_;
   std::size_t cells_ = 0;  // so far
+  std::size_t round_ = 0;  // the one that stands first in sums_
   double origin_t_ = 0.0, origin_y_ = 0.0;
   Course course_;
   int per_cell_;

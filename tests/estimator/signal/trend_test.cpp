@@ -96,5 +96,30 @@ TEST(Trend, ACoarseStraightCourseKeepsItsLongLine) {
   EXPECT_LT(end_error_N(Course::kBends, 10.0, 80.0, false), 1.3 * straight_N);
 }
 
+// With few cells the line is that of the many, as long as it is no longer than they reach back; so
+// wherever they stand in their ring.
+TEST(Trend, FewCellsTellOfTheNewestWhatManyTell) {
+  constexpr std::size_t kFew = 101;
+  Trend few(kRate_hz, kFew), many(kRate_hz, 4096);
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  const double cells_s = few.cell_s() * static_cast<double>(kFew);
+  int shorter = 0;
+  for (int i = 0; i < 16000; ++i) {
+    const double t_s = i / kRate_hz;
+    // It turns back every 3.2 s.
+    const double read = 300.0 * std::abs(std::remainder(t_s, 6.4)) + normal(random);
+    many.step(t_s, read, 0.0);
+    if (!few.step(t_s, read, 0.0) || t_s < 10.0) continue;
+    const Line line = few.line(), whole = many.line();
+    ASSERT_GT(line.begin_s, t_s - cells_s - 0.02);
+    if (whole.begin_s < t_s - 0.9 * cells_s) continue;
+    ++shorter;
+    ASSERT_NEAR(line.slope, whole.slope, 1e-6);
+    ASSERT_NEAR(line.at(t_s), whole.at(t_s), 1e-6);
+  }
+  EXPECT_GT(shorter, 500);
+}
+
 }  // namespace
 }  // namespace beltgrip::estimator
