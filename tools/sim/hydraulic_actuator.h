@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "tools/sim/vehicle_parameters.h"
@@ -29,14 +30,26 @@ class HydraulicActuator {
   }
   // slowness multiplies lag and dead time: cold oil, a fault.
   double step(double command_Pa, double slowness) {
+    return step(command_Pa, slowness, follows(slowness));
+  }
+  // The same, of another circuit that has asked how it follows.
+  double step(double command_Pa, double slowness, double follows) {
     past_[now_] = limit(command_Pa);
     const auto delay =
         std::min(kPast - 1, static_cast<std::size_t>(parameters_.dead_time_s * slowness / step_s_));
     const double delayed_Pa = past_[(now_ + kPast - delay) % kPast];
     now_ = (now_ + 1) % kPast;
-    pressure_Pa_ -=
-        std::expm1(-step_s_ / (parameters_.lag_s * slowness)) * (delayed_Pa - pressure_Pa_);
+    pressure_Pa_ -= follows * (delayed_Pa - pressure_Pa_);
     return pressure_Pa_;
+  }
+  // The share of its way that it has left behind after a step, less 1. Kept: warm oil stays as it
+  // is.
+  double follows(double slowness) {
+    if (slowness != slowness_) {
+      slowness_ = slowness;
+      follows_ = std::expm1(-step_s_ / (parameters_.lag_s * slowness));
+    }
+    return follows_;
   }
   double pressure_Pa() const { return pressure_Pa_; }
 
@@ -50,6 +63,8 @@ class HydraulicActuator {
   std::vector<double> past_;  // commands, a ring
   std::size_t now_ = 0;
   double pressure_Pa_ = 0.0;
+  double slowness_ = std::numeric_limits<double>::quiet_NaN();
+  double follows_ = 0.0;
 };
 
 // The force behind Coulomb friction follows the force before it within +/- friction.

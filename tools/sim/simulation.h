@@ -65,7 +65,9 @@ class Simulation {
   // The shafts' speeds after a step, and how far they have turned in it.
   void turn(double omega_p_rad_s, double omega_s_rad_s) {
     const auto turned = [this](double angle_rad, double omega_rad_s) {
-      return std::fmod(angle_rad + omega_rad_s * step_s_, 2.0 * std::numbers::pi);
+      constexpr double kTurn_rad = 2.0 * std::numbers::pi;
+      const double next_rad = angle_rad + omega_rad_s * step_s_;
+      return std::abs(next_rad) < kTurn_rad ? next_rad : std::fmod(next_rad, kTurn_rad);
     };
     signals_.omega_p_rad_s = omega_p_rad_s;
     signals_.omega_s_rad_s = omega_s_rad_s;

@@ -89,8 +89,9 @@ void VehicleSimulation::step() {
   double slow = oil_slowness(hydraulics, signals_.oil_degC);
   if (const FaultStep* fault = faults_.active(FaultKind::kHydraulicLag, t_s)) slow *= fault->size;
   const TcuOutput& tcu = tcu_.output();
-  const double p_s = secondary_.step(tcu.secondary_pressure_Pa, slow);
-  const double p_p = primary_.step(tcu.primary_pressure_Pa, slow);
+  const double follows = secondary_.follows(slow);
+  const double p_s = secondary_.step(tcu.secondary_pressure_Pa, slow, follows);
+  const double p_p = primary_.step(tcu.primary_pressure_Pa, slow, follows);
 
   const DrivelineState& state = plant_.state();
   const VariatorParameters& v = scenario_.variator;
