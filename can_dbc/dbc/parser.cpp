@@ -22,7 +22,6 @@ constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::uint32_t kExtendedFlag = 0x8000'0000U;
 constexpr std::size_t kExcerptLength = 24;  // of the text that a message quotes
 
-
 // Reads the statements of a DBC text into a draft. Each handler starts behind its keyword; false:
 // it has said what is wrong, and the statement is kept as text.
 class StatementReader {

@@ -24,9 +24,9 @@ constexpr int kAttempts = 10;     // to find a step that gains, each shorter tha
 // Of Levenberg and Marquardt, times the curvature.
 constexpr double kDampingFirst = 1e-4, kDampingLeast = 1e-5, kDampingMost = 1e6;
 constexpr double kDampingFactor = 10.0;
-constexpr double kShareLeast = 0.1;    // of a step: none is tried that is shorter
-constexpr double kLongStep = 0.05;     // in tolerances and usual sizes
-constexpr double kWorthwhile = 1.0;    // of the log likelihood
+constexpr double kShareLeast = 0.1;  // of a step: none is tried that is shorter
+constexpr double kLongStep = 0.05;   // in tolerances and usual sizes
+constexpr double kWorthwhile = 1.0;  // of the log likelihood
 // Of the same, for a step: the end. Measured, five slow ones of the 24 campaigns of
 // tools/DIAGNOSE.md: where the coarse looks from afar end at 1 or 3 instead, one is given another
 // verdict; at 0.3 none is.

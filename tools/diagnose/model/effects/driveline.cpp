@@ -8,7 +8,6 @@
 namespace beltgrip::diagnose {
 namespace {
 
-
 // ln(1 + x), kept finite: a fit may try more than the machine could do.
 double safe_ln(double x) { return std::log(std::max(x, 0.05)); }
 
