@@ -94,9 +94,10 @@ class Trend {
   static constexpr int kScales = 9;  // up to 256 cells
   void add(double t_s, double value, double slip_percent) noexcept;
   double slow_variance_of(Squares Scale::*squares) const noexcept;
-  // Of one that is kept: without a division.
+  // Of one that is kept: without a division, and without the library's look at the index.
   const Sums& sums(std::size_t cell) const noexcept {
-    return sums_[cell >= round_ ? cell - round_ : cell + sums_.size() - round_];
+    const std::size_t before = cell >= round_ ? 0 : sums_.size();
+    return sums_.data()[cell + before - round_];
   }
   Line through(std::size_t begin, std::size_t end, double cell_variance) const noexcept;
   bool fits(const Line& line, std::size_t begin, std::size_t end,
