@@ -5,6 +5,7 @@
 #include <string>
 
 #include "can_dbc/log/format.h"
+#include "can_dbc/log/frame_bits.h"
 #include "can_dbc/log/text.h"
 #include "can_dbc/log/usual_line.h"
 
@@ -20,7 +21,6 @@ using log_text::take_word;
 using log_text::time_ns;
 using log_text::trim_end;
 
-constexpr std::uint32_t kErrorFlag = 0x2000'0000;
 constexpr std::size_t kClassicPayload = 8;
 
 // Identifier digits as candump writes them: three for a standard one, eight for an extended one or

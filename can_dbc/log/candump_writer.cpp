@@ -4,6 +4,8 @@
 #include <array>
 #include <charconv>
 
+#include "can_dbc/log/frame_bits.h"
+
 namespace beltgrip::can {
 
 namespace {
@@ -17,7 +19,6 @@ void append_hex(std::string& text, std::uint32_t value, int digits) {
 }
 
 void append_frame(std::string& text, const CanFrame& frame) {
-  constexpr std::uint32_t kErrorFlag = 0x2000'0000;
   constexpr int kStandardDigits = 3;
   constexpr int kExtendedDigits = 8;
   if (frame.error) {

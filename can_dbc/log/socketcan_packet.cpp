@@ -24,7 +24,6 @@ constexpr std::uint16_t kSentByUs = 4;
 
 // Flags as in linux/can.h.
 constexpr std::uint32_t kRemoteFlag = 0x4000'0000;
-constexpr std::uint32_t kErrorFlag = 0x2000'0000;
 constexpr std::uint8_t kXlFlag = 0x80;  // where classic and FD have their length
 constexpr std::uint8_t kFdBitRateSwitch = 0x01;
 constexpr std::uint8_t kFdErrorState = 0x02;
