@@ -226,7 +226,7 @@ TEST(MessageCodec, DecodesEightBytesAsBitsPickedOneByOne) {
     if (seed % 4 != 0) drawn.select(message, seed % 4 == 1 ? 3 : 12);
     const MessageCodec codec(message);
     DecodedMessage values(count);
-    for (const std::size_t length : {8, 8, 7, 8, 12, 8}) {
+    for (const std::size_t length : {8U, 8U, 7U, 8U, 12U, 8U}) {
       expect_as_naive(message, codec, drawn.payload(length, seed % 2 == 0), values);
       if (HasFatalFailure()) return;
     }
