@@ -77,7 +77,7 @@ InputMonitor::InputMonitor(const Config& config) : config_(config), uds_(config)
 
 void InputMonitor::bind(const RoleBinding& binding) {
   Row& row = this->row(binding.role);
-  if (row.binding == nullptr) bound_[bound_count_++] = static_cast<std::uint8_t>(binding.role);
+  bound_[bound_count_++] = static_cast<std::uint8_t>(binding.role);  // each role stands once
   row.binding = &binding;
   row.quality = SignalQuality::kMissing;
   row.is_flag = role_dimension(binding.role) == can::Dimension::kNone;
