@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -163,20 +164,39 @@ void check_includes(const SourceFile& file, const std::string& code,
   }
 }
 
+// The name as a word of its own, not behind a scope or an object, elsewhere than from `begin` to
+// `end`.
+bool is_used(const std::string& code, const std::string& name, std::size_t begin, std::size_t end) {
+  const auto is_word = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) || c == '_';
+  };
+  for (std::size_t at = code.find(name); at != std::string::npos; at = code.find(name, at + 1)) {
+    const std::size_t behind = at + name.size();
+    const char before = at == 0 ? ' ' : code[at - 1];
+    const bool is_whole = !is_word(before) && (behind == code.size() || !is_word(code[behind]));
+    const bool is_bare = before != ':' && before != '.' && before != '>';
+    if (is_whole && is_bare && (at < begin || at >= end)) return true;
+  }
+  return false;
+}
+
 // clang-tidy asks this of a source that is compiled alone, not of one of eight.
 void check_usings(const SourceFile& file, const std::string& code,
                   std::vector<std::string>& found) {
   static const std::regex declared(
-      R"(^[ \t]*(?:using\s+(?!namespace\b|enum\b)[\w:]+::(\w+)\s*;|namespace\s+(\w+)\s*=))",
-      std::regex::ECMAScript | std::regex::multiline);
-  for (std::sregex_iterator each(code.begin(), code.end(), declared), end; each != end; ++each) {
-    const std::string name = (*each)[1].matched ? (*each)[1].str() : (*each)[2].str();
-    const std::regex word("(^|[^\\w:.>])" + name + "\\b", std::regex::multiline);
-    std::string rest = code;
-    rest.erase(static_cast<std::size_t>(each->position()),
-               static_cast<std::size_t>(each->length()));
-    if (!std::regex_search(rest, word)) {
-      found.push_back(at_line(file, code, each->position()) + name + " (declared, never used)");
+      R"([ \t]*(?:using\s+(?!namespace\b|enum\b)[\w:]+::(\w+)\s*;|namespace\s+(\w+)\s*=).*)");
+  for (std::size_t begin = 0, end = 0; begin < code.size(); begin = end + 1) {
+    end = std::min(code.find('\n', begin), code.size());
+    const std::string line = code.substr(begin, end - begin);
+    std::smatch names;
+    if (line.find("using ") == std::string::npos && line.find("namespace ") == std::string::npos)
+      continue;
+    if (!std::regex_match(line, names, declared)) continue;
+    const std::string name = names[1].matched ? names[1].str() : names[2].str();
+    const std::size_t behind = begin + line.find_first_of(";=") + 1;
+    if (!is_used(code, name, begin, behind)) {
+      found.push_back(at_line(file, code, static_cast<std::ptrdiff_t>(begin)) + name +
+                      " (declared, never used)");
     }
   }
 }
