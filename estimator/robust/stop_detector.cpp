@@ -52,7 +52,8 @@ Weights engine_weights(double tau) noexcept {
 }
 
 Eigen::Matrix3d slow_covariance(double window_s, Weights (*weights)(double) noexcept) noexcept {
-  // Each half of so many parts: the time before, then the window.
+  // Each half of so many parts: the time before, then the window. Fine enough: 32 and 48 change no
+  // result, value or stop of 120 drawn traces.
   constexpr std::size_t kParts = 40;
   const double faded = std::exp(-window_s / (kSlowTime_s * double{kParts}));
   Eigen::Vector3d recent = Eigen::Vector3d::Zero();  // sum of earlier weights, faded

@@ -12,6 +12,8 @@ namespace {
 using estimator::kPercent;
 constexpr double kEver_s = 1e9;  // before the first
 // Chosen: of the pedal, above what a foot that holds it, or a cruise control, does in a second.
+// campaign --seeds 150 --from 1600001: at 0.024 one request more is ended for the pedal; at 0.036
+// a case with several faults slips by 54 % that 0.03 ends below 8 %.
 constexpr double kPedalChanged = 0.03;
 constexpr double kPedalHeld_s = 1.0;
 // Chosen: a torque that comes every 10 ms is halved in its noise, and late by 20 ms.
