@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "tools/sim/tanh.h"
+
 namespace beltgrip::sim {
 
 namespace {
@@ -15,7 +17,7 @@ constexpr double kDropWithin = 1e-3;                // of slip
 constexpr double kFloorOfFall = 0.5;                // share of the peak that stays at any slip
 
 FrictionPoint rise(double mu_scale, double peak_slip_share, double slip_share) {
-  const double t = std::tanh(kSteepness * slip_share / peak_slip_share);
+  const double t = tanh_of(kSteepness * slip_share / peak_slip_share);
   return {mu_scale * t, mu_scale * (1.0 - t * t) * kSteepness / peak_slip_share};
 }
 
@@ -24,7 +26,7 @@ FrictionPoint broad_rise(const FrictionCurve& curve, double slip_share) {
   const double knee_slip_share = curve.knee_slip_percent / 100.0;
   const double along = 100.0 * curve.rise_per_percent;
   const double foot = (curve.mu_max - along * peak_slip_share) /
-                      std::tanh(kSteepness * peak_slip_share / knee_slip_share);
+                      tanh_of(kSteepness * peak_slip_share / knee_slip_share);
   const FrictionPoint steep = rise(foot, knee_slip_share, slip_share);
   return {steep.mu + along * slip_share, steep.slope + along};
 }
@@ -57,7 +59,7 @@ FrictionPoint magnitude(const FrictionCurve& curve, double slip_share) {
       break;
   }
   if (slip_share <= peak_slip_share)
-    return rise(curve.mu_max / std::tanh(kSteepness), peak_slip_share, slip_share);
+    return rise(curve.mu_max / tanh_of(kSteepness), peak_slip_share, slip_share);
   const double fall = 100.0 * curve.fall_per_percent;
   const bool two = curve.shape == CurveShape::kTwoPeaks;
   const double from = two ? 2.0 * peak_slip_share : curve.fall_slip_share();

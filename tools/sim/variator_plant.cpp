@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "estimator/physics/variator_geometry.h"
+#include "tools/sim/tanh.h"
 
 namespace beltgrip::sim {
 
@@ -25,7 +26,7 @@ FrictionPoint VariatorPlant::friction_now(double slip_share) const {
 
 double VariatorPlant::drag_Nm(double omega_s_rad_s) const {
   // Smooth through standstill: full drag from about 1 rad/s on.
-  return variator_.secondary_loss_Nm * std::tanh(omega_s_rad_s) +
+  return variator_.secondary_loss_Nm * tanh_of(omega_s_rad_s) +
          variator_.secondary_loss_Nm_s * omega_s_rad_s;
 }
 
@@ -77,7 +78,7 @@ VariatorPlant::Derivative VariatorPlant::derivative(const PlantState& state,
   const double slip_per_s = -1.0 / (ratio * state.omega_p_rad_s);
   const double drive = input.drive_torque_Nm +
                        input.drive_torque_slope_Nm_s * (state.omega_p_rad_s - omega_p_start_rad_s);
-  const double t = std::tanh(state.omega_s_rad_s);
+  const double t = tanh_of(state.omega_s_rad_s);
   const double drag_per_s =
       variator_.secondary_loss_Nm * (1.0 - t * t) + variator_.secondary_loss_Nm_s;
 

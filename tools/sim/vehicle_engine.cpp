@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tools/sim/tanh.h"
+
 namespace beltgrip::sim {
 
 namespace {
@@ -16,7 +18,7 @@ constexpr double kEngineCoulombWidth_rad_s = 5.0;
 }  // namespace
 
 double VehicleEngine::step(double accelerator, double omega_rad_s, double extra_Nm, double step_s) {
-  const double coulomb = std::tanh(omega_rad_s / kEngineCoulombWidth_rad_s);
+  const double coulomb = tanh_of(omega_rad_s / kEngineCoulombWidth_rad_s);
   const double drag_Nm =
       std::max(0.0, parameters_.overrun_torque_Nm +
                         parameters_.overrun_slope_Nm_s * (omega_rad_s - kDragSpeed_rad_s)) *

@@ -5,6 +5,7 @@
 
 #include "estimator/physics/variator_geometry.h"
 #include "tools/sim/friction_factor.h"
+#include "tools/sim/tanh.h"
 
 namespace beltgrip::sim {
 
@@ -26,54 +27,31 @@ double wedge_factor(double half_angle_rad) {
   return (1.0 + cosine * cosine) / std::sin(2.0 * half_angle_rad);
 }
 
-// From here on the nearest number is 1.
-constexpr double kSaturated = 22.0;
-double tanh_of(double x) {
-  return std::abs(x) >= kSaturated ? std::copysign(1.0, x) : std::tanh(x);
-}
-
-// A 3 by 3 system by elimination with pivots, for several right sides; the matrix I - gamma h J is
-// regular.
-class Elimination {
+// I - gamma h J of three shafts in a row, of which the first and the last do not see each other, by
+// its cofactors: one division and no question, for several right sides.
+class Inverse {
  public:
-  explicit Elimination(const std::array<std::array<double, 3>, 3>& matrix) : a_(matrix) {
-    for (std::size_t i = 0; i < 3; ++i) {
-      pivot_[i] = i;
-      for (std::size_t r = i + 1; r < 3; ++r) {
-        if (std::abs(a_[r][i]) > std::abs(a_[pivot_[i]][i])) pivot_[i] = r;
-      }
-      if (pivot_[i] != i) {
-        std::swap(a_[i], a_[pivot_[i]]);
-        swaps_ = true;
-      }
-      for (std::size_t r = i + 1; r < 3; ++r) {
-        factor_[i][r] = a_[r][i] / a_[i][i];
-        for (std::size_t c = i; c < 3; ++c) a_[r][c] -= factor_[i][r] * a_[i][c];
-      }
-    }
+  using Matrix = std::array<std::array<double, 3>, 3>;
+  explicit Inverse(const Matrix& w) {
+    const double first = w[0][1] * w[1][0], last = w[1][2] * w[2][1];
+    const double rest = w[1][1] * w[2][2] - last;
+    const double scale = 1.0 / (w[0][0] * rest - first * w[2][2]);
+    inverse_ = {
+        {{scale * rest, -scale * w[0][1] * w[2][2], scale * w[0][1] * w[1][2]},
+         {-scale * w[1][0] * w[2][2], scale * w[0][0] * w[2][2], -scale * w[0][0] * w[1][2]},
+         {scale * w[1][0] * w[2][1], -scale * w[0][0] * w[2][1],
+          scale * (w[0][0] * w[1][1] - first)}}};
   }
-  std::array<double, 3> solve(std::array<double, 3> b) const {
-    return swaps_ ? solve<true>(b) : solve<false>(b);
+  std::array<double, 3> times(const std::array<double, 3>& b) const {
+    std::array<double, 3> x{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      x[i] = inverse_[i][0] * b[0] + inverse_[i][1] * b[1] + inverse_[i][2] * b[2];
+    }
+    return x;
   }
 
  private:
-  // Without swaps, as mostly, all places are known and nothing goes through memory.
-  template <bool kSwaps>
-  std::array<double, 3> solve(std::array<double, 3> b) const {
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (kSwaps) std::swap(b[i], b[pivot_[i]]);
-      for (std::size_t r = i + 1; r < 3; ++r) b[r] -= factor_[i][r] * b[i];
-    }
-    for (std::size_t i = 3; i-- > 0;) {
-      for (std::size_t c = i + 1; c < 3; ++c) b[i] -= a_[i][c] * b[c];
-      b[i] /= a_[i][i];
-    }
-    return b;
-  }
-
-  std::array<std::array<double, 3>, 3> a_, factor_{};
-  std::array<std::size_t, 3> pivot_{};
-  bool swaps_ = false;
+  Matrix inverse_;
 };
 
 }  // namespace
@@ -91,7 +69,8 @@ VehiclePlant::VehiclePlant(const VehicleScenario& scenario)
                                    std::pow(body_.wheel_radius_m / body_.final_drive, 2)),
       cos_wedge_(std::cos(variator_.half_wedge_angle_rad)),
       wedge_factor_(wedge_factor(variator_.half_wedge_angle_rad)),
-      ln_span_(std::log(variator_.ratio_overdrive / variator_.ratio_low)) {
+      ln_ratio_low_(std::log(variator_.ratio_low)),
+      ln_span_(std::log(variator_.ratio_overdrive) - ln_ratio_low_) {
   belt_.overdrive = shaped(belt_.overdrive, effects_);
   variator_.secondary_loss_Nm += effects_.secondary_loss_constant_Nm;
   variator_.secondary_loss_Nm_s += effects_.secondary_loss_per_rad_s_Nm;
@@ -104,9 +83,12 @@ VehiclePlant::VehiclePlant(const VehicleScenario& scenario)
 }
 
 double VehiclePlant::primary_radius_m(double ratio) const {
-  if (!std::isfinite(ratio)) return ratio;  // what is no number stays none; the run ends on it
-  const double place = std::clamp(std::log(ratio / variator_.ratio_low) / ln_span_, 0.0, 1.0) *
-                       static_cast<double>(kRadii - 1);
+  return radius_at(std::clamp((std::log(ratio) - ln_ratio_low_) / ln_span_, 0.0, 1.0));
+}
+
+double VehiclePlant::radius_at(double way) const {
+  if (std::isnan(way)) return way;  // what is no number stays none; the run ends on it
+  const double place = way * static_cast<double>(kRadii - 1);
   const auto i = std::min(static_cast<std::size_t>(place), static_cast<std::size_t>(kRadii - 2));
   const double share = place - static_cast<double>(i);
   return radius_m_[i] + share * (radius_m_[i + 1] - radius_m_[i]);
@@ -126,11 +108,20 @@ void VehiclePlant::settle(double speed_m_s, double ratio, double idle_rad_s) {
 
 const VehiclePlant::RatioGeometry& VehiclePlant::ratio_geometry() {
   if (place_.ratio != state_.ratio) {
-    place_ = {state_.ratio,
-              std::clamp(std::log(variator_.ratio_overdrive / state_.ratio) / ln_span_, 0.0, 1.0),
-              primary_radius_m(state_.ratio), std::log(state_.ratio)};
+    const double ln_ratio = std::log(state_.ratio);
+    const double way = std::clamp((ln_ratio - ln_ratio_low_) / ln_span_, 0.0, 1.0);
+    place_ = {state_.ratio, 1.0 - way, radius_at(way), ln_ratio};
   }
   return place_;
+}
+
+double VehiclePlant::load_factor(double secondary_force_N) {
+  if (secondary_force_N != loaded_N_) {
+    loaded_N_ = secondary_force_N;
+    load_factor_ =
+        std::pow(std::max(secondary_force_N, 1.0) / kReferenceForce_N, -belt_.load_exponent);
+  }
+  return load_factor_;
 }
 
 VehiclePlant::StepConstants VehiclePlant::step_constants(const DrivelineInput& input) {
@@ -140,12 +131,11 @@ VehiclePlant::StepConstants VehiclePlant::step_constants(const DrivelineInput& i
   held.curve.peak_slip_percent +=
       low_share * (belt_.low_peak_slip_percent - belt_.overdrive.peak_slip_percent);
   const double speed = std::max(state_.omega_p_rad_s, kLeastSpeed_rad_s) / kReferenceSpeed_rad_s;
-  const double force = std::max(input.secondary_force_N, 1.0) / kReferenceForce_N;
   held.curve.mu_max *=
       (1.0 + low_share * (belt_.low_mu_factor - 1.0)) * (1.0 - input.wear) *
       std::max(0.2, 1.0 + belt_.temperature_per_K * (input.oil_degC - kReferenceTemperature_degC)) *
       std::max(0.2, 1.0 + belt_.speed_per_ln * ln_speed_.of(speed)) *
-      std::pow(force, -belt_.load_exponent) *
+      load_factor(input.secondary_force_N) *
       friction_factor(effects_, {input.oil_degC, state_.omega_p_rad_s, input.secondary_force_N,
                                  low_share, input.time_s, input.slip_energy_kJ, experiment_}) *
       (1.0 + learned_at(learned_, estimator::LearnedPoint::kFriction, input.conditions));
@@ -299,13 +289,13 @@ void VehiclePlant::step(const DrivelineInput& input, double step_s) {
       w[i][j] = (i == j ? 1.0 : 0.0) - gamma_h * first.jacobian[i][j];
     }
   }
-  const Elimination elimination(w);
-  const std::array<double, 3> k1 = elimination.solve(first.value);
+  const Inverse inverse(w);
+  const std::array<double, 3> k1 = inverse.times(first.value);
   std::array<double, 3> trial{};
   for (std::size_t i = 0; i < 3; ++i) trial[i] = x[i] + step_s * k1[i];
   Rates second = rates<false>(trial, input, held, fixed);
   for (std::size_t i = 0; i < 3; ++i) second.value[i] -= 2.0 * k1[i];
-  const std::array<double, 3> k2 = elimination.solve(second.value);
+  const std::array<double, 3> k2 = inverse.times(second.value);
   state_.omega_e_rad_s += step_s * (1.5 * k1[0] + 0.5 * k2[0]);
   state_.omega_p_rad_s += step_s * (1.5 * k1[1] + 0.5 * k2[1]);
   state_.omega_s_rad_s += step_s * (1.5 * k1[2] + 0.5 * k2[2]);

@@ -113,7 +113,9 @@ class VehiclePlant {
     double primary_Nm, learned_Nm, speed_per_omega, coulomb_Nm, air, grade_Nm;
   };
   const RatioGeometry&
-  ratio_geometry();  // at the present ratio; kept, since it stands for most steps
+  ratio_geometry();                    // at the present ratio; kept, since it stands for most steps
+  double radius_at(double way) const;  // of the primary pulley; way: 0 at low, 1 at overdrive
+  double load_factor(double secondary_force_N);  // of friction; kept, since it is asked twice
   StepConstants step_constants(const DrivelineInput& input);
   static Slip slip_of(double ratio, double omega_p_rad_s, double omega_s_rad_s);
   Loads loads(const DrivelineInput& input) const;
@@ -137,7 +139,10 @@ class VehiclePlant {
   double wedge_factor_;
   RatioGeometry place_;
   Logarithm ln_speed_;
-  double ln_span_;                       // of the ratios
+  double ln_ratio_low_;
+  double ln_span_;  // of the ratios
+  double loaded_N_ = std::numeric_limits<double>::quiet_NaN();
+  double load_factor_ = 1.0;
   std::array<double, kRadii> radius_m_;  // over ln(ratio) between the end stops
   DrivelineState state_;
   DrivelineOutput output_;

@@ -14,6 +14,7 @@
 #include "tools/sim/rig_scenario.h"
 #include "tools/sim/rig_simulation.h"
 #include "tools/sim/rig_source.h"
+#include "tools/sim/tanh.h"
 
 namespace beltgrip::sim {
 namespace {
@@ -34,6 +35,17 @@ void run(RigSimulation& simulation) {
     simulation.step();
     ASSERT_TRUE(simulation.finite());
   }
+}
+
+TEST(Tanh, IsTheLibrarysWithinARounding) {
+  for (double x = 1e-9; x < 50.0; x *= 1.01) {
+    const auto exact = static_cast<double>(std::tanh(static_cast<long double>(x)));
+    EXPECT_NEAR(tanh_of(x), exact, 2.3e-16) << x;
+    EXPECT_EQ(tanh_of(-x), -tanh_of(x)) << x;
+  }
+  EXPECT_EQ(tanh_of(0.0), 0.0);
+  EXPECT_EQ(tanh_of(std::numeric_limits<double>::infinity()), 1.0);
+  EXPECT_TRUE(std::isnan(tanh_of(std::numeric_limits<double>::quiet_NaN())));
 }
 
 TEST(FrictionCurve, PeaksWhereItSaysAndIsOdd) {
