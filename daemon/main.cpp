@@ -400,9 +400,8 @@ int run(const Arguments& arguments) {
   ReloadSlot reload_slot;
   log.info(prepare_real_time());
   ServiceNotify service;
-  std::string no_status;
-  StatusServer status(runtime_folder(), no_status);
-  if (!no_status.empty()) log.warning(no_status);
+  StatusServer status(runtime_folder());
+  if (!status.error().empty()) log.warning(status.error());
   Reloader reloader(arguments.config, config, reload_slot, claim ? &*claim : nullptr, say);
   Requests requests(request_fd, reloader, log, service);
   std::unique_ptr<FlightRecorder> recorder;

@@ -145,7 +145,7 @@ struct Range {
   }
   bool holds(double value) const { return std::isnan(value) || (value >= least && value <= most); }
 };
-using Result = ExperimentResult;
+using Measured = ExperimentResult;
 using Peak = estimator::PeakEstimate;
 constexpr std::array kRanges{
     Range{&Stored::time_s, nullptr, nullptr, -4e10, 4e10},
@@ -155,13 +155,13 @@ constexpr std::array kRanges{
     Range{nullptr, nullptr, &Peak::ci95_low, -1.0, 1.0},
     Range{nullptr, nullptr, &Peak::ci95_high, -1.0, 10.0},
     Range{nullptr, nullptr, &Peak::sigma_peak_percent, 0.0, 1e3},
-    Range{nullptr, &Result::sensor_std, nullptr, 0.0, 1.0},
-    Range{nullptr, &Result::sigma_stop_percent, nullptr, 0.0, 1e6},
-    Range{nullptr, &Result::omega_p_rad_s, nullptr, -1e4, 1e4},
-    Range{nullptr, &Result::omega_s_rad_s, nullptr, -1e4, 1e4},
-    Range{nullptr, &Result::torque_Nm, nullptr, -1e4, 1e4},
-    Range{nullptr, &Result::clamp_force_N, nullptr, -1e6, 1e6},
-    Range{nullptr, &Result::oil_degC, nullptr, -60.0, 300.0},
+    Range{nullptr, &Measured::sensor_std, nullptr, 0.0, 1.0},
+    Range{nullptr, &Measured::sigma_stop_percent, nullptr, 0.0, 1e6},
+    Range{nullptr, &Measured::omega_p_rad_s, nullptr, -1e4, 1e4},
+    Range{nullptr, &Measured::omega_s_rad_s, nullptr, -1e4, 1e4},
+    Range{nullptr, &Measured::torque_Nm, nullptr, -1e4, 1e4},
+    Range{nullptr, &Measured::clamp_force_N, nullptr, -1e6, 1e6},
+    Range{nullptr, &Measured::oil_degC, nullptr, -60.0, 300.0},
 };
 constexpr std::int64_t kSamplesMost = 1'000'000'000;
 
@@ -545,30 +545,29 @@ HistoryContent HistoryDb::read() {
   return content;
 }
 
-bool HistoryDb::is_there(HistoryRow& row) {
+std::optional<std::int64_t> HistoryDb::id_of(const HistoryRow& row) {
   Statement same(db_,
                  "SELECT id FROM experiment WHERE time_s = ? AND fingerprint = ? AND mu_max IS ?");
   sqlite3_bind_double(same.get(), 1, row.time_s);
   sqlite3_bind_text(same.get(), 2, row.fingerprint.data(), static_cast<int>(row.fingerprint.size()),
                     SQLITE_TRANSIENT);
   sqlite3_bind_double(same.get(), 3, row.result.peak.mu_max);
-  if (same.step() != SQLITE_ROW) return false;
-  row.id = sqlite3_column_int64(same.get(), 0);
-  return true;
+  if (same.step() != SQLITE_ROW) return std::nullopt;
+  return sqlite3_column_int64(same.get(), 0);
 }
 
-bool HistoryDb::append(HistoryRow& row, std::string& why) {
+Result<std::int64_t> HistoryDb::append(const HistoryRow& row) {
   const auto fail = [&] {
-    why = sqlite3_errmsg(db_);
+    std::string why = sqlite3_errmsg(db_);
     run(db_, "ROLLBACK");
-    return false;
+    return why;
   };
   if (run(db_, "BEGIN IMMEDIATE") != SQLITE_DONE) return fail();
   std::int64_t last = 0;
   // An attempt that was reported as failed may have reached the disk after all.
-  if (is_there(row)) {
+  if (const std::optional<std::int64_t> known = id_of(row)) {
     run(db_, "ROLLBACK");
-    return true;
+    return *known;
   }
   if (query(db_, "SELECT coalesce(max(id), 0) FROM experiment", last) != SQLITE_ROW) return fail();
   HistoryRow numbered = row;
@@ -589,10 +588,9 @@ bool HistoryDb::append(HistoryRow& row, std::string& why) {
   sqlite3_bind_int64(statement, ++at, checksum(stored));
   if (insert.step() != SQLITE_DONE) return fail();
   if (run(db_, "COMMIT") != SQLITE_DONE) return fail();
-  row = numbered;
   // Where it cannot be folded back now (a reader, a full disk), the row is safe in the log.
   run(db_, "PRAGMA wal_checkpoint(TRUNCATE)");
-  return true;
+  return numbered.id;
 }
 
 }  // namespace beltgrip::daemon

@@ -7,9 +7,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "daemon/core/base/result.h"
 #include "daemon/core/experiment/experiment.h"
 #include "estimator/belt/belt_history.h"
 
@@ -63,13 +65,13 @@ class HistoryDb {
 
   // Rows that can be read, also of a damaged file.
   HistoryContent read();
-  // Gives the row its id; the same row is there already and stays the only one. False:
+  // The row's id in the file; where the same row is there already, it stays the only one. Or
   // nothing was added, and why.
-  bool append(HistoryRow& row, std::string& why);
+  Result<std::int64_t> append(const HistoryRow& row);
 
  private:
   explicit HistoryDb(sqlite3* db) : db_(db) {}
-  bool is_there(HistoryRow& row);
+  std::optional<std::int64_t> id_of(const HistoryRow& row);
   sqlite3* db_;
 };
 

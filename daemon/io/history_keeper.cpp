@@ -100,9 +100,8 @@ void HistoryKeeper::set_aside(const std::string& why) {
   db_ = fresh.trouble == HistoryTrouble::kNone ? std::move(fresh.db) : nullptr;
   if (!adopted_) adopt(content);
   std::vector<HistoryRow> unwritten;
-  std::string reason;
-  for (HistoryRow row : content.rows) {
-    if (db_ == nullptr || !db_->append(row, reason)) unwritten.push_back(row);
+  for (const HistoryRow& row : content.rows) {
+    if (db_ == nullptr || !db_->append(row)) unwritten.push_back(row);
   }
   // They are older than what waits.
   waiting_.insert(waiting_.begin(), unwritten.begin(), unwritten.end());
@@ -156,10 +155,10 @@ void HistoryKeeper::note(const HistoryRow& row) {
 }
 
 void HistoryKeeper::write_waiting() {
-  std::string why;
   while (db_ != nullptr && !waiting_.empty()) {
-    if (!db_->append(waiting_.front(), why)) {
-      complain("the history cannot be written (" + why +
+    const Result<std::int64_t> id = db_->append(waiting_.front());
+    if (!id) {
+      complain("the history cannot be written (" + id.error() +
                "); results are kept in memory, next attempt in a minute");
       // Open again at the next attempt: the file may have gone.
       db_.reset();

@@ -153,7 +153,7 @@ std::string status_json(const Config& config, MonoTime now, const Observation& o
   return status.dump() + "\n";
 }
 
-StatusServer::StatusServer(const std::string& folder, std::string& error) {
+StatusServer::StatusServer(const std::string& folder) {
   if (folder.empty()) return;
   path_ = folder + "/status.sock";
   sockaddr_un address{};
@@ -170,7 +170,7 @@ StatusServer::StatusServer(const std::string& folder, std::string& error) {
   } else {
     errno = ENAMETOOLONG;
   }
-  error = path_ + ": no status to ask for (" + std::strerror(errno) + ")";
+  error_ = path_ + ": no status to ask for (" + std::strerror(errno) + ")";
   path_.clear();
 }
 

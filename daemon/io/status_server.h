@@ -17,17 +17,19 @@ std::string status_json(const Config& config, MonoTime now, const Observation& o
 
 class StatusServer {
  public:
-  // folder empty: nobody can ask. error, if not empty, is one line for the log.
-  StatusServer(const std::string& folder, std::string& error);
+  // folder empty: nobody can ask.
+  explicit StatusServer(const std::string& folder);
   ~StatusServer();
   StatusServer(const StatusServer&) = delete;
   StatusServer& operator=(const StatusServer&) = delete;
+  // Why nobody can ask, though there is a folder: one line for the log. Else empty.
+  const std::string& error() const { return error_; }
   // Answers all who wait. newest is nullptr before the first sample: then they wait on.
   void turn(const Config& config, MonoTime now, const Observation* newest,
             const CarriedBounds& carried = {});
 
  private:
-  std::string path_;
+  std::string path_, error_;
   int socket_ = -1;
 };
 

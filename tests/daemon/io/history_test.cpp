@@ -118,8 +118,9 @@ std::vector<HistoryRow> write_rows(const std::string& path, int count) {
   EXPECT_EQ(opened.trouble, HistoryTrouble::kNone) << opened.text;
   for (int i = 0; i < count; ++i) {
     rows.push_back(row(i));
-    std::string why;
-    EXPECT_TRUE(opened.db->append(rows.back(), why)) << why;
+    const Result<std::int64_t> id = opened.db->append(rows.back());
+    EXPECT_TRUE(id) << id.error();
+    rows.back().id = *id;
   }
   return rows;
 }
@@ -155,8 +156,9 @@ TEST(HistoryDb, EveryValueComesBack) {
       each.result.end_stop = estimator::EndStop::kLow;
       each.notes = 63;
       each.fingerprint = "";
-      std::string why;
-      ASSERT_TRUE(opened.db->append(each, why)) << why;
+      const Result<std::int64_t> id = opened.db->append(each);
+      ASSERT_TRUE(id) << id.error();
+      each.id = *id;
       rows.push_back(each);
     }
     // Read by another connection while it is open.
@@ -164,10 +166,9 @@ TEST(HistoryDb, EveryValueComesBack) {
     ASSERT_NE(reader.db, nullptr) << reader.text;
     EXPECT_EQ(reader.db->read().rows.size(), rows.size());
     // The same result again stays one row.
-    std::string why;
-    HistoryRow again = row(2);
-    EXPECT_TRUE(opened.db->append(again, why));
-    EXPECT_EQ(again.id, 3);
+    const Result<std::int64_t> again = opened.db->append(row(2));
+    ASSERT_TRUE(again);
+    EXPECT_EQ(*again, 3);
   }
   EXPECT_FALSE(fs::exists(folder.file("history.db-wal")));
   HistoryDb::Opened opened = HistoryDb::open_to_read(folder.file());
@@ -208,8 +209,9 @@ Recorded record(int old) {
   if (old > 0) recorded.before[kHistoryFile] = folder.bytes();
   CrashVfs vfs;
   HistoryRow added = row(old);
-  std::string why;
-  EXPECT_TRUE(HistoryDb::open(folder.file()).db->append(added, why)) << why;
+  const Result<std::int64_t> id = HistoryDb::open(folder.file()).db->append(added);
+  EXPECT_TRUE(id) << id.error();
+  added.id = *id;
   recorded.rows.push_back(added);
   recorded.operations = vfs.operations;
   return recorded;
@@ -285,8 +287,9 @@ TEST(HistoryDb, EveryFailureOfTheDisk) {
         HistoryDb::Opened opened = HistoryDb::open(folder.file());
         for (int i = 3; i < 6 && opened.db != nullptr; ++i) {
           HistoryRow each = row(i);
-          std::string why;
-          if (!opened.db->append(each, why)) break;
+          const Result<std::int64_t> id = opened.db->append(each);
+          if (!id) break;
+          each.id = *id;
           acknowledged.push_back(each);
         }
       }
@@ -721,11 +724,10 @@ TEST(HistoryKeeper, InsaneValuesAreNoKnowledge) {
     for (const double mu : {kNan, -0.1, 1e300, std::numeric_limits<double>::infinity(), 0.0}) {
       HistoryRow each = row(number++);
       each.result.peak.mu_max = mu;
-      std::string why;
-      ASSERT_TRUE(opened.db->append(each, why));
+      ASSERT_TRUE(opened.db->append(each));
       each = row(number++);
       each.result.peak.mu_max_std = mu == 1e300 ? 0.0 : mu;
-      ASSERT_TRUE(opened.db->append(each, why));
+      ASSERT_TRUE(opened.db->append(each));
     }
   }
   Keeper keeper(folder.path());

@@ -39,9 +39,8 @@ std::string read_all(int fd) {
 
 TEST(StatusServer, AnswersEachClientOnceTheLoopHasSampled) {
   const test::TemporaryDirectory folder;
-  std::string error;
-  StatusServer server(folder.path(), error);
-  ASSERT_EQ(error, "");
+  StatusServer server(folder.path());
+  ASSERT_EQ(server.error(), "");
   struct stat status {};
   ASSERT_EQ(stat((folder.path() + "/status.sock").c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777U, 0666U) << "for every user";
@@ -60,26 +59,22 @@ TEST(StatusServer, AnswersEachClientOnceTheLoopHasSampled) {
 TEST(StatusServer, OneThatWasKilledLeavesNothingInTheWay) {
   const test::TemporaryDirectory folder;
   folder.write("status.sock", "left behind");
-  std::string error;
-  const StatusServer server(folder.path(), error);
-  EXPECT_EQ(error, "");
+  const StatusServer server(folder.path());
+  EXPECT_EQ(server.error(), "");
 }
 
 TEST(StatusServer, WithoutAFolderThatCanBeWrittenItSaysSoAndGoesOn) {
-  std::string error;
-  StatusServer server("/nowhere", error);
-  EXPECT_NE(error.find("/nowhere/status.sock"), std::string::npos) << error;
+  StatusServer server("/nowhere");
+  EXPECT_NE(server.error().find("/nowhere/status.sock"), std::string::npos) << server.error();
   const Observation observation;
   server.turn(Config{}, MonoTime{}, &observation);
-  std::string none;
-  const StatusServer unasked("", none);
-  EXPECT_EQ(none, "");
+  const StatusServer unasked("");
+  EXPECT_EQ(unasked.error(), "");
 }
 
 TEST(StatusServer, ClientsThatLeaveOrNeverReadDoNoHarm) {
   const test::TemporaryDirectory folder;
-  std::string error;
-  StatusServer server(folder.path(), error);
+  StatusServer server(folder.path());
   close(connect_to(folder.path()));
   const int lazy = connect_to(folder.path());
   const Observation observation;

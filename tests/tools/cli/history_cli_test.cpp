@@ -48,8 +48,7 @@ class History : public testing::Test {
     rows.back().result.outcome = daemon::Outcome::kInconclusive;
     rows.back().result.peak.kind = estimator::PeakKind::kLowerBound;
     rows.back().notes = 1;
-    std::string why;
-    for (HistoryRow& each : rows) ASSERT_TRUE(opened.db->append(each, why)) << why;
+    for (const HistoryRow& each : rows) ASSERT_TRUE(opened.db->append(each));
   }
   Workplace place;
 };
@@ -77,10 +76,8 @@ TEST_F(History, WearIsToldWhereItBegan) {
   for (const int after : {4, 10}) {
     Workplace belt;
     const auto opened = HistoryDb::open(belt.path("history.db"));
-    std::string why;
     for (int i = 1; i <= 10 + after; ++i) {
-      HistoryRow each = row(i, (i <= 10 ? 0.105 : 0.0945) + 1e-4 * (i % 3));
-      ASSERT_TRUE(opened.db->append(each, why)) << why;
+      ASSERT_TRUE(opened.db->append(row(i, (i <= 10 ? 0.105 : 0.0945) + 1e-4 * (i % 3))));
     }
     const RunResult result = beltgrip({"history", belt.path("")});
     EXPECT_NE(result.out.find("\n  10.0 % less friction since experiment 11 ("), std::string::npos)

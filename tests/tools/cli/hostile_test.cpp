@@ -542,7 +542,7 @@ TEST_F(Hostile, AHistoryRowWithARightChecksumAndMadValuesIsDamaged) {
         row.result.outcome = daemon::Outcome::kCompleted;
         row.result.peak = {estimator::PeakKind::kValue, 0.1, 3e-4, 0.099, 0.101, 2.5, 900};
         row.result.oil_degC = 80.0;
-        ASSERT_TRUE(opened.db->append(row, why)) << why;
+        ASSERT_TRUE(opened.db->append(row));
       }
     }
     sqlite3* db = nullptr;

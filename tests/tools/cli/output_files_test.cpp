@@ -110,9 +110,8 @@ class OutputFiles : public testing::TestWithParam<Output> {
     in.write("held.csv", steady_run(106.0));
     in.write("scene.toml", "name = \"scene\"\n");
     in.write("model.toml", "[variator]\n");
-    std::string why;
     daemon::HistoryRow row;
-    ASSERT_TRUE(daemon::HistoryDb::open(in.path("history.db")).db->append(row, why)) << why;
+    ASSERT_TRUE(daemon::HistoryDb::open(in.path("history.db")).db->append(row));
   }
   static void TearDownTestSuite() { delete source_; }
 

@@ -75,18 +75,19 @@ class DocumentReader {
 bool DocumentReader::read_file(const std::string& path, const std::string& shown,
                                const std::string& folder, std::uint32_t first_line,
                                std::uint32_t included_at, TomlNode& root) {
-  std::string text;
-  const std::string reason = read_text_file(path, kSizeMax - size_, kind_, text);
-  if (!reason.empty() && included_at != 0) {
-    errors_.add(included_at, "include", in_quotes(shown) + " that cannot be read (" + reason + ")",
+  const Result<std::string, Unreadable> found = read_text_file(path, kSizeMax - size_, kind_);
+  if (!found && included_at != 0) {
+    errors_.add(included_at, "include",
+                in_quotes(shown) + " that cannot be read (" + found.error().reason + ")",
                 "the path of a configuration", kNoInput);
     return false;
   }
-  if (!reason.empty()) {
-    errors_.add_of_file(path, "no readable file (" + reason + ")", "a configuration in TOML",
-                        kNoInput);
+  if (!found) {
+    errors_.add_of_file(path, "no readable file (" + found.error().reason + ")",
+                        "a configuration in TOML", kNoInput);
     return false;
   }
+  const std::string& text = *found;
   if (text.size() > kSizeMax - size_) {
     errors_.add(first_line + 1, "size",
                 included_at == 0 ? "more than 1 MiB" : "more than 1 MiB with the files before it",

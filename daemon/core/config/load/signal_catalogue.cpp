@@ -40,17 +40,16 @@ void SignalCatalogue::add_file(const std::string& key, const std::string& path,
                                const std::string& directory, std::uint32_t line,
                                ConfigErrors& errors, std::vector<std::string>& warnings) {
   const std::string full = (std::filesystem::path(directory) / path).string();
-  std::string text;
-  std::string reason = read_text_file(full, kDbcSizeMax, kind_, text);
-  if (text.size() > kDbcSizeMax) reason = "it is larger than 256 MiB";
-  if (!reason.empty()) {
-    errors.add(line, key, in_quotes(path) + " that cannot be read (" + reason + ")",
+  Result<std::string, Unreadable> text = read_text_file(full, kDbcSizeMax, kind_);
+  if (text && text->size() > kDbcSizeMax) text = Unreadable{"it is larger than 256 MiB"};
+  if (!text) {
+    errors.add(line, key, in_quotes(path) + " that cannot be read (" + text.error().reason + ")",
                "the path of a DBC file, relative to " + (directory.empty() ? "." : directory),
                kNoInput);
     complete_ = false;
     return;
   }
-  can::DbcParseResult parsed = can::parse_dbc(text);
+  can::DbcParseResult parsed = can::parse_dbc(*std::move(text));
   if (parsed.database.messages.empty()) {
     std::string why = "no message in it";
     if (!parsed.problems.empty()) {

@@ -209,11 +209,12 @@ ModelFile parse_model(const std::string& text, const std::string& name, const Mo
 }
 
 ModelFile read_model(const std::string& path, const ModelFile& base, FileKind kind) {
-  std::string text;
-  if (const std::string reason = read_text_file(path, kFileSizeMax, kind, text); !reason.empty()) {
-    throw ModelError{true, path + ": found no readable file (" + reason + "), expected a model"};
+  const Result<std::string, Unreadable> text = read_text_file(path, kFileSizeMax, kind);
+  if (!text) {
+    throw ModelError{
+        true, path + ": found no readable file (" + text.error().reason + "), expected a model"};
   }
-  return parse_model(text, path, base);
+  return parse_model(*text, path, base);
 }
 
 std::string model_text(const ModelFile& model) {
