@@ -26,6 +26,7 @@ struct Ramp {
   double inertia_kg_m2 = 0.0;
   double ends_percent = 9.9;
   double gains_percent_per_s = 0.25;
+  double runs_away_from_s = 1e9, runs_away_percent_per_s = 0.0;
 };
 
 // Up to the top a parabola, behind it falling or level.
@@ -74,7 +75,8 @@ Compared compare(const Ramp& ramp, std::mt19937_64& random) {
     const double t_s = i / kRate_hz;
     // Slow at first; over the top slip gains pace.
     const double pace = t_s < 1.5 ? 0.1 : slip_percent > ramp.peak_percent ? 6.0 : 1.0;
-    slip_percent += pace * ramp.gains_percent_per_s / kRate_hz;
+    const double runs = t_s > ramp.runs_away_from_s ? ramp.runs_away_percent_per_s : 0.0;
+    slip_percent += (pace * ramp.gains_percent_per_s + runs) / kRate_hz;
     wander = faded * wander + std::sqrt(1.0 - faded * faded) * normal(random);
     const double torque = ramp.torque_Nm + ramp.torque_drift_Nm_per_s * t_s;
     const double over = std::max(0.0, slip_percent - ramp.peak_percent);
@@ -130,32 +132,96 @@ TEST(StopReference, SaysTheSameAfterEveryCell) {
   EXPECT_GT(rising, 100);
 }
 
+// Friction that rises on, so that nothing but slip itself ends it: slowly to the most that is gone
+// to, or so fast that it would be beyond it soon, at any time and with any noise.
+TEST(StopReference, SaysTheSameOfABeltThatRunsAway) {
+  std::mt19937_64 random(22);
+  int slip = 0, rate = 0, at_once = 0;
+  for (int i = 0; i < 120; ++i) {
+    const auto between = [&random](double low, double high) {
+      return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    Ramp ramp = draw(random);
+    ramp.peak_percent = 40.0;
+    ramp.ends_percent = 20.0;
+    ramp.runs_away_from_s = between(0.3, 4.0);
+    ramp.runs_away_percent_per_s = std::pow(10.0, between(0.3, 2.2));
+    const Compared found = compare(ramp, random);
+    EXPECT_EQ(found.differs, "") << "ramp " << i;
+    slip += found.stop == StopReason::kSlip;
+    rate += found.stop == StopReason::kSlipRate;
+    at_once += found.stop == StopReason::kSlipRate && found.cells < 1.2 * kRate_hz;
+  }
+  EXPECT_GT(slip, 10);
+  EXPECT_GT(rate, 30);
+  EXPECT_GT(at_once, 10);
+}
+
+// Where all slip there is hardly shows: below the least that an elasticity is taken at, with gains
+// about the smallest that is looked at, and under noise that only the longest cells average.
+TEST(StopReference, SaysTheSameOfLittleSlip) {
+  std::mt19937_64 random(23);
+  int level = 0, rising = 0;
+  for (int i = 0; i < 60; ++i) {
+    const auto between = [&random](double low, double high) {
+      return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    Ramp ramp = draw(random);
+    ramp.peak_percent = between(0.2, 0.6);
+    ramp.gains_percent_per_s = between(0.02, 0.15);
+    ramp.slip_noise_percent *= i % 3 == 0 ? 30.0 : 0.1;
+    const Compared found = compare(ramp, random);
+    EXPECT_EQ(found.differs, "") << "ramp " << i;
+    level += found.level > 0;
+    rising += found.rising > 0;
+  }
+  EXPECT_GT(level, 20);
+  EXPECT_GT(rising, 20);
+}
+
+// A torque that fades and turns round leaves no friction to be level.
+TEST(StopReference, SaysTheSameOfATorqueThatTurnsRound) {
+  std::mt19937_64 random(24);
+  int rising = 0;
+  for (int i = 0; i < 20; ++i) {
+    Ramp ramp = draw(random);
+    ramp.peak_percent = 6.0;
+    ramp.torque_drift_Nm_per_s = -0.4 * ramp.torque_Nm;
+    ramp.gains_percent_per_s = 0.8;
+    const Compared found = compare(ramp, random);
+    EXPECT_EQ(found.differs, "") << "ramp " << i;
+    rising += found.rising > 0;
+  }
+  EXPECT_GT(rising, 5);
+}
+
 // A detector that is used again begins anew.
 TEST(StopReference, ASecondExperimentOwesNothingToTheFirst) {
-  std::mt19937_64 random(21);
   StopDetector used, fresh;
   ExperimentRecord record(kRate_hz);
-  const auto drive = [&](StopDetector& detector) {
+  // Friction rises, lies level from a slip on, and slip stands still at another: then it was level.
+  const auto drive = [&](StopDetector& detector, double level_percent, double stands_percent) {
     record.reset();
-    double slope = 0.0;
+    double seen = 0.0;
     for (int i = 0; i < 2000; ++i) {
-      const double slip_percent = 0.1 + 0.002 * i;
-      const Cell sample{.t_s = i / kRate_hz,
-                        .slip_percent = slip_percent,
-                        .torque_Nm = 30.0,
-                        .clamp_force_N = kTraction * 30.0 / friction({}, slip_percent),
-                        .omega_p_rad_s = 110.0};
-      if (record.step(sample) && detector.step(record) == StopReason::kNone) {
-        slope += detector.slope() * i;
-      }
+      const double slip_percent = std::min(0.1 + 0.002 * i, stands_percent);
+      const Cell sample{
+          .t_s = i / kRate_hz,
+          .slip_percent = slip_percent,
+          .torque_Nm = 30.0,
+          .clamp_force_N = kTraction * 30.0 / (0.03 + 0.02 * std::min(slip_percent, level_percent)),
+          .omega_p_rad_s = 110.0};
+      if (!record.step(sample)) continue;
+      detector.step(record);
+      seen += (detector.slope() + (detector.level() ? 1.0 : 0.0)) * i;
     }
-    return slope + detector.smallest_slip_percent();
+    return seen + detector.smallest_slip_percent();
   };
   used.reset(kTraction, 0.0);
-  drive(used);
+  drive(used, 2.5, 4.1);  // level at its end
   used.reset(kTraction, 0.0);
   fresh.reset(kTraction, 0.0);
-  EXPECT_EQ(drive(used), drive(fresh));
+  EXPECT_EQ(drive(used, 0.8, 1.3), drive(fresh, 0.8, 1.3));
 }
 
 }  // namespace
