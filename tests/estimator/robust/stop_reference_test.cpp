@@ -27,6 +27,7 @@ struct Ramp {
   double ends_percent = 9.9;
   double gains_percent_per_s = 0.25;
   double runs_away_from_s = 1e9, runs_away_percent_per_s = 0.0;
+  double accelerates_rad_s2 = 2.0;  // for each percent behind the top
 };
 
 // Up to the top a parabola, behind it falling or level.
@@ -62,6 +63,22 @@ struct Compared {
   std::string differs;
 };
 
+// Both look at the record; what they do not agree on.
+std::string difference(StopDetector& detector, test::StopReference& reference,
+                       const ExperimentRecord& record, StopReason& stop) {
+  stop = reference.step(record);
+  if (detector.step(record) != stop) return "stop";
+  if (detector.level() != reference.level()) return "level";
+  if (detector.rising() != reference.rising()) return "rising";
+  if (detector.smallest_slip_percent() != reference.smallest_slip_percent()) return "smallest slip";
+  if (std::abs(detector.slope() - reference.slope()) >
+      kDigits * std::abs(reference.slope()) + 1e-9) {
+    return "slope " + std::to_string(detector.slope()) + " for " +
+           std::to_string(reference.slope());
+  }
+  return "";
+}
+
 Compared compare(const Ramp& ramp, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   ExperimentRecord record(kRate_hz);
@@ -80,35 +97,26 @@ Compared compare(const Ramp& ramp, std::mt19937_64& random) {
     wander = faded * wander + std::sqrt(1.0 - faded * faded) * normal(random);
     const double torque = ramp.torque_Nm + ramp.torque_drift_Nm_per_s * t_s;
     const double over = std::max(0.0, slip_percent - ramp.peak_percent);
-    const double acceleration = ramp.inertia_kg_m2 > 0.0 ? 2.0 * over : 0.0;
+    const double acceleration =
+        ramp.inertia_kg_m2 > 0.0
+            ? std::min(ramp.accelerates_rad_s2 * over, 0.7 * ramp.torque_Nm / ramp.inertia_kg_m2)
+            : 0.0;
     omega += acceleration / kRate_hz;
     const double carried = torque - ramp.inertia_kg_m2 * acceleration;
     const Cell sample{
         .t_s = t_s,
         .slip_percent = slip_percent + ramp.slip_noise_percent * normal(random),
         .torque_Nm = torque + ramp.wander_Nm * wander + ramp.torque_noise_Nm * normal(random),
-        .clamp_force_N = kTraction * carried / friction(ramp, slip_percent) +
+        .clamp_force_N = kTraction * std::abs(carried) / friction(ramp, slip_percent) +
                          ramp.force_noise_N * normal(random),
         .omega_p_rad_s = omega + ramp.speed_noise_rad_s * normal(random)};
     if (!record.step(sample)) continue;
     ++out.cells;
-    const StopReason stop = detector.step(record), expected = reference.step(record);
-    const std::string at = " at " + std::to_string(t_s) + " s";
-    if (stop != expected) out.differs = "stop" + at;
-    if (detector.level() != reference.level()) out.differs = "level" + at;
-    if (detector.rising() != reference.rising()) out.differs = "rising" + at;
-    if (detector.smallest_slip_percent() != reference.smallest_slip_percent()) {
-      out.differs = "smallest slip" + at;
-    }
-    if (std::abs(detector.slope() - reference.slope()) >
-        kDigits * std::abs(reference.slope()) + 1e-9) {
-      out.differs = "slope" + at + ": " + std::to_string(detector.slope()) + " for " +
-                    std::to_string(reference.slope());
-    }
+    out.differs = difference(detector, reference, record, out.stop);
+    if (!out.differs.empty()) out.differs += " at " + std::to_string(t_s) + " s";
     out.rising += reference.rising() ? 1 : 0;
     out.level += reference.level() ? 1 : 0;
-    out.stop = expected;
-    if (expected != StopReason::kNone || !out.differs.empty()) break;
+    if (out.stop != StopReason::kNone || !out.differs.empty()) break;
   }
   return out;
 }
@@ -179,20 +187,79 @@ TEST(StopReference, SaysTheSameOfLittleSlip) {
   EXPECT_GT(rising, 20);
 }
 
-// A torque that fades and turns round leaves no friction to be level.
-TEST(StopReference, SaysTheSameOfATorqueThatTurnsRound) {
-  std::mt19937_64 random(24);
-  int rising = 0;
-  for (int i = 0; i < 20; ++i) {
+// What the belt no longer carries speeds the shaft up: the force falls, friction stays.
+TEST(StopReference, SaysTheSameWhereTheShaftTakesTheTorque) {
+  std::mt19937_64 random(25);
+  int level = 0, slopes = 0;
+  for (int i = 0; i < 60; ++i) {
     Ramp ramp = draw(random);
-    ramp.peak_percent = 6.0;
-    ramp.torque_drift_Nm_per_s = -0.4 * ramp.torque_Nm;
-    ramp.gains_percent_per_s = 0.8;
+    ramp.inertia_kg_m2 = 0.18;
+    ramp.fall = 0.0;
+    ramp.peak_percent = std::uniform_real_distribution<double>(0.8, 4.0)(random);
+    ramp.accelerates_rad_s2 = std::uniform_real_distribution<double>(50.0, 400.0)(random);
     const Compared found = compare(ramp, random);
     EXPECT_EQ(found.differs, "") << "ramp " << i;
-    rising += found.rising > 0;
+    level += found.level > 0;
+    slopes += found.stop == StopReason::kSlope;
   }
-  EXPECT_GT(rising, 5);
+  EXPECT_GT(level, 20);
+  EXPECT_GT(slopes, 10);
+}
+
+// Friction that lies level here and rises there, and slip that moves on slowly, fast or not at all:
+// what was level is found and taken back many times.
+TEST(StopReference, SaysTheSameOfLevelsAndRises) {
+  std::mt19937_64 random(26);
+  const auto one_of = [&random](std::initializer_list<double> all) {
+    return all.begin()[std::uniform_int_distribution<std::size_t>(0, all.size() - 1)(random)];
+  };
+  std::normal_distribution<double> normal;
+  int taken_back = 0;
+  for (int drive = 0; drive < 60; ++drive) {
+    ExperimentRecord record(kRate_hz);
+    StopDetector detector;
+    detector.reset(kTraction, 0.0);
+    test::StopReference reference(kTraction, 0.0);
+    double slip_percent = 0.1, friction = 0.04, pace = 0.1, slope = 0.02, until_s = 2.0;
+    double next_percent = 0.5;
+    bool was_level = false;
+    for (int i = 0; i < 20 * kRate_hz && slip_percent < 9.0; ++i) {
+      const double t_s = i / kRate_hz;
+      if (t_s > until_s) {
+        pace = one_of({0.0, 0.1, 0.3, 1.0, 3.0});
+        until_s += one_of({0.3, 0.6, 1.2, 2.4});
+      }
+      if (slip_percent > next_percent) {
+        slope = one_of({0.0, 0.0, 0.02, 0.05});
+        next_percent += one_of({0.2, 0.4, 0.8});
+      }
+      slip_percent += pace / kRate_hz;
+      friction += slope * pace / kRate_hz;
+      const Cell sample{.t_s = t_s,
+                        .slip_percent = slip_percent + 0.002 * normal(random),
+                        .torque_Nm = 30.0 + 0.02 * normal(random),
+                        .clamp_force_N = kTraction * 30.0 / friction + normal(random),
+                        .omega_p_rad_s = 110.0};
+      if (!record.step(sample)) continue;
+      StopReason stop = StopReason::kNone;
+      ASSERT_EQ(difference(detector, reference, record, stop), "") << drive << ", " << t_s << " s";
+      taken_back += was_level && !detector.level();
+      was_level = detector.level();
+    }
+  }
+  EXPECT_GT(taken_back, 60);
+}
+
+// A torque against the direction is no friction, neither level nor rising.
+TEST(StopReference, SaysTheSameOfATorqueTheOtherWay) {
+  std::mt19937_64 random(24);
+  for (int i = 0; i < 20; ++i) {
+    Ramp ramp = draw(random);
+    ramp.torque_Nm *= -1.0;
+    const Compared found = compare(ramp, random);
+    EXPECT_EQ(found.differs, "") << "ramp " << i;
+    EXPECT_EQ(found.rising + found.level, 0) << "ramp " << i;
+  }
 }
 
 // A detector that is used again begins anew.
