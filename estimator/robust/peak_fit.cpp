@@ -29,6 +29,8 @@ constexpr double kLastLambda = 1.2;     // of the span of slip
 constexpr double kLambdaFactor = 1.35;
 constexpr std::size_t kCorners = 20;
 constexpr std::size_t kMostForms = 16 * (kCorners + 1) + kCorners * kCorners;
+// Times and slips that are equal but for rounding: it decides nothing.
+constexpr double kSameTime_s = 1e-6, kSameSlip_percent = 1e-9;
 constexpr double kSmallestSlope = 1e-9;    // 1/percent, of a deviation that is divided by
 constexpr std::size_t kLargestGroup = 16;  // points
 
@@ -138,7 +140,9 @@ bool PeakFit::step() noexcept {
         seen += point_count_ - first_;
       }
       if (next_ <= point_count_ - first_) return false;
-      go_to(point_count_ - first_ < kFewestPoints ? Stage::kIdle : Stage::kTerms);
+      // No friction, no curve of it.
+      go_to(point_count_ - first_ < kFewestPoints || !(mu_top_ > 0.0) ? Stage::kIdle
+                                                                      : Stage::kTerms);
       if (stage_ == Stage::kIdle) return true;
       find_span();
       return false;
@@ -191,7 +195,7 @@ void PeakFit::gather_level() noexcept {
   std::size_t taken = 0;
   for (std::size_t age = 0; age < history.size(level_) && taken < kCellsPerLevel; ++age) {
     const Cell& cell = history.cell(level_, age);
-    if (cell.t_s + 0.5 * length_s > covered_from_s_ + 1e-6) continue;
+    if (cell.t_s + 0.5 * length_s > covered_from_s_ + kSameTime_s) continue;
     cells_[cell_count_] = cell;
     lengths_s_[cell_count_] = length_s;
     covered_from_s_ = cell.t_s - 0.5 * length_s;
@@ -280,7 +284,7 @@ void PeakFit::add_point(std::size_t begin, std::size_t end) noexcept {
   if (inertia_kg_m2_ > 0.0) {
     // The engine's torque changes slowly: of its line and the readings, by their variances.
     const Line& held = record_->torque_line();
-    if (point.t_s > held.begin_s) {
+    if (point.t_s > held.begin_s + kSameTime_s) {
       const double variation =
           std::max(0.0, record_->torque().density(1.0) - noise) / point.duration_s;
       const double share = variance / (variance + variation + 1e-12);
@@ -304,7 +308,7 @@ void PeakFit::add_point(std::size_t begin, std::size_t end) noexcept {
   const double traction = c_ / point.force_N;
   point.mu = traction * torque;
   point.variance = std::max(square(traction) * variance, 1e-12);
-  if (point.t_s < record_->force_line().begin_s) {
+  if (point.t_s < record_->force_line().begin_s - kSameTime_s) {
     point.force_variance = square(point.mu / point.force_N) *
                            record_->force().density(point.duration_s) / point.duration_s;
   }
@@ -378,7 +382,8 @@ void PeakFit::find_stretch() noexcept {
 double PeakFit::force_variance(double begin_s, double end_s) const noexcept {
   const Line& line = record_->force_line();
   const double readings = record_->force().density(end_s - begin_s) / (end_s - begin_s);
-  return begin_s < line.begin_s ? readings : line.variance_at(0.5 * (begin_s + end_s));
+  return begin_s < line.begin_s - kSameTime_s ? readings
+                                              : line.variance_at(0.5 * (begin_s + end_s));
 }
 
 // Mean torque by mean force is a mean of mu*, weighted by force: its largest was no less. Within a
@@ -580,22 +585,27 @@ void PeakFit::solve(std::size_t corner_number) noexcept {
   };
   double best = 0.0;  // the end of the data
   const auto consider = [&](double x) {
-    if (x > low && x <= 0.0 && terms(x).dot(theta) >= terms(best).dot(theta)) best = x;
+    if (x >= low && x <= 0.0 && terms(x).dot(theta) >= terms(best).dot(theta)) best = x;
   };
-  // Where the slope B/lambda exp(..) - d (- h) vanishes, before and beyond the corner; the corner.
+  // Where the slope B/lambda exp(..) - d (- h) vanishes, before and beyond the corner; the corner;
+  // where the data begin, if the curve falls over all of them.
   const auto level_at = [&](double fall) {
     return rise.lambda * std::log(B / (rise.lambda * fall)) - rise.span;
   };
-  const bool exponential = rise.power == 0 && B > 0.0;
-  if (exponential && d > 0.0) {
-    const double x = level_at(d);
-    if (!has_corner || x < corner) consider(x);
-  }
-  if (has_corner) {
-    consider(corner);
-    if (exponential && d + h > 0.0) {
-      const double x = level_at(d + h);
-      if (x > corner) consider(x);
+  if (rise.power > 0) {
+    best = std::max(low, corner);  // level until there
+  } else {
+    consider(low);
+    if (B > 0.0 && d > 0.0) {
+      const double x = level_at(d);
+      if (!has_corner || x < corner) consider(x);
+    }
+    if (has_corner) {
+      consider(corner);
+      if (B > 0.0 && d + h > 0.0) {
+        const double x = level_at(d + h);
+        if (x > corner) consider(x);
+      }
     }
   }
   const double prior = rise.power > 0 ? 4.0 / square(kCorners) : has_corner ? 1.0 / kCorners : 1.0;
@@ -634,7 +644,7 @@ void PeakFit::average() noexcept {
     average_.mu += w * rest;
     average_.squares += w * rest * rest;
     average_.variance += w * form.variance * scale;
-    average_.slip_percent += w * form.slip_percent;
+    average_.slip_percent += w * (form.slip_percent - slip_high_percent_);
     // All of these curves bend down only: one that falls at the end of the data has its top in
     // them.
     const double deviation = std::max(kSmallestSlope, std::sqrt(form.end_slope_variance * scale));
@@ -654,7 +664,7 @@ void PeakFit::finish() noexcept {
   const double mu = a.mu / a.weight;
   result_.mu = mu_top_ + mu;
   result_.variance = a.variance / a.weight + std::max(0.0, a.squares / a.weight - mu * mu);
-  result_.slip_percent = a.slip_percent / a.weight;
+  result_.slip_percent = slip_high_percent_ + a.slip_percent / a.weight;
   result_.inside = a.inside / a.weight;
   result_.end_slip_percent = slip_high_percent_;
   result_.end_rise = a.end_rise / a.weight;
@@ -664,7 +674,7 @@ void PeakFit::finish() noexcept {
   for (std::size_t i = point_count_; i > first_; --i) {
     result_.t_s = points_[i - 1].t_s;
     result_.held_share = points_[i - 1].held_share;
-    if (points_[i - 1].slip_percent <= result_.slip_percent) break;
+    if (points_[i - 1].slip_percent <= result_.slip_percent + kSameSlip_percent) break;
   }
   result_.valid = std::isfinite(result_.mu) && result_.mu > 0.0;
   result_.passed = came_after();
@@ -683,9 +693,12 @@ bool PeakFit::came_after() const noexcept {
       point_count_ - std::max<std::size_t>(1, (point_count_ - first_) / 10);
   for (std::size_t i = first_; i < point_count_; ++i) {
     const Point& point = points_[i];
-    Side& side = point.slip_percent > result_.slip_percent ? beyond : before;
-    side.time_s += point.duration_s;
-    side.sum += point.duration_s * point.t_s;
+    const double beyond_percent = point.slip_percent - result_.slip_percent;
+    if (std::abs(beyond_percent) > kSameSlip_percent) {
+      Side& side = beyond_percent > 0.0 ? beyond : before;
+      side.time_s += point.duration_s;
+      side.sum += point.duration_s * point.t_s;
+    }
     if (i < end_begin) continue;
     last.time_s += point.duration_s;
     last.sum += point.duration_s * point.slip_percent;
@@ -700,7 +713,8 @@ double PeakFit::tested_until_s() const noexcept {
   const Line& line = record_->force_line();
   const double end_s = record_->duration_s();
   const bool stands = std::abs(line.slope) * (end_s - line.begin_s) < kStandsStill * line.at(end_s);
-  return std::min({stands ? line.begin_s : end_s, record_->lowered_until_s(), stop_s_});
+  const double until_s = std::min(stands ? line.begin_s : end_s, record_->lowered_until_s());
+  return std::min(until_s, stop_s_) - kSameTime_s;
 }
 
 // From where mu* came to a share of its top, to where the curve has its top.

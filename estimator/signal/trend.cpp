@@ -33,6 +33,7 @@ constexpr double kWhite_s = 0.2;            // longer means scatter by the slow 
 constexpr std::size_t kFirstSlowScale = 3;  // of 0.4 s
 constexpr double kMedianOfSquare = 0.455;   // of a normal variable with variance 1
 constexpr double kUnbounded = 1e100;
+constexpr double kSameLength_s = 1e-9;  // of times that are equal but for rounding
 // Weight of the newest in how slip follows the value. Chosen: along the curve slip follows by more
 // and more, so that a few differences count.
 constexpr double kFading = 0.4;
@@ -146,7 +147,8 @@ double Trend::density(double over_s) const noexcept {
   for (int i = 0; i < kScales; ++i) {
     const Scale& scale = scales_[static_cast<std::size_t>(i)];
     const double length_s = cell_s_ * (1 << i);
-    if (scale.squares.count < (i == 0 ? 1.0 : kEnough) || (i > 0 && length_s > over_s)) break;
+    if (scale.squares.count < (i == 0 ? 1.0 : kEnough)) break;
+    if (i > 0 && length_s > over_s + kSameLength_s) break;
     largest = std::max(largest, scale.mean_square * length_s);
   }
   return largest;
@@ -157,7 +159,7 @@ double Trend::quiet_density(double over_s) const noexcept {
   for (int i = 0; i < kScales; ++i) {
     const Squares& squares = scales_[static_cast<std::size_t>(i)].squares;
     const double length_s = cell_s_ * (1 << i);
-    if (squares.count < kEnough || (i > 0 && length_s > over_s)) break;
+    if (squares.count < kEnough || (i > 0 && length_s > over_s + kSameLength_s)) break;
     largest = std::max(largest, squares.median() / kMedianOfSquare * length_s);
   }
   return largest;
@@ -181,7 +183,8 @@ double Trend::slow_variance() const noexcept {
 
 double Trend::squares(double over_s) const noexcept {
   std::size_t i = 0;
-  while (i + 1 < kScales && cell_s_ * static_cast<double>(std::size_t{1} << i) < over_s - 1e-9) ++i;
+  const double least_s = over_s - kSameLength_s;
+  while (i + 1 < kScales && cell_s_ * static_cast<double>(std::size_t{1} << i) < least_s) ++i;
   return scales_[i].squares.count;
 }
 
