@@ -298,7 +298,6 @@ void PeakFit::add_point(std::size_t begin, std::size_t end) noexcept {
     const double speed_1 = speed_at_edge(end, t_1, weight_1);
     const double span_s = std::max(1e-3, t_1 - t_0);
     torque -= inertia_kg_m2_ * (speed_1 - speed_0) / span_s;
-    point.inertia_per_s = inertia_kg_m2_ / span_s;
     point.speed_variance_begin = record_->omega_noise_rad2_s() / weight_0;
     point.speed_variance_end = record_->omega_noise_rad2_s() / weight_1;
     variance +=
@@ -357,7 +356,6 @@ void PeakFit::find_course() noexcept {
 // further down.
 bool PeakFit::belongs(std::size_t point) const noexcept {
   const std::size_t count = point_count_ - point - 1;
-  if (count < kFewestPoints) return true;
   return count < kWantedPoints || mean_mu(point + 1) >= kStretchFrom * mu_top_;
 }
 

@@ -70,7 +70,6 @@ class PeakFit {
     double held_share;
     double torque_Nm;             // that the belt carries
     double torque_variance;       // of it, without
-    double inertia_per_s;         // J over the time between its ends
     double speed_variance_begin;  // that of the speeds at its ends, which the neighbour shares
     double speed_variance_end;
   };
