@@ -229,6 +229,9 @@ TEST(PeakFitReference, SaysTheSameOfDrawnRecords) {
         test::fit_peak(data.record, kOverdrive_1_m, drive.inertia_kg_m2, data.stop_s);
     const PeakFitResult& r = expected.fit;
     EXPECT_EQ(differs(fitted(fit, data, drive.inertia_kg_m2), r), "") << "record " << i;
+    // The filter of the residuals takes the slow error for as large as at the point before. Of
+    // 3,000 records that changed 0.7 % at most.
+    EXPECT_NEAR(r.residuals.innovation, expected.innovation, 0.01 * expected.innovation) << i;
     nothing += !r.valid;
     valid += r.valid;
     engines += r.valid && drive.inertia_kg_m2 > 0.0;

@@ -463,6 +463,28 @@ bool Fit::slip_moves(double until_s) const {
              std::abs(force[1] / time_s[1] - force[0] / time_s[0]);
 }
 
+// Free of what they share, by their covariance.
+std::vector<Residual> by_covariance(std::vector<Residual> residuals) {
+  const auto n = static_cast<Eigen::Index>(residuals.size());
+  if (n == 0) return residuals;
+  MatrixXd covariance(n, n);
+  VectorXd values(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Residual& a = residuals[static_cast<std::size_t>(i)];
+    values(i) = a.value;
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const Residual& b = residuals[static_cast<std::size_t>(j)];
+      covariance(i, j) = std::sqrt(a.slow_variance * b.slow_variance) *
+                         std::exp(-std::abs(a.t_s - b.t_s) / kSlowTime_s);
+    }
+    covariance(i, i) += a.variance;
+  }
+  const Eigen::LLT<MatrixXd> factor(covariance);
+  values = factor.matrixL().solve(values);
+  for (Eigen::Index i = 0; i < n; ++i) residuals[static_cast<std::size_t>(i)].value = values(i);
+  return residuals;
+}
+
 void Fit::test_residuals() {
   const double until_s = tested_until_s();
   if (!slip_moves(until_s)) return;
@@ -477,7 +499,7 @@ void Fit::test_residuals() {
          point.variance + point.force_variance + square(number::kFormTolerance * fitted),
          slow_share(record_) * square(fitted)});
   }
-  out_.residuals = residuals.size();
+  out_.innovation = estimator::test_residuals(by_covariance(residuals)).innovation;
   estimator::whiten(residuals);
   out_.fit.residuals = estimator::test_residuals(residuals);
 }

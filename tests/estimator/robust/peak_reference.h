@@ -15,8 +15,8 @@ struct PeakReference {
   estimator::PeakFitResult fit;
   // What happened on the way.
   std::size_t points = 0, of_stretch = 0, forms = 0;
-  double scale = 1.0;  // of chi2
-  std::size_t residuals = 0;
+  double scale = 1.0;       // of chi2
+  double innovation = 0.0;  // of the residuals, made free of what they share by its covariance
   double tops_at_the_begin = 0.0;  // weight of the forms that fall over all of the data
 };
 
