@@ -668,7 +668,6 @@ void PeakFit::finish() noexcept {
   result_.end_rise = a.end_rise / a.weight;
   result_.fall = a.fall / a.weight;
   result_.fall_variance = a.fall_variance / a.weight;
-  result_.t_s = points_[point_count_ - 1].t_s;
   for (std::size_t i = point_count_; i > first_; --i) {
     result_.t_s = points_[i - 1].t_s;
     result_.held_share = points_[i - 1].held_share;

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/robust/curve_health.h"
 #include "estimator/robust/thresholds.h"
 #include "tests/estimator/robust/peak_reference.h"
 
@@ -40,6 +41,7 @@ struct Drive {
   double gap_at_s = 1e9, gap_s = 0.0;
   double swings_percent = 0.0, swings_rad_s = 9.0;  // slip, to and fro
   double stops_before_end_s = 0.0;
+  double deforms_percent_per_N = 0.0;  // then slip follows the clamp force alone, and so the load
 };
 
 double friction_of(const Drive& drive, double slip_percent) {
@@ -71,6 +73,7 @@ struct Change {
   double load = 1.0;    // times: forces and torques
   double torque = 1.0;  // times: its reading
   double begins_s = 0.0;
+  double no_number_at_s = 1e9;  // of the torque, from then
 };
 
 Driven driven(const Drive& drive, std::uint64_t seed, const Change& change = {}) {
@@ -83,6 +86,7 @@ Driven driven(const Drive& drive, std::uint64_t seed, const Change& change = {})
   const auto feed = [&](double t_s, double slip_percent, double torque_Nm, double force_N) {
     wander = faded * wander + std::sqrt(1.0 - faded * faded) * normal(random);
     torque_Nm += drive.wander_Nm * wander + 0.15 * drive.noise * normal(random);
+    if (t_s > change.no_number_at_s) torque_Nm = std::numeric_limits<double>::quiet_NaN();
     out.record.step({.t_s = change.begins_s + t_s,
                      .slip_percent = slip_percent + 0.02 * drive.noise * normal(random),
                      .torque_Nm = change.load * change.torque * torque_Nm,
@@ -112,6 +116,14 @@ Driven driven(const Drive& drive, std::uint64_t seed, const Change& change = {})
     if (t_s < drive.stands_from_s) {
       force_N = kOverdrive_1_m * (load_Nm - drive.inertia_kg_m2 * acceleration) /
                 friction_of(drive, slips_percent);
+    }
+    if (drive.deforms_percent_per_N > 0.0) {
+      const double first_N = kOverdrive_1_m * drive.load_Nm / drive.mu_max;
+      const double share = 1.0 - 0.7 * t_s / drive.ends_s;
+      slip_percent = drive.begins_percent + drive.deforms_percent_per_N * first_N * (1.0 - share);
+      feed(t_s, slip_percent, drive.load_Nm * share * (1.0 + 0.02 * t_s / drive.ends_s),
+           first_N * share);
+      continue;
     }
     feed(t_s, slips_percent, load_Nm, force_N);
   }
@@ -174,7 +186,7 @@ struct Field {
   const char* name;
   double (*of)(const PeakFitResult&);
   double share, least;
-  bool of_a_fit = true, of_health = false;
+  bool of_health = false;
 };
 constexpr Field kFields[] = {
     {"mu", [](const PeakFitResult& r) { return r.mu; }, 3e-9, 0.0},
@@ -189,16 +201,14 @@ constexpr Field kFields[] = {
     {"passed", [](const PeakFitResult& r) { return r.passed ? 1.0 : 0.0; }, 0.0, 0.0},
     {"end slip", [](const PeakFitResult& r) { return r.end_slip_percent; }, 1e-12, 0.0},
     {"end rise", [](const PeakFitResult& r) { return r.end_rise; }, 1e-5, 1e-12},
-    {"below chord", [](const PeakFitResult& r) { return r.below_chord; }, 0.0, 1e-5, true, true},
-    {"innovation", [](const PeakFitResult& r) { return r.residuals.innovation; }, 0.0, 1e-6, true,
-     true},
-    {"runs", [](const PeakFitResult& r) { return r.residuals.runs; }, 0.0, 1e-12, true, true},
-    {"duration", [](const PeakFitResult& r) { return r.duration_s; }, 1e-12, 0.0, false},
-    {"reached", [](const PeakFitResult& r) { return r.reached; }, 1e-8, 0.0, false},
+    {"below chord", [](const PeakFitResult& r) { return r.below_chord; }, 0.0, 1e-5, true},
+    {"innovation", [](const PeakFitResult& r) { return r.residuals.innovation; }, 0.0, 1e-6, true},
+    {"runs", [](const PeakFitResult& r) { return r.residuals.runs; }, 0.0, 1e-12, true},
+    {"duration", [](const PeakFitResult& r) { return r.duration_s; }, 1e-12, 0.0},
+    {"reached", [](const PeakFitResult& r) { return r.reached; }, 1e-8, 0.0},
     // Running sums in one: what has left them leaves its rounding.
-    {"reached's deviation", [](const PeakFitResult& r) { return r.reached_deviation; }, 5e-5, 0.0,
-     false},
-    {"reached at", [](const PeakFitResult& r) { return r.reached_slip_percent; }, 0.0, 1e-9, false},
+    {"reached's deviation", [](const PeakFitResult& r) { return r.reached_deviation; }, 5e-5, 0.0},
+    {"reached at", [](const PeakFitResult& r) { return r.reached_slip_percent; }, 0.0, 1e-9},
 };
 
 // Nothing, or the first field that differs.
@@ -207,7 +217,6 @@ std::string differs(const PeakFitResult& found, const PeakFitResult& expected, d
   if (found.valid != expected.valid) return "valid";
   for (const Field& field : kFields) {
     if (field.of_health && !health) continue;
-    if (field.of_a_fit && !expected.valid) continue;
     const double is = field.of(found), should = field.of(expected);
     if (std::abs(is - should) <= slack * (field.share * std::abs(should) + field.least)) continue;
     std::ostringstream out;
@@ -217,6 +226,15 @@ std::string differs(const PeakFitResult& found, const PeakFitResult& expected, d
   return "";
 }
 
+// Both fits of one record; what the second says.
+test::PeakReference compared(PeakFit& fit, const Drive& drive, std::uint64_t seed) {
+  const Driven data = driven(drive, seed);
+  const test::PeakReference expected =
+      test::fit_peak(data.record, kOverdrive_1_m, drive.inertia_kg_m2, data.stop_s);
+  EXPECT_EQ(differs(fitted(fit, data, drive.inertia_kg_m2), expected.fit), "") << "seed " << seed;
+  return expected;
+}
+
 TEST(PeakFitReference, SaysTheSameOfDrawnRecords) {
   std::mt19937_64 random(31);
   PeakFit fit;
@@ -224,11 +242,8 @@ TEST(PeakFitReference, SaysTheSameOfDrawnRecords) {
       held = 0, scattered = 0, nothing = 0;
   for (std::uint64_t i = 0; i < 400; ++i) {
     const Drive drive = draw_drive(random);
-    const Driven data = driven(drive, i);
-    const test::PeakReference expected =
-        test::fit_peak(data.record, kOverdrive_1_m, drive.inertia_kg_m2, data.stop_s);
+    const test::PeakReference expected = compared(fit, drive, i);
     const PeakFitResult& r = expected.fit;
-    EXPECT_EQ(differs(fitted(fit, data, drive.inertia_kg_m2), r), "") << "record " << i;
     // The filter of the residuals takes the slow error for as large as at the point before. Of
     // 3,000 records that changed 0.7 % at most.
     EXPECT_NEAR(r.residuals.innovation, expected.innovation, 0.01 * expected.innovation) << i;
@@ -256,26 +271,104 @@ TEST(PeakFitReference, SaysTheSameOfDrawnRecords) {
   EXPECT_GT(tested, 60);
 }
 
-// Of more points than are kept, and with more of them near the top.
-TEST(PeakFitReference, SaysTheSameOfALongRecord) {
+// Slip that swings for a long time: more points than are kept, more than that near the top, more
+// than that from 0.6 of it on; and somewhat fewer.
+TEST(PeakFitReference, SaysTheSameOfLongRecords) {
   PeakFit fit;
-  for (const double begins_percent : {2.0, 3.7}) {
-    const Drive drive{.peak_percent = 4.0,
+  struct Long {
+    double begins_percent, swings_percent, ends_s;
+    Curve curve = Curve::kRound;
+    double peak_percent = 4.0;
+    std::size_t least, most;  // points
+  };
+  const Long longs[] = {
+      {.begins_percent = 2.0, .swings_percent = 1.8, .ends_s = 2000.0, .least = 513, .most = 1000},
+      {.begins_percent = 3.7, .swings_percent = 0.9, .ends_s = 2000.0, .least = 385, .most = 1000},
+      {.begins_percent = 2.6, .swings_percent = 0.8, .ends_s = 1000.0, .least = 257, .most = 1000},
+      {.begins_percent = 2.6, .swings_percent = 0.8, .ends_s = 90.0, .least = 172, .most = 256},
+      {.begins_percent = 3.7, .swings_percent = 0.9, .ends_s = 150.0, .least = 257, .most = 383},
+      {.begins_percent = 3.7,
+       .swings_percent = 0.9,
+       .ends_s = 800.0,
+       .curve = Curve::kSaturating,
+       .peak_percent = 1.0,
+       .least = 257,
+       .most = 1000}};
+  for (const Long& each : longs) {
+    const Drive drive{.curve = each.curve,
+                      .peak_percent = each.peak_percent,
                       .rate_hz = 20.0,
-                      .begins_percent = begins_percent,
-                      .gains_percent_per_s = 0.001,
+                      .begins_percent = each.begins_percent,
+                      .gains_percent_per_s = 0.0004,
                       .ends_percent = 4.6,
-                      .ends_s = 2000.0,
-                      .swings_percent = begins_percent < 3.0 ? 1.8 : 0.9,
+                      .ends_s = each.ends_s,
+                      .swings_percent = each.swings_percent,
                       .swings_rad_s = 1.0};
-    const Driven data = driven(drive, 1);
-    const test::PeakReference expected =
-        test::fit_peak(data.record, kOverdrive_1_m, drive.inertia_kg_m2, data.stop_s);
-    EXPECT_GT(expected.points, begins_percent < 3.0 ? 512U : 300U);
-    EXPECT_EQ(expected.of_stretch == 256U, begins_percent > 3.0);
-    EXPECT_TRUE(expected.fit.valid);
-    EXPECT_EQ(differs(fitted(fit, data, drive.inertia_kg_m2), expected.fit), "");
+    const test::PeakReference expected = compared(fit, drive, each.least);
+    EXPECT_GE(expected.points, each.least);
+    EXPECT_LE(expected.points, each.most);
   }
+}
+
+// A load that is read with so much noise that the course takes many points.
+TEST(PeakFitReference, SaysTheSameOfMuchNoise) {
+  std::mt19937_64 random(33);
+  PeakFit fit;
+  for (std::uint64_t i = 0; i < 40; ++i) {
+    Drive drive = draw_drive(random);
+    drive.load_Nm = 15.0;
+    drive.rate_hz = 200.0;
+    drive.noise = 60.0;
+    drive.wander_Nm = 0.0;
+    drive.ends_s = 60.0;
+    compared(fit, drive, i);
+  }
+}
+
+// Slip that follows the clamp force alone is no curve to be tested; one that moves by more is.
+TEST(PeakFitReference, SaysTheSameWhereTheForceDeforms) {
+  std::mt19937_64 random(34);
+  PeakFit fit;
+  int tested = 0, untested = 0;
+  for (std::uint64_t i = 0; i < 80; ++i) {
+    Drive drive = draw_drive(random);
+    drive.rate_hz = 100.0;
+    drive.noise *= 0.3;
+    drive.wander_Nm = 0.0;
+    drive.ends_percent = 1e9;
+    drive.ends_s = 4.0 + 0.05 * static_cast<double>(i);
+    drive.raised_for_s = 0.0;
+    drive.stands_from_s = 1e9;
+    drive.deforms_percent_per_N =
+        kDeformation_percent_per_N * (0.5 + 0.0125 * static_cast<double>(i));
+    const test::PeakReference expected = compared(fit, drive, i);
+    (expected.fit.residuals.innovation > 0.0 ? tested : untested) += 1;
+  }
+  EXPECT_GT(tested, 15);
+  EXPECT_GT(untested, 15);
+}
+
+// All of the points that are tested before a long gap, and the experiment ended in it.
+TEST(PeakFitReference, SaysTheSameAroundALongGap) {
+  std::mt19937_64 random(35);
+  PeakFit fit;
+  int tested = 0;
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    Drive drive = draw_drive(random);
+    drive = {.curve = Curve::kSaturating,
+             .peak_percent = 1.0,
+             .noise = drive.noise,
+             .wander_Nm = drive.wander_Nm,
+             .inertia_kg_m2 = drive.inertia_kg_m2,
+             .waits_s = 0.2,
+             .ends_percent = 5.0,
+             .gap_at_s = 4.0,
+             .gap_s = 9.0,
+             .stops_before_end_s = 3.0};
+    const test::PeakReference expected = compared(fit, drive, i);
+    tested += expected.fit.residuals.innovation > 0.0;
+  }
+  EXPECT_GT(tested, 10);
 }
 
 // From too few cells for anything to some.
@@ -288,10 +381,7 @@ TEST(PeakFitReference, SaysTheSameOfTheFirstCells) {
     drive.rate_hz = 20.0;
     drive.ends_s = 0.05 * static_cast<double>(2 + i % 15);
     drive.waits_s = 0.0;
-    const Driven data = driven(drive, i);
-    const test::PeakReference expected =
-        test::fit_peak(data.record, kOverdrive_1_m, drive.inertia_kg_m2, data.stop_s);
-    EXPECT_EQ(differs(fitted(fit, data, drive.inertia_kg_m2), expected.fit), "") << i;
+    const test::PeakReference expected = compared(fit, drive, i);
     (expected.fit.reached > 0.0 ? reached : nothing) += 1;
   }
   EXPECT_GT(reached, 20);
@@ -302,8 +392,9 @@ TEST(PeakFitReference, SaysTheSameOfTheFirstCells) {
 // stays.
 TEST(PeakFit, OwesNothingToTheOneBefore) {
   PeakFit used;
-  Driven broken = driven({}, 1, {.torque = std::numeric_limits<double>::quiet_NaN()});
-  EXPECT_FALSE(fitted(used, broken, 0.18).valid);
+  EXPECT_FALSE(fitted(used, driven({}, 1, {.no_number_at_s = 4.0}), 0.18).valid);
+  EXPECT_FALSE(fitted(used, driven({.ends_s = 0.05}, 1), 0.18).valid);
+  EXPECT_TRUE(used.step());
   PeakFit fresh;
   const Driven data = driven({.inertia_kg_m2 = 0.18}, 2);
   const PeakFitResult expected = fitted(fresh, data, 0.18);
@@ -377,22 +468,21 @@ TEST(PeakFit, KnowsNoTimeOfDay) {
     const Drive drive = draw_drive(random);
     const PeakFitResult first = fitted(fit, driven(drive, i), drive.inertia_kg_m2);
     PeakFitResult later = fitted(fit, driven(drive, i, {.begins_s = 4096.0}), drive.inertia_kg_m2);
-    later.t_s -= 4096.0;
+    later.t_s -= first.valid ? 4096.0 : 0.0;
     EXPECT_EQ(differs(later, first, 1e4), "") << i;
   }
 }
 
-// Torque against its own direction is no friction.
+// Torque against its own direction is no friction. The last four, found among 20,000, have no mean
+// of it above 0 and yet forms that have.
 TEST(PeakFit, FindsNothingInATorqueThatIsReadBackwards) {
-  std::mt19937_64 random(8);
   PeakFit fit;
-  for (std::uint64_t i = 0; i < 100; ++i) {
-    const Drive drive = i < 20 ? fair(random) : draw_drive(random);
-    const PeakFitResult r = fitted(fit, driven(drive, i, {.torque = -1.0}), drive.inertia_kg_m2);
-    EXPECT_FALSE(r.valid) << i;
-    if (i < 20) {
-      EXPECT_EQ(r.reached, 0.0) << i;
-    }
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U, 5U, 6U, 7U, 8U, 137U, 1061U, 1456U, 12137U}) {
+    std::mt19937_64 random(seed);
+    const Drive drive = seed < 10 ? fair(random) : draw_drive(random);
+    const PeakFitResult r = fitted(fit, driven(drive, seed, {.torque = -1.0}), drive.inertia_kg_m2);
+    EXPECT_FALSE(r.valid) << seed;
+    EXPECT_EQ(r.reached, 0.0) << seed;
   }
 }
 
