@@ -244,5 +244,31 @@ TEST(Staircase, KeepsThePlateausAndNotTheSteps) {
   EXPECT_EQ(data.stretches.size(), 3U);
 }
 
+// Of the secondary speed. late_s: of its stamps; every: so many rows repeat a value.
+double age_of_secondary_speed_s(double late_s, int every) {
+  SignalTable table;
+  Noise noise;
+  double held = 0.0;
+  for (int i = 0; i < 2000; ++i) {
+    const double t_s = 0.01 * i;
+    const auto add = [&](Role role, double stamp_s, double value) {
+      table[role].t_s.push_back(stamp_s);
+      table[role].value.push_back(value);
+    };
+    if (i % every == 0) held = 200.0 + 0.1 * noise();
+    add(Role::kPrimarySpeed, t_s, 100.0 + 0.1 * noise());
+    add(Role::kSecondarySpeed, t_s + late_s, held);
+    add(Role::kSecondaryPressure, t_s, 5e5);
+    add(Role::kPrimaryTorque, t_s, 60.0);
+  }
+  return prepare(table, estimator::VariatorParameters{}).omega_s.age_s;
+}
+
+TEST(Age, IsNoneInOneRowUnlessValuesAreRepeated) {
+  EXPECT_EQ(age_of_secondary_speed_s(0.0, 1), 0.0);
+  EXPECT_NEAR(age_of_secondary_speed_s(0.0, 5), 0.01, 1e-9);
+  EXPECT_NEAR(age_of_secondary_speed_s(0.003, 1), 0.01, 1e-9);
+}
+
 }  // namespace
 }  // namespace beltgrip::diagnose

@@ -45,7 +45,6 @@ GridSignal to_grid(const Channel& channel, double start_s, int n, double dt_s) {
   out.slope = ArrayXd::Zero(n);
   if (channel.t_s.size() < 3) return out;
   const double period_s = median_period_s(channel);
-  out.period_s = period_s;
   const double sigma_s = kernel_s(dt_s);
   const double half_s = 3.0 * sigma_s;
   const double gap_s = std::max(0.25, 3.5 * period_s);
@@ -477,9 +476,24 @@ Role torque_role(const ExperimentData& data) {
   return data.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque;
 }
 
+// A value that is sent by itself may have waited for as long as the time between two of them. What
+// stands in one row with another channel was read with it, unless most values only repeat the last.
+double age_s(const Channel& channel, const Channel& beside) {
+  const double period_s = median_period_s(channel);
+  if (channel.t_s != beside.t_s) return period_s;
+  std::size_t repeats = 0;
+  for (std::size_t i = 1; i < channel.value.size(); ++i) {
+    repeats += channel.value[i] == channel.value[i - 1];
+  }
+  return 2 * repeats > channel.value.size() ? period_s : 0.0;
+}
+
 void put_on_grid(const SignalTable& table, double start_s, int n, ExperimentData& data) {
   const auto on_grid = [&](Role role) {
     GridSignal out = to_grid(table[role], start_s, n, data.dt_s);
+    out.age_s =
+        age_s(table[role],
+              table[role == Role::kPrimarySpeed ? Role::kSecondarySpeed : Role::kPrimarySpeed]);
     add_slow(out, data.dt_s);
     return out;
   };

@@ -25,7 +25,7 @@ struct GridSignal {
   Eigen::ArrayXd slow_slope;   // else such an effect would win by averaging the channel's noise
   Eigen::ArrayXd sharp;        // what a shift, lag or play is computed from: the slow copy; of the
   Eigen::ArrayXd sharp_slope;  // pressure one that is not rounded where it turns or steps
-  double period_s = 0.0;       // median time between the channel's samples
+  double age_s = 0.0;          // by how much a value may be older than its stamp
   bool present = false;
 };
 

@@ -41,16 +41,13 @@ double least_whiteness(const Engine& engine) {
 // The line at the belt's passage, of the speed and the order that show it best, in sigmas; Hz:
 // mean.
 double belt_line(const Campaign& campaign, double& frequency_Hz) {
-  constexpr double kAmplitudeMin = 1e-4;  // of the speed: less is of no consequence for slip
   double most = 0.0, cycles = 0.0, pieces = 0.0;
   for (const auto lines : {&ExperimentData::belt_p, &ExperimentData::belt_s}) {
     for (std::size_t i = 0; i < kBeltOrders.size(); ++i) {
       OrderLine all;
       for (const ExperimentData& run : campaign.runs) all.add((run.*lines)[i]);
       const double sigmas = all.amplitude() / std::max(all.amplitude_sigma(), 1e-12);
-      if (all.amplitude() > kAmplitudeMin) {
-        most = std::max(most, std::min(sigmas, std::sqrt(all.chi2())));
-      }
+      most = std::max(most, std::min(sigmas, std::sqrt(all.chi2())));
     }
   }
   for (const ExperimentData& run : campaign.runs) {
