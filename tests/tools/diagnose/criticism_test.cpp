@@ -37,9 +37,10 @@ Cell cell(Injection injection, std::string_view follows, double gain, double mea
 Criticism failing(const std::vector<std::string>& names, std::vector<Cell> cells = {}) {
   Criticism out;
   out.cells = std::move(cells);
-  for (const char* name : {"law_cell", "smooth_cell", "own_shape", "line", "channel_line",
-                           "belt_passage", "whiteness", "scatter_friction", "scatter_ratio",
-                           "scatter_torque", "unusual_scatter", "unusual_friction"}) {
+  for (const char* name :
+       {"law_cell", "smooth_cell", "own_shape", "line", "channel_line", "torque_swing",
+        "belt_passage", "whiteness", "scatter_friction", "scatter_ratio", "scatter_torque",
+        "unusual_scatter", "unusual_friction"}) {
     const bool fails = std::find(names.begin(), names.end(), name) != names.end();
     out.tests.push_back({name, fails ? 10.0 : 0.0, 1.0});
   }
@@ -77,6 +78,15 @@ TEST(OwnShape, AloneIsToldAsWhatItFollows) {
   EXPECT_EQ(told.acts_on, "friction");
   EXPECT_EQ(told.depends_on, std::vector<std::string>{"oil_temperature"});
   EXPECT_EQ(told.kind, MisfitKind::kFunction);
+}
+
+TEST(TorqueSwing, IsToldAsALine) {
+  Criticism left = failing({"torque_swing"});
+  left.swing = {"torque", 3.25, 10.0, 0.1};
+  const Unexplained told = what_is_left(left, true);
+  EXPECT_EQ(told.kind, MisfitKind::kLine);
+  EXPECT_EQ(told.acts_on, "torque");
+  EXPECT_EQ(told.frequency_Hz, 3.25);
 }
 
 TEST(RepeatsWithin, WhatFollowsAVariableThatChangesInEachExperiment) {

@@ -119,11 +119,35 @@ TEST(NarrowLine, StandsOverNoiseAndNotOverASlope) {
     }
     return out;
   };
-  const NarrowLine line = narrow_line(pooled_spectrum(channel_of(0.5)));
+  const NarrowLine line = narrow_line(pooled_spectrum(channel_of(0.5), kChannelMost_Hz));
   EXPECT_NEAR(line.frequency_Hz, 6.25, 0.05);
   EXPECT_GT(line.over_level, 30.0);
   EXPECT_GT(line.share, 0.3);
-  EXPECT_LT(narrow_line(pooled_spectrum(channel_of(0.0))).over_level, 5.0);
+  EXPECT_LT(narrow_line(pooled_spectrum(channel_of(0.0), kChannelMost_Hz)).over_level, 5.0);
+}
+
+// A shaft that noise moves at its own frequency, damped: white noise through two poles.
+TEST(Hump, OfAShaftThatSwingsAndNotOfASlope) {
+  const auto channel_of = [](double strength) {
+    Channel out;
+    Noise noise;
+    const double turn = 2.0 * std::numbers::pi * 3.0 * 0.01, keep = std::exp(-0.06 * turn);
+    double slow = 0.0, swing = 0.0, before = 0.0;
+    for (int i = 0; i < 40000; ++i) {
+      slow = 0.97 * slow + 0.1 * noise();  // its power falls with the frequency
+      const double next = 2.0 * keep * std::cos(turn) * swing - keep * keep * before + noise();
+      before = swing;
+      swing = next;
+      out.t_s.push_back(0.01 * i);
+      out.value.push_back(50.0 + slow + strength * swing + 0.3 * noise());
+    }
+    return out;
+  };
+  const Hump hump = strongest_hump(pooled_spectrum(channel_of(0.01), kSwingMost_Hz));
+  EXPECT_NEAR(hump.frequency_Hz, 3.0, 0.3);
+  EXPECT_GT(hump.excess, 8.0);
+  EXPECT_GT(hump.share, 0.0);
+  EXPECT_LT(strongest_hump(pooled_spectrum(channel_of(0.0), kSwingMost_Hz)).excess, 4.0);
 }
 
 }  // namespace

@@ -520,6 +520,37 @@ void add_roundings(const SignalTable& table, ExperimentData& data) {
   data.rests_torque_s = rests_of(table[Role::kSecondaryTorque], data.torque_s.value);
 }
 
+// What moves a machine shows in the torques at both its shafts, and in the acceleration; what
+// swings in one of the readings alone does not. Nothing where they were not read together.
+Channel unbalanced_torque(const SignalTable& table, const estimator::VariatorParameters& variator,
+                          bool is_engine) {
+  const Channel& in = table[is_engine ? Role::kEngineTorque : Role::kPrimaryTorque];
+  const Channel& behind = table[Role::kSecondaryTorque];
+  const Channel& speed = table[Role::kPrimarySpeed];
+  const Channel& speed_s = table[Role::kSecondarySpeed];
+  const bool needs_speed = is_engine && variator.primary_inertia_kg_m2 > 0.0;
+  if (in.t_s != behind.t_s || in.t_s.size() < 3 || speed.value.size() != speed_s.value.size() ||
+      (needs_speed && speed.t_s != in.t_s)) {
+    return {};
+  }
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < speed.value.size(); ++i) {
+    if (speed.value[i] > 0.0) ratios.push_back(speed_s.value[i] / speed.value[i]);
+  }
+  if (ratios.empty()) return {};
+  const double ratio = estimator::median(ratios);
+  Channel out;
+  for (std::size_t i = 1; i + 1 < in.t_s.size(); ++i) {
+    const double inertia_Nm = !needs_speed ? 0.0
+                                           : variator.primary_inertia_kg_m2 *
+                                                 (speed.value[i + 1] - speed.value[i - 1]) /
+                                                 (speed.t_s[i + 1] - speed.t_s[i - 1]);
+    out.t_s.push_back(in.t_s[i]);
+    out.value.push_back(in.value[i] - inertia_Nm - ratio * behind.value[i]);
+  }
+  return out;
+}
+
 void add_lines(const SignalTable& table, const estimator::VariatorParameters& variator,
                ExperimentData& data) {
   data.line_p = order_line(table[Role::kPrimarySpeed]);
@@ -531,8 +562,10 @@ void add_lines(const SignalTable& table, const estimator::VariatorParameters& va
                          " folds back to about 0 Hz; not judged there");
   }
   add_belt_lines(table, variator, data);
-  data.torque_spectrum = pooled_spectrum(table[torque_role(data)]);
-  data.torque_s_spectrum = pooled_spectrum(table[Role::kSecondaryTorque]);
+  data.torque_spectrum = pooled_spectrum(table[torque_role(data)], kChannelMost_Hz);
+  data.torque_s_spectrum = pooled_spectrum(table[Role::kSecondaryTorque], kChannelMost_Hz);
+  data.unbalanced_spectrum =
+      pooled_spectrum(unbalanced_torque(table, variator, data.torque_is_engine), kSwingMost_Hz);
 }
 
 // Samples at which the pressure or a torque rests on its bound.

@@ -48,6 +48,7 @@ struct ExperimentData {
   BeltLines belt_p, belt_s;  // at the belt's passage, in the same
   double belt_Hz = 0.0;      // of that, mean
   PooledSpectrum torque_spectrum, torque_s_spectrum;
+  PooledSpectrum unbalanced_spectrum;  // of the torque that does not arrive behind the belt
   bool torque_is_engine = false;
   std::vector<int> stop;  // EndStopIndex per sample
   // By how much the slip varies within what one sample is the mean of, squared shares: a curve that

@@ -13,7 +13,6 @@ namespace {
 
 constexpr double kSpectrumPiece_s = 1.0 / PooledSpectrum::kStep_Hz;
 constexpr double kHighest = 0.45;  // of the sample rate: what lies above folds back
-constexpr double kMost_Hz = 40.0;
 // Below, ramps and steps have their own power.
 constexpr double kLowest_Hz = 2.0;
 // The level on either side of a line, without the line. The higher one counts: the power of a
@@ -21,6 +20,8 @@ constexpr double kLowest_Hz = 2.0;
 constexpr double kAround_Hz = 2.0, kOwn_Hz = 0.75;
 constexpr int kPiecesMin = 12;                   // chosen: a mean of so many is known to a third
 constexpr std::size_t kSpectrumSamplesMin = 60;  // per piece
+// Chosen: slower than the first, what drives a machine has its own power there.
+constexpr double kSwingLowest_Hz = 1.25;
 
 std::size_t bin_of(double frequency_Hz) {
   return static_cast<std::size_t>(std::lround(frequency_Hz / PooledSpectrum::kStep_Hz));
@@ -106,11 +107,11 @@ void PooledSpectrum::add(const PooledSpectrum& other) {
   pieces += other.pieces;
 }
 
-PooledSpectrum pooled_spectrum(const Channel& channel) {
+PooledSpectrum pooled_spectrum(const Channel& channel, double most_Hz) {
   PooledSpectrum out;
   const double period_s = channel.empty() ? 0.0 : median_period_s(channel);
   if (!(period_s > 0.0)) return out;
-  const double highest_Hz = std::min(kMost_Hz, kHighest / period_s);
+  const double highest_Hz = std::min(most_Hz, kHighest / period_s);
   if (highest_Hz < kLowest_Hz) return out;
   out.power.assign(bin_of(highest_Hz) + 1, 0.0);
   for (std::size_t begin = 0; begin < channel.t_s.size();) {
@@ -128,6 +129,14 @@ PooledSpectrum pooled_spectrum(const Channel& channel) {
   return out;
 }
 
+namespace {
+double median_of(const std::vector<double>& power, std::size_t first, std::size_t last) {
+  std::vector<double> near;
+  for (std::size_t j = first; j <= std::min(last, power.size() - 1); ++j) near.push_back(power[j]);
+  return estimator::median(near);
+}
+}  // namespace
+
 NarrowLine narrow_line(const PooledSpectrum& spectrum) {
   NarrowLine out;
   const std::vector<double>& power = spectrum.power;
@@ -136,15 +145,9 @@ NarrowLine narrow_line(const PooledSpectrum& spectrum) {
   double whole = 0.0;
   for (std::size_t i = lowest; i < power.size(); ++i) whole += power[i];
   const std::size_t around = bin_of(kAround_Hz), own = bin_of(kOwn_Hz);
-  const auto level_from = [&](std::size_t first, std::size_t last) {
-    std::vector<double> near;
-    for (std::size_t j = first; j <= std::min(last, power.size() - 1); ++j)
-      near.push_back(power[j]);
-    return estimator::median(near);
-  };
   for (std::size_t i = lowest; i + own + 2 < power.size(); ++i) {
-    const double level = std::max(level_from(i > around ? i - around : 1, i - own - 1),
-                                  level_from(i + own + 1, i + around));
+    const double level = std::max(median_of(power, i > around ? i - around : 1, i - own - 1),
+                                  median_of(power, i + own + 1, i + around));
     const double over = power[i] / std::max(level, 1e-300);
     if (over <= out.over_level) continue;
     double mass = 0.0, moment = 0.0;
@@ -154,6 +157,28 @@ NarrowLine narrow_line(const PooledSpectrum& spectrum) {
       moment += here * static_cast<double>(j);
     }
     out = {moment / std::max(mass, 1e-300) * PooledSpectrum::kStep_Hz, over, mass / whole};
+  }
+  return out;
+}
+
+Hump strongest_hump(const PooledSpectrum& spectrum) {
+  Hump out;
+  const std::vector<double>& power = spectrum.power;
+  const std::size_t lowest = bin_of(kSwingLowest_Hz);
+  const std::size_t around = bin_of(kAround_Hz), own = bin_of(kOwn_Hz);
+  if (spectrum.pieces < kPiecesMin || power.size() < lowest + around) return out;
+  double whole = 0.0;
+  for (std::size_t i = lowest; i < power.size(); ++i) whole += power[i];
+  for (std::size_t i = lowest; i + around < power.size(); ++i) {
+    const double level = std::max(median_of(power, i > around ? i - around : 1, i - own),
+                                  median_of(power, i + own, i + around));
+    const double mass = power[i - 1] + power[i] + power[i + 1];
+    // Derived: of three neighbours through Hann's window one and a half are independent, and the
+    // level's median is uncertain by half as much as they are.
+    const double excess = (mass / std::max(3.0 * level, 1e-300) - 1.0) * std::sqrt(spectrum.pieces);
+    if (excess <= out.excess) continue;
+    out = {static_cast<double>(i) * PooledSpectrum::kStep_Hz, excess,
+           std::max(0.0, mass - 3.0 * level) / whole};
   }
   return out;
 }

@@ -15,7 +15,10 @@ struct PooledSpectrum {
   int pieces = 0;
   void add(const PooledSpectrum& other);
 };
-PooledSpectrum pooled_spectrum(const Channel& channel);
+// most_Hz: nothing is asked for above.
+PooledSpectrum pooled_spectrum(const Channel& channel, double most_Hz);
+inline constexpr double kChannelMost_Hz = 40.0;  // of a channel as it is
+inline constexpr double kSwingMost_Hz = 14.0;    // of a shaft that swings, and what lies about it
 
 struct NarrowLine {
   double frequency_Hz = 0.0;
@@ -24,5 +27,14 @@ struct NarrowLine {
 };
 // The strongest; none of pieces too few to tell.
 NarrowLine narrow_line(const PooledSpectrum& spectrum);
+
+// The same of a shaft that swings at its own frequency: noise moves it, so that it is no line but a
+// hump, half a Hz wide.
+struct Hump {
+  double frequency_Hz = 0.0;
+  double excess = 0.0;  // over the higher one of the levels on either side, sigmas
+  double share = 0.0;   // of the power from the lowest frequency that it is looked for at
+};
+Hump strongest_hump(const PooledSpectrum& spectrum);
 
 }  // namespace beltgrip::diagnose

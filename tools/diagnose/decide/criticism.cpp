@@ -72,6 +72,13 @@ SpectralLine channel_line(const Campaign& campaign) {
   return out;
 }
 
+SpectralLine swing(const Campaign& campaign) {
+  PooledSpectrum all;
+  for (const ExperimentData& run : campaign.runs) all.add(run.unbalanced_spectrum);
+  const Hump hump = strongest_hump(all);
+  return {"torque", hump.frequency_Hz, hump.excess, hump.share};
+}
+
 double decades(double p) { return -std::log10(std::max(p, 1e-300)); }
 
 }  // namespace
@@ -105,6 +112,7 @@ Criticism criticise(const Engine& engine, Steps steps) {
   demote_order(out.cells);
   out.line = strongest_line(engine.campaign(), engine.state());
   out.channel_line = channel_line(engine.campaign());
+  out.swing = swing(engine.campaign());
   out.base = scatter_base(engine);
   double law = 0.0, smooth = 0.0;
   for (const Cell& cell : out.cells) {
@@ -123,6 +131,7 @@ Criticism criticise(const Engine& engine, Steps steps) {
       {"own_shape", out.own ? out.own->gain() : 0.0, kOwnShape},
       {"line", fine ? out.line.excess : 0.0, kLine},
       {"channel_line", out.channel_line.excess, kChannelLine},
+      {"torque_swing", fine ? out.swing.excess : 0.0, kSwing},
       {"belt_passage", belt_line(engine.campaign(), out.belt_Hz), kBeltLine},
       {"whiteness", fine ? decades(least_whiteness(engine)) : 0.0, decades(kWhiteness)},
       {"scatter_friction", ratio.friction, kScatterFriction},
@@ -187,8 +196,8 @@ Unexplained what_is_left(const Criticism& criticism, bool has_balance) {
     out.is_belt = true;
     return out;
   }
-  if (fails("channel_line")) {
-    const SpectralLine& line = criticism.channel_line;
+  if (fails("channel_line") || fails("torque_swing")) {
+    const SpectralLine& line = fails("channel_line") ? criticism.channel_line : criticism.swing;
     out = {line.acts_on, {}, line.share, MisfitKind::kLine, line.frequency_Hz};
     return out;
   }
