@@ -8,6 +8,7 @@
 #include <set>
 
 #include "estimator/statistics/distributions.h"
+#include "tools/diagnose/decide/rivals.h"
 #include "tools/diagnose/decide/unknown.h"
 #include "tools/diagnose/infer/gain.h"
 #include "tools/diagnose/infer/parallel.h"
@@ -40,7 +41,6 @@ constexpr int kSettling = 20;     // steps of a fit whose effects are settled
 constexpr int kGroupDegrees = 3;  // of a group of score_groups
 constexpr double kPromotedOdds = 3.0;
 constexpr int kPromotions = 2;
-constexpr double kThereOdds = 20.0;   // that it is there
 constexpr double kClassOdds = 200.0;  // worse by more: told apart; the class is to miss one in 100
 // A further cause must matter beside those found: below this share of their evidence it is the
 // difference between the found effect's equation and the machine.
@@ -265,18 +265,20 @@ bool repeats_one(const Campaign& campaign) {
   return true;
 }
 
-// A cause that is too small to be a name, or that no machine has, says nothing against one that is
-// there beside it as well: it is in the place of another. Where all experiments repeat one ramp,
-// what no machine has may be several constants of the machine at once, and says that nothing holds.
+// Whether the name `slot` stands beside this rival in its place. ln_odds: of the rival over
+// nothing.
 bool stands_beside(const Engine& engine, const Hypothesis& rival, int of_rival, double ln_odds,
                    int slot) {
   const double size = rival.state.effects[of_rival];
-  const bool is_too_small = !is_beyond_holding(engine, of_rival, size) ||
-                            !is_worth_a_name(engine, of_rival, size, ln_odds);
-  if (!is_too_small && (credible(engine, rival) || repeats_one(engine.campaign()))) return false;
-  const Hypothesis both = engine.refine_from(rival.state, plus(rival.slots, slot));
-  return both.log_evidence > rival.log_evidence + std::log(kThereOdds) &&
-         credible(engine, slot, both.state.effects[slot]);
+  const Rival what{.is_too_small = !is_beyond_holding(engine, of_rival, size) ||
+                                   !is_worth_a_name(engine, of_rival, size, ln_odds),
+                   .is_possible = credible(engine, rival),
+                   .repeats_one = repeats_one(engine.campaign())};
+  return stands_beside(what, [&] {
+    const Hypothesis both = engine.refine_from(rival.state, plus(rival.slots, slot));
+    return Beside{both.log_evidence - rival.log_evidence,
+                  credible(engine, slot, both.state.effects[slot])};
+  });
 }
 
 struct Promotion {

@@ -1,0 +1,55 @@
+// Which rivals of a name count against it.
+#include "tools/diagnose/decide/rivals.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace beltgrip::diagnose {
+namespace {
+
+const double kSure = std::log(kThereOdds) + 0.01, kUnsure = std::log(kThereOdds) - 0.01;
+
+bool beside(const Rival& rival, double ln_odds, bool is_possible = true) {
+  return stands_beside(rival, [&] { return Beside{ln_odds, is_possible}; });
+}
+
+TEST(StandsBeside, ARivalThatMayBeTheCauseCounts) {
+  EXPECT_FALSE(beside({}, kSure));
+  EXPECT_FALSE(beside({.repeats_one = true}, kSure));
+}
+
+TEST(StandsBeside, WhatIsTooSmallOrImpossibleDoesNotCount) {
+  EXPECT_TRUE(beside({.is_too_small = true}, kSure));
+  EXPECT_TRUE(beside({.is_possible = false}, kSure));
+  EXPECT_TRUE(beside({.is_too_small = true, .is_possible = false}, kSure));
+}
+
+TEST(StandsBeside, OnlyWhereTheNameIsThereBesideIt) {
+  EXPECT_FALSE(beside({.is_too_small = true}, kUnsure));
+  EXPECT_FALSE(beside({.is_possible = false}, kUnsure));
+  EXPECT_FALSE(beside({.is_too_small = true}, kSure, false));
+  EXPECT_FALSE(beside({.is_possible = false}, kSure, false));
+}
+
+// Of one ramp what no machine has is several constants at once; what is small is small there too.
+TEST(StandsBeside, WhatIsImpossibleCountsWhereOneRampIsRepeated) {
+  EXPECT_FALSE(beside({.is_possible = false, .repeats_one = true}, kSure));
+  EXPECT_TRUE(beside({.is_too_small = true, .repeats_one = true}, kSure));
+}
+
+TEST(StandsBeside, AsksForTheFitOnlyWhereItDecides) {
+  int asked = 0;
+  const auto fit = [&] {
+    ++asked;
+    return Beside{kSure, true};
+  };
+  stands_beside({}, fit);
+  stands_beside({.is_possible = false, .repeats_one = true}, fit);
+  EXPECT_EQ(asked, 0);
+  stands_beside({.is_too_small = true}, fit);
+  EXPECT_EQ(asked, 1);
+}
+
+}  // namespace
+}  // namespace beltgrip::diagnose

@@ -1,0 +1,28 @@
+// What fits better in the place of a name, and says nothing against it all the same.
+#pragma once
+
+#include <functional>
+
+namespace beltgrip::diagnose {
+
+inline constexpr double kThereOdds = 20.0;  // that an effect is there
+
+struct Rival {
+  bool is_too_small = false;  // to be a name itself
+  bool is_possible = true;    // sizes and constants that a machine can have
+  bool repeats_one = false;   // all experiments are the same ramp
+};
+
+// The name beside the rival.
+struct Beside {
+  double ln_odds = 0.0;  // of its being there as well
+  bool is_possible = true;
+};
+
+// A cause that is too small to be a name, or that no machine has, is in the place of another: it
+// says nothing against a name that is there beside it as well. Where all experiments repeat one
+// ramp, what no machine has may be several constants of the machine at once, and says that nothing
+// holds. beside: a fit, asked for only where it decides.
+bool stands_beside(const Rival& rival, const std::function<Beside()>& beside);
+
+}  // namespace beltgrip::diagnose
