@@ -248,6 +248,16 @@ Hypothesis refine_replacement(const Engine& engine, const Engine::Replacement& s
   return linear.log_likelihood > beside.log_likelihood ? linear : beside;
 }
 
+// The runner-up that puts this slot beside the others; null: there is none.
+const Hypothesis* runner_up(const Naming& naming, const std::vector<int>& others, int slot) {
+  const auto found =
+      std::find_if(naming.runners_up.begin(), naming.runners_up.end(), [&](const Hypothesis& each) {
+        return each.slots.size() == others.size() + 1 && each.slots.back() == slot &&
+               std::is_permutation(others.begin(), others.end(), each.slots.begin());
+      });
+  return found == naming.runners_up.end() ? nullptr : &*found;
+}
+
 // What the friction curve alone could do as well, however it runs, while it runs as friction does.
 bool is_in_curve(const Naming& naming, int slot) {
   return Engine::curve_is_possible(naming.sharp.state) &&
@@ -322,12 +332,21 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
             -ranked[near].first.gain <= std::clamp(kNearShare * loss, kNear, kNearMax))) {
       ++near;
     }
+    // The way from the name's own optimum to that of another one may be barred by the curve's
+    // bounds.
+    for (std::size_t i = near; i < ranked.size(); ++i) {
+      if (runner_up(naming, others, ranked[i].second)) std::swap(ranked[near++], ranked[i]);
+    }
     std::vector<std::optional<Hypothesis>> rivals(near);
     in_parallel(engine.jobs(), near, [&](std::size_t i) {
       if (stop()) return;
       const std::vector<int> rival = plus(others, ranked[i].second);
-      rivals[i] =
-          refine_replacement(engine, ranked[i].first, rival, whole.log_evidence - kNothingBeside);
+      const double worth = whole.log_evidence - kNothingBeside;
+      rivals[i] = refine_replacement(engine, ranked[i].first, rival, worth);
+      if (const Hypothesis* known = runner_up(naming, others, ranked[i].second)) {
+        Hypothesis again = engine.refine_from(known->state, rival, kSettling, worth);
+        if (again.log_likelihood > rivals[i]->log_likelihood) rivals[i] = std::move(again);
+      }
     });
     for (std::size_t i = 0; i < near; ++i) {
       const std::optional<Hypothesis>& rival = rivals[i];
@@ -569,6 +588,7 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
                      std::any_of(scores.begin(), scores.end(),
                                  [](const Score& score) { return score.gain > kFar; });
     Hypothesis best;
+    std::vector<Hypothesis> considered;
     bool found = false;
     const double gain_least = std::max(out.threshold, worth_beside(first_gain));
     const double worth = base.log_likelihood + 0.5 * gain_least;
@@ -583,6 +603,7 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
         return;
       if (parts_experiments(base.fit.scatter, h.fit.scatter)) return;
       if (gain < gain_least) return;
+      considered.push_back(h);
       if (!found || h.log_evidence > best.log_evidence) {
         best = std::move(h);
         found = true;
@@ -630,6 +651,11 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
       break;
     }
     first_gain = std::max(first_gain, gain);
+    std::erase_if(considered, [&](const Hypothesis& each) {
+      return each.log_evidence < best.log_evidence - std::log(kClassOdds) ||
+             each.slots.back() == best.slots.back();
+    });
+    out.runners_up = std::move(considered);
     engine.accept(best);
     engine.update_noise();
     engine.accept(engine.refine(engine.accepted(), kSettling));

@@ -46,7 +46,9 @@ struct Naming {
   std::optional<UnknownGroup> unknown;
   Hypothesis hypothesis;           // all accepted ones
   std::vector<Score> last_screen;  // on top of the accepted ones: what is not there
-  std::vector<Ripple> ripples;     // both shafts
+  // What fitted as well as the last effect in its place, where its own fit ended.
+  std::vector<Hypothesis> runners_up;
+  std::vector<Ripple> ripples;  // both shafts
   double threshold = 0.0;
   // Effects that were found, but do not help to predict experiments left out of the fit.
   std::vector<int> not_confirmed;
