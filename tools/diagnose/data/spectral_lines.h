@@ -19,8 +19,8 @@ struct PooledSpectrum {
 PooledSpectrum pooled_spectrum(const Channel& channel, double most_Hz);
 // Of a channel as it is. Not varied.
 inline constexpr double kChannelMost_Hz = 40.0;
-// Chosen: of a shaft that swings, and what lies about it. A fifth less or more: the same verdicts of
-// the sets named at kSwingLowest_Hz.
+// Chosen: of a shaft that swings, and what lies about it. A fifth less or more: the same verdicts
+// of the sets named at kSwingLowest_Hz.
 inline constexpr double kSwingMost_Hz = 14.0;
 
 struct NarrowLine {
