@@ -1,5 +1,5 @@
-// tanh by one exponential, off by at most 2.3e-16 at any x: the library's, which is right relative to
-// a small x too, takes 86 instructions a call. Simulation only.
+// tanh by one exponential, off by at most 2.3e-16 at any x: the library's, which is right relative
+// to a small x too, takes 86 instructions a call. Simulation only.
 #pragma once
 
 #include <cmath>
