@@ -52,7 +52,7 @@ constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
 // Log odds that what is of no consequence is there. How small it is says what it matters, not
 // whether it is there; but what the form of the friction leaves in healthy machines is small as
 // well. Measured, campaigns of other make: without it one of 102 healthy ones is named, at 5.9;
-// nine that are there have 21 to 257. A fifth less or more: the same.
+// nine that are there have 21 to 257. A fifth less or more lies between; not run.
 constexpr double kSmallLnOdds = 12.0;
 // Where something else is so much more probable that cannot be, for its size, neither is it.
 constexpr double kUnlikely = 0.01;
