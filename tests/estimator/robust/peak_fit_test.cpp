@@ -272,20 +272,28 @@ TEST(PeakFitReference, SaysTheSameOfDrawnRecords) {
   EXPECT_GT(tested, 60);
 }
 
-// Slip that swings for a long time: more points than are kept, more than that near the top, more
-// than that from 0.6 of it on; and somewhat fewer.
+// Slip that swings for a long time: more points than are kept, more than that near the top (also
+// where some of them were moved to make room), more than that from 0.6 of it on; and somewhat
+// fewer.
 TEST(PeakFitReference, SaysTheSameOfLongRecords) {
   PeakFit fit;
   struct Long {
     double begins_percent, swings_percent, ends_s;
     Curve curve = Curve::kRound;
-    double peak_percent = 4.0;
+    double peak_percent = 4.0, gains_percent_per_s = 0.0004;
     std::size_t least, most;  // points
     std::uint64_t seed = 1;
   };
   const Long longs[] = {
       {.begins_percent = 2.0, .swings_percent = 1.8, .ends_s = 2000.0, .least = 513, .most = 1000},
       {.begins_percent = 3.7, .swings_percent = 0.9, .ends_s = 2000.0, .least = 385, .most = 1000},
+      {.begins_percent = 3.7,
+       .swings_percent = 1.3,
+       .ends_s = 2000.0,
+       .curve = Curve::kPlateau,
+       .gains_percent_per_s = 0.0001,
+       .least = 513,
+       .most = 640},
       {.begins_percent = 2.6,
        .swings_percent = 0.8,
        .ends_s = 1000.0,
@@ -312,7 +320,7 @@ TEST(PeakFitReference, SaysTheSameOfLongRecords) {
                       .peak_percent = each.peak_percent,
                       .rate_hz = 20.0,
                       .begins_percent = each.begins_percent,
-                      .gains_percent_per_s = 0.0004,
+                      .gains_percent_per_s = each.gains_percent_per_s,
                       .ends_percent = 4.6,
                       .ends_s = each.ends_s,
                       .swings_percent = each.swings_percent,
