@@ -20,6 +20,8 @@
 
 namespace beltgrip::daemon {
 
+using estimator::ReadingVerdict;
+
 namespace {
 
 using Json = nlohmann::ordered_json;  // NaN and infinity become null
@@ -45,13 +47,17 @@ Json signals(MonoTime now, const Observation& observation) {
   Json all = Json::object();
   for (std::size_t i = 0; i < kRoleCount; ++i) {
     const SignalObservation& seen = observation.signals[i];
-    if (seen.quality == SignalQuality::kUnbound) continue;
+    if (seen.status.verdict == ReadingVerdict::kUnbound) continue;
     const auto role = static_cast<Role>(i);
     Json& one = all[std::string(role_name(role))];
-    one["quality"] = quality_name(seen.quality);
+    one["quality"] = estimator::verdict_text(seen.status.verdict);
     one["age_s"] = seen.seen ? Json(seconds(now - seen.t)) : Json();
     one["value"] = seen.seen ? Json(seen.value) : Json();
     one["unit"] = can::si_unit_text(role_dimension(role));
+    one["since_s"] = seconds(now - MonoTime::of_ns(seen.status.since_ns));  // so long it is so
+    one["expected"] = seen.status.expected;
+    one["deviation"] = std::sqrt(seen.status.variance);
+    one["test_ratio"] = seen.status.test_ratio;
   }
   return all;
 }

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include "estimator/method/reading_status.h"
 #include "estimator/method/stop_reason.h"
 #include "estimator/physics/parameters.h"
 #include "estimator/physics/variator_sample.h"
@@ -56,6 +57,8 @@ struct PeakEstimate {
   double noise_high = 0.0;
   double clamp_force_N = 0.0;  // at the peak, or where the bound was reached
   double omega_s_rad_s = 0.0;  // there
+  // Of the experiment, at its end. The paper's method judges none: unbound.
+  ReadingStatuses readings{};
 };
 
 class SlipCurveEstimator {

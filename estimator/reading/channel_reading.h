@@ -4,26 +4,24 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
+#include "estimator/physics/units.h"
 #include "estimator/reading/frozen_reading.h"
 #include "estimator/reading/glitch_gate.h"
 
 namespace beltgrip::estimator {
 
-enum class ReadingVerdict : std::uint8_t {
-  kTrusted,
-  kStepped,     // it has gone to another level by itself, at stepped_s()
-  kNeverMoved,  // one value since the beginning: doubtful where other channels move
-  kFrozen       // it kept changing, and has come to stand still
-};
-
 class ChannelReading {
  public:
   // may_rest: what is computed, not measured, may stand still.
   explicit ChannelReading(double sample_rate_hz, bool may_rest = false)
-      : course_(sample_rate_hz), gate_(sample_rate_hz), may_rest_(may_rest) {}
+      : course_(sample_rate_hz),
+        gate_(sample_rate_hz),
+        may_rest_(may_rest),
+        sample_rate_hz_(sample_rate_hz) {}
   void reset() noexcept {
     course_.reset();
     gate_.reset();
@@ -43,7 +41,19 @@ class ChannelReading {
   ReadingVerdict verdict() const noexcept {
     if (!may_rest_ && course_.frozen()) return ReadingVerdict::kFrozen;
     if (!may_rest_ && course_.never_moved()) return ReadingVerdict::kNeverMoved;
-    return has_stepped() ? ReadingVerdict::kStepped : ReadingVerdict::kTrusted;
+    return has_stepped() ? ReadingVerdict::kStepped : ReadingVerdict::kValid;
+  }
+  // begin_ns: where the time of steps counts from; now_s: on it.
+  ReadingStatus status(std::int64_t begin_ns, double now_s) const noexcept {
+    ReadingStatus out = gate_.status();
+    out.verdict = verdict();
+    out.value = course_.value();
+    const double stood_s = static_cast<double>(course_.still_samples()) / sample_rate_hz_;
+    const double since_s = out.verdict == ReadingVerdict::kFrozen    ? now_s - stood_s
+                           : out.verdict == ReadingVerdict::kStepped ? stepped_s_
+                                                                     : 0.0;
+    out.since_ns = begin_ns + std::llround(since_s / kNanosecond_s);
+    return out;
   }
   // A channel that stands still may have stepped before.
   bool has_stepped() const noexcept { return stepped_s_ < kNever_s; }
@@ -56,6 +66,7 @@ class ChannelReading {
   FrozenReading course_;
   GlitchGate gate_;
   bool may_rest_;
+  double sample_rate_hz_;
   double stepped_s_ = kNever_s;
 };
 

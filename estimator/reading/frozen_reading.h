@@ -40,6 +40,8 @@ class FrozenReading {
   // noise.
   bool never_moved() const noexcept { return values_ == 1 && run_ >= never_samples_; }
   bool moves() const noexcept { return values_ > kFewest; }
+  long still_samples() const noexcept { return run_; }  // since the last change
+  double value() const noexcept { return last_; }
 
  private:
   static constexpr double kLeast_s = 0.15;

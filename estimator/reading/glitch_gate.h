@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "estimator/method/reading_status.h"
+
 namespace beltgrip::estimator {
 
 class GlitchGate {
@@ -18,16 +20,22 @@ class GlitchGate {
     const double n = static_cast<double>(window_);
     step_per_moment_ = 6.0 / (n * (n - 1.0));
   }
-  void reset() noexcept { count_ = held_ = since_ = 0; }
+  void reset() noexcept {
+    begin_anew();
+    bound_ = 0.0;
+  }
 
   // One sample: the value, or what the line through those before it expects where the value lies
   // further from that than `share` of it, and than `least`.
   double step(double value, double share, double least) noexcept {
     ++since_;
     jumped_ = false;
+    value_ = value;
+    bound_ = 0.0;
     if (count_ < window_) return take(value);
-    const double expected = next_on_line();
-    if (std::abs(value - expected) <= std::max(share * std::abs(expected), least)) {
+    const double expected = expected_ = next_on_line();
+    bound_ = std::max(share * std::abs(expected), least);
+    if (std::abs(value - expected) <= bound_) {
       if (held_ > 0) since_ = 0;
       held_ = 0;
       return take(value);
@@ -39,12 +47,19 @@ class GlitchGate {
       return take(expected);
     }
     jumped_ = held_ > 0 && std::abs(away - half_way_) < kSame * std::abs(half_way_);
-    reset();
+    begin_anew();
     return take(value);
   }
   // With the last sample: it had gone to another level, within half of what is held, and stayed
   // there. What runs away goes on doing so.
   bool jumped() const noexcept { return jumped_; }
+  // Of the last sample; its verdict is for others to give.
+  ReadingStatus status() const noexcept {
+    if (!(bound_ > 0.0)) return {};
+    return {.value = value_,
+            .expected = expected_,
+            .test_ratio = std::abs(value_ - expected_) / bound_};
+  }
 
  private:
   static constexpr double kWindow_s = 0.06, kHold_s = 0.05, kApart_s = 0.5;
@@ -54,6 +69,7 @@ class GlitchGate {
     return static_cast<std::size_t>(std::lround(time_s * rate_hz));
   }
 
+  void begin_anew() noexcept { count_ = held_ = since_ = 0; }
   double take(double value) noexcept {
     values_[count_++ % window_] = value;
     return value;
@@ -78,6 +94,8 @@ class GlitchGate {
   std::size_t held_ = 0;   // samples, of a jump that may come back
   double half_way_ = 0.0;  // how far away it was then
   bool jumped_ = false;
+  double value_ = 0.0, expected_ = 0.0;  // of the last sample
+  double bound_ = 0.0;                   // of their distance; 0: not tested
   std::size_t since_ = 0;  // samples since the last one came back, or since the beginning
 };
 

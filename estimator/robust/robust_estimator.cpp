@@ -119,9 +119,7 @@ class RobustEstimator final : public SlipCurveEstimator {
       peak_ = {};
       if (out_.stop == StopReason::kConfidence) {
         take_expected();
-        refuse_impossible(peak_, reading_reach_);
-        concluded_ = true;
-        return true;
+        return conclude_with_readings();
       }
       if (out_.stop == StopReason::kNone) after_stop_.begin(record_);  // ended by the caller
       stop_s_ = record_.duration_s();
@@ -137,14 +135,25 @@ class RobustEstimator final : public SlipCurveEstimator {
     if (!fit_.step()) return false;
     if (stepped && follow_on_.waits()) return false;
     judge();
-    refuse_impossible(peak_, reading_reach_);
-    concluded_ = true;
-    return true;
+    return conclude_with_readings();
   }
 
   const PeakEstimate& peak() const noexcept override { return peak_; }
 
  private:
+  bool conclude_with_readings() noexcept {
+    refuse_impossible(peak_, reading_reach_);
+    const auto tell = [this](Channel channel, const ChannelReading& reading) {
+      peak_.readings[static_cast<std::size_t>(channel)] =
+          reading.status(first_t_ns_, record_.duration_s());
+    };
+    tell(Channel::kPrimarySpeed, omega_p_);
+    tell(Channel::kSecondarySpeed, omega_s_);
+    tell(Channel::kSecondaryPressure, pressure_);
+    tell(Channel::kTorque, torque_);
+    return concluded_ = true;
+  }
+
   Cell cell_of(const VariatorSample& sample) const noexcept {
     const double sign = chain_.point().sign;
     return {
@@ -431,10 +440,12 @@ class RobustEstimator final : public SlipCurveEstimator {
     peak_.omega_s_rad_s = omega_s_at(record_.duration_s());
   }
 
-  bool contradictory(const PeakFitResult& fit) const noexcept {
-    return record_.torque_stepped_s() < record_.torque_counts_until_s() ||
-           pressure_.has_stepped() || omega_p_.has_stepped() || omega_s_.has_stepped() ||
-           after_stop_.swung_back() ||
+  bool contradictory(const PeakFitResult& fit) noexcept {
+    if (record_.torque_stepped_s() < record_.torque_counts_until_s()) {
+      torque_.take_step(record_.torque_stepped_s());
+    }
+    return torque_.has_stepped() || pressure_.has_stepped() || omega_p_.has_stepped() ||
+           omega_s_.has_stepped() || after_stop_.swung_back() ||
            (fit.valid && follow_on_.stood_still(fit.mu, traction_, inertia_kg_m2_)) ||
            fit.below_chord > kChordDeviations || fit.residuals.innovation > kInManyLooks ||
            fit.residuals.runs > kRuns;

@@ -62,9 +62,9 @@ daemon::Duration BusView::slowest_stale() const {
 
 double BusView::value(Role role) const {
   const daemon::SignalObservation seen = pipeline_.signal(role);
-  const bool usable = seen.seen && (seen.quality == daemon::SignalQuality::kValid ||
-                                    seen.quality == daemon::SignalQuality::kLearning ||
-                                    seen.quality == daemon::SignalQuality::kFrozen);
+  const bool usable = seen.seen && (seen.status.verdict == estimator::ReadingVerdict::kValid ||
+                                    seen.status.verdict == estimator::ReadingVerdict::kLearning ||
+                                    seen.status.verdict == estimator::ReadingVerdict::kFrozen);
   return usable ? seen.value : kNaN;
 }
 

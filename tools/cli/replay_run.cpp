@@ -140,8 +140,9 @@ class Sink final : public daemon::SampleSink {
     std::string roles;
     for (std::size_t i = 0; i < daemon::kRoleCount; ++i) {
       const auto role = static_cast<daemon::Role>(i);
-      const daemon::SignalQuality quality = pipeline_.signal(role).quality;
-      if (quality != daemon::SignalQuality::kStale && quality != daemon::SignalQuality::kFrozen) {
+      const estimator::ReadingVerdict verdict = pipeline_.signal(role).status.verdict;
+      if (verdict != estimator::ReadingVerdict::kStale &&
+          verdict != estimator::ReadingVerdict::kFrozen) {
         continue;
       }
       roles += (roles.empty() ? "" : ", ") + std::string(daemon::role_name(role));
@@ -452,6 +453,21 @@ void interval(text::JsonWriter& json, bool known, double low, double high) {
   }
 }
 
+// The readings that are not what they should be.
+void doubted(text::JsonWriter& json, const estimator::ReadingStatuses& readings) {
+  json.key("doubted").begin_array();
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    if (!estimator::is_doubtful(readings[i].verdict)) continue;
+    json.begin_object()
+        .field("channel", estimator::kChannels[i])
+        .field("verdict", estimator::verdict_text(readings[i].verdict))
+        .key("since_s")
+        .raw(text::seconds_text(readings[i].since_ns))
+        .end_object();
+  }
+  json.end_array();
+}
+
 }  // namespace
 
 std::string experiment_lines(const ReplayResult& result, std::size_t from) {
@@ -485,8 +501,9 @@ std::string experiment_lines(const ReplayResult& result, std::size_t from) {
         .field("contradictory", e.peak.contradictory)
         .field("impossible", e.peak.impossible)
         .field("sigma_peak_percent", completed ? e.peak.sigma_peak_percent : text::kJsonNull)
-        .field("samples", e.samples)
-        .field("direction", text::snake_case(daemon::direction_name(e.direction)))
+        .field("samples", e.samples);
+    doubted(json, e.peak.readings);
+    json.field("direction", text::snake_case(daemon::direction_name(e.direction)))
         .field("ratio", text::snake_case(daemon::end_stop_name(e.end_stop)))
         .end_object();
     lines += json.take() + "\n";

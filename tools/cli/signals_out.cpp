@@ -65,7 +65,7 @@ void signal_values(const daemon::SampleReport& report, const daemon::Pipeline& p
   values.reserve(config.roles.size() + kColumns.size());
   for (const daemon::RoleBinding& binding : config.roles) {
     const daemon::SignalObservation seen = pipeline.signal(binding.role);
-    const bool live = seen.seen && seen.quality <= daemon::SignalQuality::kFrozen;
+    const bool live = seen.seen && seen.status.verdict <= estimator::ReadingVerdict::kFrozen;
     values.push_back(live ? seen.value : kNone);
   }
   const bool has_curve = report.in_experiment && report.curve.usable;

@@ -123,7 +123,8 @@ std::string status_text(const Json& status) {
   }
   for (const auto& [role, signal] : status.at("signals").items()) {
     line(role, number(signal.at("value"), "%.6g") + " " + signal.at("unit").get<std::string>() +
-                   ", " + signal.at("quality").get<std::string>() + ", " +
+                   ", " + signal.at("quality").get<std::string>() +
+                   number(signal.at("since_s"), " for %.3g s") + ", " +
                    number(signal.at("age_s"), "%.3f s old"));
   }
   for (const auto& [name, latency] : status.at("latency").items()) {

@@ -233,10 +233,12 @@ std::vector<Line> input_table(const View& view, int role_columns, int rows) {
     if (row.value && row.is_flag) value = *row.value > 0.5 ? "yes" : "no";
     if (row.value && !row.is_flag) value = format("%.4g %s", *row.value, row.unit.c_str());
     const std::string age = row.value ? format("%.2f", std::min(row.age_s, 99.99)) : "-";
+    const std::string trust =
+        row.good ? row.trust : row.trust + format(" %.1f s", std::min(row.trust_s, 999.9));
     lines.push_back({{format("%-*.*s %10.10s %5s %4.0f ", role_columns, role_columns,
                              short_role(row.role, role_columns).c_str(), value.c_str(), age.c_str(),
                              row.rate_Hz)},
-                     {row.trust, row.good ? Tone::kGood : Tone::kAlarm}});
+                     {trust, row.good ? Tone::kGood : Tone::kAlarm}});
   }
   const std::size_t hidden = view.inputs.size() + 1 - lines.size();
   if (hidden > 0) lines.back() = {{format("... and %zu more", hidden + 1), Tone::kDim}};

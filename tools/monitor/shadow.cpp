@@ -13,7 +13,7 @@ namespace {
 
 using daemon::MonoTime;
 using daemon::Role;
-using daemon::SignalQuality;
+using estimator::ReadingVerdict;
 
 }  // namespace
 
@@ -82,7 +82,7 @@ void Shadow::show(View& view, MonoTime now) const {
   for (std::size_t i = 0; i < daemon::kRoleCount; ++i) {
     const auto role = static_cast<Role>(i);
     const daemon::SignalObservation seen = pipeline_.signal(role);
-    if (seen.quality == SignalQuality::kUnbound) continue;
+    if (seen.status.verdict == ReadingVerdict::kUnbound) continue;
     InputRow row;
     row.role = role_name(role);
     row.is_flag = role_dimension(role) == can::Dimension::kNone;
@@ -91,8 +91,9 @@ void Shadow::show(View& view, MonoTime now) const {
     if (seen.seen) row.value = shown.value;
     row.age_s = seen.seen ? static_cast<double>((now - seen.t).ns()) * 1e-9 : 0.0;
     row.rate_Hz = rates_[i].per_second(now);
-    row.trust = daemon::quality_name(seen.quality);
-    row.good = seen.quality == SignalQuality::kValid;
+    row.trust = estimator::verdict_text(seen.status.verdict);
+    row.trust_s = daemon::seconds(now - MonoTime::of_ns(seen.status.since_ns));
+    row.good = seen.status.verdict == ReadingVerdict::kValid;
     view.inputs.push_back(std::move(row));
   }
 }

@@ -44,7 +44,8 @@ struct InputRow {
   bool is_flag = false;
   double age_s = 0.0;
   double rate_Hz = 0.0;
-  std::string trust;  // "valid", "stale", ...
+  std::string trust;     // "valid", "stale", ...
+  double trust_s = 0.0;  // so long it is so
   bool good = false;
 };
 

@@ -73,6 +73,7 @@ void add_inputs(JsonWriter& json, const View& view) {
         .field("age_s", each.value ? each.age_s : text::kJsonNull)
         .field("rate_Hz", each.rate_Hz)
         .field("trust", each.trust)
+        .field("trust_s", each.trust_s)
         .end_object();
   }
   json.end_object();

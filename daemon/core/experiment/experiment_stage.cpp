@@ -11,6 +11,8 @@
 
 namespace beltgrip::daemon {
 
+using estimator::ReadingVerdict;
+
 using estimator::PeakKind;
 using estimator::StopReason;
 using estimator::VariatorSample;
@@ -511,7 +513,7 @@ void ExperimentStage::stop(MonoTime t, const Stop& why, const Now& now) noexcept
   running_.omega_s_rad_s = sample.omega_s_rad_s;
   running_.torque_Nm = curve.torque_p_Nm;
   running_.clamp_force_N = curve.clamp_force_N;
-  const bool oil_known = channels.quality(Role::kOilTemperature) == SignalQuality::kValid;
+  const bool oil_known = channels.verdict(Role::kOilTemperature) == ReadingVerdict::kValid;
   running_.oil_degC = oil_known ? channels.history(Role::kOilTemperature).newest_value()
                                 : std::numeric_limits<double>::quiet_NaN();
 }

@@ -8,6 +8,8 @@
 
 namespace beltgrip::daemon {
 
+using estimator::ReadingVerdict;
+
 namespace {
 
 constexpr double kMissingPeriods = 10.0;
@@ -79,7 +81,7 @@ void InputMonitor::bind(const RoleBinding& binding) {
   Row& row = this->row(binding.role);
   bound_[bound_count_++] = static_cast<std::uint8_t>(binding.role);  // each role stands once
   row.binding = &binding;
-  row.quality = SignalQuality::kMissing;
+  row.verdict = ReadingVerdict::kMissing;
   row.is_flag = role_dimension(binding.role) == can::Dimension::kNone;
   row.has_range = binding.minimum < binding.maximum;
   const double spare = 1e-9 * std::max(std::abs(binding.minimum), std::abs(binding.maximum));
@@ -215,7 +217,7 @@ void InputMonitor::take(Row& row, std::span<const std::uint8_t> payload, std::ui
                         MonoTime t, FaultSet& faults) noexcept {
   const RoleBinding& binding = *row.binding;
   const bool another = row.by_group && row.source.value_or(source) != source;
-  if (another && row.own_source != source && row.quality != SignalQuality::kStale) return;
+  if (another && row.own_source != source && row.verdict != ReadingVerdict::kStale) return;
   // What a source is not followed for is no fault of the input.
   const auto refuse = [&](Fault fault) {
     if (!another) faults.raise(fault, t);
@@ -250,7 +252,7 @@ void InputMonitor::take(Row& row, std::span<const std::uint8_t> payload, std::ui
     row.gate.reset();
     row.course.reset();
     row.interval_count = 0;
-    row.quality = SignalQuality::kMissing;  // until update() has judged it
+    row.verdict = ReadingVerdict::kMissing;  // until update() has judged it
   }
   row.source = source;
   row.heard = t;
@@ -279,15 +281,15 @@ Duration InputMonitor::stale_limit(const Row& row) noexcept {
   return row.period ? stale_after(*row.period) : kLearningStale;
 }
 
-SignalQuality InputMonitor::judge(const Row& row, MonoTime t) const noexcept {
-  if (row.history.empty()) return SignalQuality::kMissing;
-  if (t - row.heard > stale_limit(row)) return SignalQuality::kStale;
-  return row.period ? SignalQuality::kValid : SignalQuality::kLearning;
+ReadingVerdict InputMonitor::judge(const Row& row, MonoTime t) const noexcept {
+  if (row.history.empty()) return ReadingVerdict::kMissing;
+  if (t - row.heard > stale_limit(row)) return ReadingVerdict::kStale;
+  return row.period ? ReadingVerdict::kValid : ReadingVerdict::kLearning;
 }
 
 bool InputMonitor::is_frozen(Motion& motion, const Row& row, const Row& other,
                              MonoTime t) noexcept {
-  if (row.quality != SignalQuality::kValid || other.quality != SignalQuality::kValid) {
+  if (row.verdict != ReadingVerdict::kValid || other.verdict != ReadingVerdict::kValid) {
     motion.known = false;
     return false;
   }
@@ -303,7 +305,7 @@ bool InputMonitor::is_frozen(Motion& motion, const Row& row, const Row& other,
 double InputMonitor::moved_since(Role role, MonoTime t) const noexcept {
   const Row& from = row(role);
   double then = 0.0;
-  if (from.quality != SignalQuality::kValid || !from.history.value_at(t, Duration{}, then))
+  if (from.verdict != ReadingVerdict::kValid || !from.history.value_at(t, Duration{}, then))
     return 0.0;
   const double moved = from.history.newest_value() - then;
   const double spare = kOtherDeviations * from.course.noise() + from.course.resolution();
@@ -334,7 +336,7 @@ bool InputMonitor::standstill_shows() const noexcept {
   constexpr std::array kWitnesses{Role::kPrimarySpeed, Role::kEngineSpeed};
   return std::any_of(kWitnesses.begin(), kWitnesses.end(), [this](Role role) {
     const Row& each = row(role);
-    if (each.quality != SignalQuality::kValid || !each.period) return false;
+    if (each.verdict != ReadingVerdict::kValid || !each.period) return false;
     const std::optional<Duration> after = each.course.shown_after(*each.period);
     return after && *after <= kStandstillShown;
   });
@@ -344,9 +346,9 @@ void InputMonitor::watch_courses(MonoTime t) noexcept {
   std::array<bool, kWatched.size()> found{};
   for (std::size_t i = 0; i < kWatched.size(); ++i) {
     Row& each = row(kWatched[i]);
-    if (each.quality != SignalQuality::kValid) {
+    if (each.verdict != ReadingVerdict::kValid) {
       each.stands_since.reset();
-      if (each.quality != SignalQuality::kFrozen) each.course.reset();
+      if (each.verdict != ReadingVerdict::kFrozen) each.course.reset();
       continue;
     }
     // Until it moves again.
@@ -357,7 +359,7 @@ void InputMonitor::watch_courses(MonoTime t) noexcept {
   for (std::size_t i = 0; i < kWatched.size(); ++i) {
     Row& each = row(kWatched[i]);
     if (found[i]) each.stands_since = each.course.since();
-    if (each.stands_since) each.quality = SignalQuality::kFrozen;
+    if (each.stands_since) each.verdict = ReadingVerdict::kFrozen;
   }
 }
 
@@ -365,37 +367,40 @@ void InputMonitor::update(MonoTime t, FaultSet& faults) noexcept {
   if (!began_) began_ = t;
   for (const std::uint8_t i : bound()) {
     Row& each = rows_[i];
-    each.quality = judge(each, t);
+    each.verdict = judge(each, t);
     // Intervals from before a message stopped say nothing of its period.
-    if (each.quality == SignalQuality::kStale && each.learns) each.interval_count = 0;
+    if (each.verdict == ReadingVerdict::kStale && each.learns) each.interval_count = 0;
   }
   Row& primary = row(Role::kPrimarySpeed);
   Row& secondary = row(Role::kSecondarySpeed);
   const bool primary_frozen = is_frozen(primary_motion_, primary, secondary, t);
   const bool secondary_frozen = is_frozen(secondary_motion_, secondary, primary, t);
-  if (primary_frozen) primary.quality = SignalQuality::kFrozen;
-  if (secondary_frozen) secondary.quality = SignalQuality::kFrozen;
+  if (primary_frozen) primary.verdict = ReadingVerdict::kFrozen;
+  if (secondary_frozen) secondary.verdict = ReadingVerdict::kFrozen;
   watch_courses(t);
-  if (row(Role::kEngineSpeed).quality == SignalQuality::kFrozen) {
+  if (row(Role::kEngineSpeed).verdict == ReadingVerdict::kFrozen) {
     faults.raise(Fault::kInputFrozen, t);
   }
   // What comes next need not go on from there.
   for (const std::uint8_t i : bound()) {
-    if (rows_[i].quality != SignalQuality::kValid) rows_[i].gate.reset();
+    Row& each = rows_[i];
+    if (each.verdict != ReadingVerdict::kValid) each.gate.reset();
+    if (each.verdict != each.verdict_before) each.verdict_since = t;
+    each.verdict_before = each.verdict;
   }
 
   for (const Role role : required()) {
     const Row& now = row(role);
-    switch (now.quality) {
-      case SignalQuality::kMissing:
+    switch (now.verdict) {
+      case ReadingVerdict::kMissing:
         if (t - *began_ >= scaled(now.period.value_or(kPeriodAssumed), kMissingPeriods)) {
           faults.raise(Fault::kInputMissing, t);
         }
         break;
-      case SignalQuality::kStale:
+      case ReadingVerdict::kStale:
         faults.raise(Fault::kInputStale, t);
         break;
-      case SignalQuality::kFrozen:
+      case ReadingVerdict::kFrozen:
         faults.raise(Fault::kInputFrozen, t);
         break;
       default:
@@ -404,9 +409,19 @@ void InputMonitor::update(MonoTime t, FaultSet& faults) noexcept {
   }
 }
 
+estimator::ReadingStatus InputMonitor::status(Role role) const noexcept {
+  const Row& from = row(role);
+  estimator::ReadingStatus status = from.gate.status();
+  const bool tested = std::isfinite(status.test_ratio);
+  if (!tested && !from.history.empty()) status.value = from.history.newest_value();
+  status.verdict = from.verdict;
+  status.since_ns = from.verdict_since.ns();
+  return status;
+}
+
 double InputMonitor::value_or(Role role, double otherwise, bool& fresh) const noexcept {
   if (!is_bound(role)) return otherwise;
-  fresh = fresh && quality(role) == SignalQuality::kValid;
+  fresh = fresh && verdict(role) == ReadingVerdict::kValid;
   return history(role).empty() ? otherwise : history(role).newest_value();
 }
 
@@ -418,7 +433,7 @@ double InputMonitor::value_if_known(Role role) const noexcept {
 
 bool InputMonitor::all_valid() const noexcept {
   return std::all_of(required().begin(), required().end(),
-                     [&](Role role) { return quality(role) == SignalQuality::kValid; });
+                     [&](Role role) { return verdict(role) == ReadingVerdict::kValid; });
 }
 
 bool InputMonitor::suspect() const noexcept {
@@ -428,16 +443,16 @@ bool InputMonitor::suspect() const noexcept {
 }
 
 bool InputMonitor::any_lost() const noexcept {
-  return quality(Role::kEngineSpeed) == SignalQuality::kFrozen ||
+  return verdict(Role::kEngineSpeed) == ReadingVerdict::kFrozen ||
          std::any_of(required().begin(), required().end(), [&](Role role) {
-           const SignalQuality now = quality(role);
-           return now == SignalQuality::kStale || now == SignalQuality::kFrozen;
+           const ReadingVerdict now = verdict(role);
+           return now == ReadingVerdict::kStale || now == ReadingVerdict::kFrozen;
          });
 }
 
 std::optional<Role> InputMonitor::frozen() const noexcept {
   for (const Role role : kWatched) {
-    if (quality(role) == SignalQuality::kFrozen || row(role).stands_since) return role;
+    if (verdict(role) == ReadingVerdict::kFrozen || row(role).stands_since) return role;
   }
   return std::nullopt;
 }
@@ -452,7 +467,7 @@ Stop InputMonitor::lost(MonoTime t) const noexcept {
              .role = role}};
   }
   for (const Role role : required()) {
-    if (quality(role) != SignalQuality::kStale) continue;
+    if (verdict(role) != ReadingVerdict::kStale) continue;
     return {StopReason::kInputs,
             {.what = "silent for",
              .figure = seconds(t - row(role).heard),

@@ -33,17 +33,9 @@
 #include "daemon/core/input/stop_cause.h"
 #include "daemon/core/input/uds_client.h"
 #include "daemon/core/input/value_course.h"
+#include "estimator/method/reading_status.h"
 
 namespace beltgrip::daemon {
-
-enum class SignalQuality : std::uint8_t {  // by severity
-  kValid,
-  kLearning,  // its period is not known yet
-  kFrozen,    // it stands still where a live one would have moved
-  kStale,
-  kMissing,  // never seen
-  kUnbound   // the configuration has no signal for the role
-};
 
 enum class FrameUse : std::uint8_t { kForeign, kTaken, kBad };
 
@@ -69,11 +61,13 @@ class InputMonitor {
   // after which an input that never came counts as missing.
   void update(MonoTime t, FaultSet& faults) noexcept;
 
-  SignalQuality quality(Role role) const noexcept { return row(role).quality; }
+  estimator::ReadingVerdict verdict(Role role) const noexcept { return row(role).verdict; }
+  // Of the newest value heard; tested are those whose spikes are left out (spike_gate.h).
+  estimator::ReadingStatus status(Role role) const noexcept;
   bool is_bound(Role role) const noexcept { return row(role).binding != nullptr; }
   const SignalHistory& history(Role role) const noexcept { return row(role).history; }
   // The newest value; `otherwise` where the configuration has no such role, or none has come. fresh
-  // falls where the role is bound and its quality is not kValid.
+  // falls where the role is bound and its verdict is not kValid.
   double value_or(Role role, double otherwise, bool& fresh) const noexcept;
   double value_if_known(Role role) const noexcept;  // 0: it is not
   // Of the signal's own frames: configured, from the DBC, or learned; nothing until then. Learned,
@@ -127,7 +121,9 @@ class InputMonitor {
     bool is_watched = false;
     ValueCourse course;
     std::optional<MonoTime> stands_since;  // it has been found to stand still, since then
-    SignalQuality quality = SignalQuality::kUnbound;
+    estimator::ReadingVerdict verdict = estimator::ReadingVerdict::kUnbound;
+    estimator::ReadingVerdict verdict_before = estimator::ReadingVerdict::kUnbound;
+    MonoTime verdict_since = MonoTime::origin();
     std::optional<Duration> period;
     Duration delay = Duration::zero();
     bool learns = false;
@@ -166,7 +162,7 @@ class InputMonitor {
             FaultSet& faults) noexcept;
   void learn(Row& row, MonoTime t) noexcept;
   static Duration stale_limit(const Row& row) noexcept;
-  SignalQuality judge(const Row& row, MonoTime t) const noexcept;
+  estimator::ReadingVerdict judge(const Row& row, MonoTime t) const noexcept;
   static bool is_frozen(Motion& motion, const Row& row, const Row& other, MonoTime t) noexcept;
   double moved_since(Role role, MonoTime t) const noexcept;
   double should_have_moved(Role role, MonoTime t) const noexcept;

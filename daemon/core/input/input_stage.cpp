@@ -6,6 +6,8 @@
 
 namespace beltgrip::daemon {
 
+using estimator::ReadingVerdict;
+
 using estimator::StopReason;
 
 namespace {
@@ -103,7 +105,7 @@ bool InputStage::usable_again(MonoTime t) const noexcept {
 Stop InputStage::missing_condition() const noexcept {
   for (const Role role : {Role::kExperimentPermitted, Role::kLockupClosed, Role::kBrakePressed,
                           Role::kAcceleratorPedal, Role::kOilTemperature}) {
-    if (!monitor_.is_bound(role) || monitor_.quality(role) == SignalQuality::kValid) continue;
+    if (!monitor_.is_bound(role) || monitor_.verdict(role) == ReadingVerdict::kValid) continue;
     return {StopReason::kInputs, {.what = "silent", .role = role}};
   }
   return {StopReason::kInputs, {}};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace beltgrip::daemon {
 
@@ -20,6 +21,16 @@ void SpikeGate::reset() noexcept {
   filled_ = left_out_ = 0;
   furthest_ = 0.0;
   usual_ = learned_ = 0.0;
+  bound_ = 0.0;
+}
+
+estimator::ReadingStatus SpikeGate::status() const noexcept {
+  if (bound_ <= 0.0) return {};
+  // The mean distance of what is normally distributed is sqrt(2 / pi) of its deviation.
+  return {.value = value_,
+          .expected = expected_,
+          .variance = 0.5 * std::numbers::pi * usual_ * usual_,
+          .test_ratio = std::abs(value_ - expected_) / bound_};
 }
 
 // Least squares.
@@ -43,15 +54,19 @@ void SpikeGate::push(double value) noexcept {
 }
 
 SpikeGate::Verdict SpikeGate::judge(double value, std::size_t most) noexcept {
+  bound_ = 0.0;
   if (filled_ < kLine) {
     push(value);
     return Verdict::kTaken;
   }
   const double steps = static_cast<double>(left_out_ + 1);
-  const double distance = std::abs(value - ahead(steps));
+  value_ = value;
+  expected_ = ahead(steps);
+  const double distance = std::abs(value - expected_);
   // The line grows less certain with every value that is missing.
   const double bound = std::max({kTimesUsual * usual_, kSteps * step_, kShare * std::abs(value)}) *
                        (1.0 + kPerMissing * (steps - 1.0));
+  if (learned_ >= kEnough) bound_ = bound;
   if (learned_ >= kEnough && distance > bound) {
     if (left_out_ < most) {
       ++left_out_;

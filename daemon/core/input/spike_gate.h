@@ -11,6 +11,8 @@
 #include <array>
 #include <cstddef>
 
+#include "estimator/method/reading_status.h"
+
 namespace beltgrip::daemon {
 
 class SpikeGate {
@@ -24,6 +26,8 @@ class SpikeGate {
   // kTakenAfterSpike: what was left out before it was more than noise now and then is.
   // most: how many values in a row may be left out.
   Verdict judge(double value, std::size_t most) noexcept;
+  // Of the last value; its verdict is for others to give.
+  estimator::ReadingStatus status() const noexcept;
 
  private:
   static constexpr std::size_t kLine = 5;
@@ -37,6 +41,9 @@ class SpikeGate {
   double furthest_ = 0.0;     // of those left out, in bounds
   double usual_ = 0.0;        // distance from the line, mean
   double learned_ = 0.0;      // values that it rests on
+  // Of the last value.
+  double value_ = 0.0, expected_ = 0.0;
+  double bound_ = 0.0;  // of their distance; 0: not tested
 };
 
 }  // namespace beltgrip::daemon

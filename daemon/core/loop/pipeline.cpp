@@ -277,7 +277,7 @@ std::size_t Pipeline::bus_count() const noexcept { return parts_->config.further
 SignalObservation Pipeline::signal(Role role) const noexcept {
   const InputMonitor& channels = parts_->input.channels();
   const SignalHistory& history = channels.history(role);
-  SignalObservation seen{.quality = channels.quality(role), .seen = !history.empty()};
+  SignalObservation seen{.status = channels.status(role), .seen = !history.empty()};
   if (seen.seen) {
     seen.value = history.newest_value();
     seen.t = history.newest();

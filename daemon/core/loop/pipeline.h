@@ -22,9 +22,9 @@
 
 namespace beltgrip::daemon {
 
-// The newest value of a role, as received.
+// The newest value of a role that was taken, and what is known of the reading.
 struct SignalObservation {
-  SignalQuality quality = SignalQuality::kUnbound;
+  estimator::ReadingStatus status;
   bool seen = false;
   double value = 0.0;               // SI
   MonoTime t = MonoTime::origin();  // its stamp

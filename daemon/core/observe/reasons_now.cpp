@@ -8,19 +8,19 @@
 
 namespace beltgrip::daemon {
 
+using estimator::ReadingVerdict;
+using estimator::verdict_text;
+
 namespace {
 
-constexpr std::array<std::string_view, 6> kQualities{"valid", "learning", "frozen",
-                                                     "stale", "missing",  "unbound"};
-
-// Roles that a test of their quality takes, each followed by that quality where it is asked for.
-std::string roles_with(const Signals& signals, auto&& takes, bool says_quality) {
+// Roles that a test of their verdict takes, each followed by that verdict where it is asked for.
+std::string roles_with(const Signals& signals, auto&& takes, bool says_verdict) {
   std::string text;
   for (std::size_t i = 0; i < kRoleCount; ++i) {
-    const SignalQuality quality = signals[i].quality;
-    if (!takes(quality)) continue;
+    const ReadingVerdict verdict = signals[i].status.verdict;
+    if (!takes(verdict)) continue;
     text += (text.empty() ? "" : ", ") + std::string(role_name(static_cast<Role>(i)));
-    if (says_quality) text += " " + std::string(quality_name(quality));
+    if (says_verdict) text += " " + std::string(verdict_text(verdict));
   }
   return text;
 }
@@ -67,22 +67,13 @@ Signals signals_of(const Pipeline& pipeline) {
   return signals;
 }
 
-std::string_view quality_name(SignalQuality quality) {
-  return kQualities.at(static_cast<std::size_t>(quality));
-}
-
 std::string figure_of(Inhibit inhibit, const Config& config, const SampleReport& report,
                       const Signals& signals) {
   const auto of = [&](Role role) { return signals[static_cast<std::size_t>(role)]; };
   const ExperimentSettings limits = begins_within(config);
   switch (inhibit) {
     case Inhibit::kInputs: {
-      const std::string lost = roles_with(
-          signals,
-          [](SignalQuality each) {
-            return each != SignalQuality::kValid && each != SignalQuality::kUnbound;
-          },
-          true);
+      const std::string lost = roles_with(signals, estimator::is_doubtful, true);
       return lost.empty() ? belt_unread(config, signals) : lost;
     }
     case Inhibit::kFault:
@@ -119,17 +110,18 @@ std::string figure_of(Inhibit inhibit, const Config& config, const SampleReport&
 }
 
 std::string figure_of(Fault fault, const SampleReport& report, const Signals& signals) {
-  const auto those = [&](SignalQuality quality) {
+  const auto those = [&](ReadingVerdict verdict) {
     return roles_with(
-        signals, [&](SignalQuality each) { return each == quality; }, false);
+        signals, [&](ReadingVerdict each) { return each == verdict; }, false);
   };
   switch (fault) {
     case Fault::kInputMissing:
-      return those(SignalQuality::kMissing);
+      return those(ReadingVerdict::kMissing);
     case Fault::kInputStale:
-      return those(SignalQuality::kStale);
+      return those(ReadingVerdict::kStale);
     case Fault::kInputFrozen:
-      return report.frozen ? std::string(role_name(*report.frozen)) : those(SignalQuality::kFrozen);
+      return report.frozen ? std::string(role_name(*report.frozen))
+                           : those(ReadingVerdict::kFrozen);
     case Fault::kForeignSender:
       return report.foreign_identifier != 0 ? format("0x%X", report.foreign_identifier) : "";
     default:

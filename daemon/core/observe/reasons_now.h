@@ -16,7 +16,6 @@ namespace beltgrip::daemon {
 
 using Signals = std::array<SignalObservation, kRoleCount>;
 Signals signals_of(const Pipeline& pipeline);
-std::string_view quality_name(SignalQuality quality);
 
 // Empty where the inputs tell none.
 std::string figure_of(Inhibit inhibit, const Config& config, const SampleReport& report,

@@ -12,6 +12,7 @@ namespace beltgrip::daemon {
 
 namespace {
 
+using estimator::ReadingVerdict;
 using estimator::StopReason;
 
 struct InhibitRow {
@@ -244,9 +245,28 @@ bool has_bound(const ExperimentResult& result) {
          result.peak.kind == estimator::PeakKind::kLowerBound && result.peak.mu_max > 0.0;
 }
 
+namespace {
+
+// The channel whose reading is as this verdict says, and since when; empty: none is.
+std::string reading_that(ReadingVerdict verdict, const char* does, const ExperimentResult& result) {
+  for (std::size_t i = 0; i < result.peak.readings.size(); ++i) {
+    const estimator::ReadingStatus& reading = result.peak.readings[i];
+    if (reading.verdict != verdict) continue;
+    const Duration after = MonoTime::of_ns(reading.since_ns) - result.start;
+    return std::string(estimator::kChannels[i]) + " " + does +
+           format(", %.2f s after the experiment began", seconds(after));
+  }
+  return "";
+}
+
+}  // namespace
+
 std::string why_no_value(const ExperimentResult& result, const std::string& lost) {
   if (result.peak.impossible) return why_impossible(result.peak.mu_refused);
   if (result.peak.contradictory) {
+    const std::string stepped =
+        reading_that(ReadingVerdict::kStepped, "went to another level by itself", result);
+    if (!stepped.empty()) return "its points lie on no one friction curve: " + stepped;
     return "its points lie on no one friction curve; is the piston area, the spring or the "
            "centrifugal term wrong?";
   }
@@ -257,7 +277,10 @@ std::string why_no_value(const ExperimentResult& result, const std::string& lost
              "the torque wrong, or the ratio off its stop?";
     case StopReason::kInputs:
       if (result.outcome == Outcome::kAborted && !lost.empty()) return lost + " was lost";
-      return "an input was lost, stood still, or read what cannot be";
+      {
+        const std::string still = reading_that(ReadingVerdict::kFrozen, "stood still", result);
+        return still.empty() ? "an input was lost, stood still, or read what cannot be" : still;
+      }
     case StopReason::kTorque:
       return "the torque went to zero or changed its sign";
     default:

@@ -16,6 +16,8 @@
 #include "tests/daemon/test_vehicle.h"
 
 namespace beltgrip::daemon {
+
+using estimator::ReadingVerdict;
 namespace {
 
 int connect_to(const std::string& folder) {
@@ -90,10 +92,16 @@ TEST(StatusJson, SaysWhatIsKnownAndNullForTheRest) {
   observation.report.curve.usable = true;  // but the sample is not
   observation.report.curve.mu_star = 0.1;
   SignalObservation& speed = observation.signals[static_cast<std::size_t>(Role::kPrimarySpeed)];
-  speed = {
-      .quality = SignalQuality::kStale, .seen = true, .value = 105.0, .t = MonoTime{8 * kSecond}};
+  speed = {.status = {.verdict = ReadingVerdict::kStale,
+                      .since_ns = (6 * kSecond).ns(),
+                      .expected = 104.5,
+                      .variance = 0.25,
+                      .test_ratio = 0.4},
+           .seen = true,
+           .value = 105.0,
+           .t = MonoTime{8 * kSecond}};
   SignalObservation& torque = observation.signals[static_cast<std::size_t>(Role::kEngineTorque)];
-  torque.quality = SignalQuality::kMissing;
+  torque.status.verdict = ReadingVerdict::kMissing;
   observation.loop.wake_up.add(Duration::of_ns(100'000));
   auto status = nlohmann::json::parse(status_json(Config{}, MonoTime{10 * kSecond}, observation));
   EXPECT_EQ(status.at("state"), "Ramping");
@@ -103,6 +111,11 @@ TEST(StatusJson, SaysWhatIsKnownAndNullForTheRest) {
   EXPECT_EQ(status.at("age_s"), 1.0);
   EXPECT_EQ(status.at("signals").at("primary_speed").at("age_s"), 2.0);
   EXPECT_EQ(status.at("signals").at("primary_speed").at("unit"), "rad/s");
+  EXPECT_EQ(status.at("signals").at("primary_speed").at("since_s"), 4.0);
+  EXPECT_EQ(status.at("signals").at("primary_speed").at("expected"), 104.5);
+  EXPECT_EQ(status.at("signals").at("primary_speed").at("deviation"), 0.5);
+  EXPECT_EQ(status.at("signals").at("primary_speed").at("test_ratio"), 0.4);
+  EXPECT_EQ(status.at("signals").at("engine_torque").at("test_ratio"), nullptr);
   EXPECT_EQ(status.at("signals").at("engine_torque").at("value"), nullptr);
   EXPECT_FALSE(status.at("signals").contains("oil_temperature")) << "has no signal";
   EXPECT_EQ(status.at("latency").at("wake_up").at("max_us"), 100.0);

@@ -26,7 +26,7 @@ void follow_level(ChannelReading& channel, int samples) {
 TEST(ChannelReading, WhatMovesIsTrusted) {
   ChannelReading channel(kRate_hz);
   follow_live(channel, 200);
-  EXPECT_EQ(channel.verdict(), ReadingVerdict::kTrusted);
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kValid);
   EXPECT_TRUE(channel.moves());
   EXPECT_TRUE(std::isinf(channel.stepped_s()));
 }
@@ -35,17 +35,17 @@ TEST(ChannelReading, WhatMovedAndStandsStillIsFrozenUntilItMovesAgain) {
   ChannelReading channel(kRate_hz);
   follow_live(channel, 200);
   follow_level(channel, 15);  // the first of them is a change
-  EXPECT_EQ(channel.verdict(), ReadingVerdict::kTrusted);
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kValid);
   follow_level(channel, 1);
   EXPECT_EQ(channel.verdict(), ReadingVerdict::kFrozen);
   channel.follow(100.5);
-  EXPECT_EQ(channel.verdict(), ReadingVerdict::kTrusted);
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kValid);
 }
 
 TEST(ChannelReading, WhatNeverMovedIsSaidSoAfterFiveSeconds) {
   ChannelReading channel(kRate_hz);
   follow_level(channel, 500);
-  EXPECT_EQ(channel.verdict(), ReadingVerdict::kTrusted);
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kValid);
   follow_level(channel, 1);
   EXPECT_EQ(channel.verdict(), ReadingVerdict::kNeverMoved);
 }
@@ -54,7 +54,7 @@ TEST(ChannelReading, WhatIsComputedMayRest) {
   ChannelReading channel(kRate_hz, true);
   follow_live(channel, 200);
   follow_level(channel, 1000);
-  EXPECT_EQ(channel.verdict(), ReadingVerdict::kTrusted);
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kValid);
 }
 
 TEST(ChannelReading, AStepKeepsItsFirstTimeAlsoWhereItStandsStillThen) {
@@ -68,8 +68,42 @@ TEST(ChannelReading, AStepKeepsItsFirstTimeAlsoWhereItStandsStillThen) {
   EXPECT_EQ(channel.verdict(), ReadingVerdict::kFrozen);
   EXPECT_TRUE(channel.has_stepped());
   channel.reset();
-  EXPECT_EQ(channel.verdict(), ReadingVerdict::kTrusted);
+  EXPECT_EQ(channel.verdict(), ReadingVerdict::kValid);
   EXPECT_FALSE(channel.has_stepped());
+}
+
+TEST(ChannelReading, TheStatusSaysSinceWhen) {
+  ChannelReading channel(kRate_hz);
+  constexpr std::int64_t kBegin_ns = 7'000'000'000;
+  const auto since_s = [&](double now_s) {
+    return static_cast<double>(channel.status(kBegin_ns, now_s).since_ns - kBegin_ns) / 1e9;
+  };
+  follow_live(channel, 200);
+  EXPECT_EQ(channel.status(kBegin_ns, 2.0).verdict, ReadingVerdict::kValid);
+  EXPECT_EQ(channel.status(kBegin_ns, 2.0).value, live(199));
+  EXPECT_EQ(since_s(2.0), 0.0);
+  channel.take_step(1.25);
+  EXPECT_EQ(channel.status(kBegin_ns, 2.0).verdict, ReadingVerdict::kStepped);
+  EXPECT_EQ(since_s(2.0), 1.25);
+  follow_level(channel, 51);  // the first of them is a change
+  EXPECT_EQ(channel.status(kBegin_ns, 2.5).verdict, ReadingVerdict::kFrozen);
+  EXPECT_EQ(since_s(2.5), 2.0);
+}
+
+TEST(ChannelReading, TheStatusSaysWhatWasExpected) {
+  ChannelReading channel(kRate_hz);
+  const auto status_after = [&](double value) {
+    channel.follow(value);
+    channel.without_glitch(value, 0.01, 0.0);
+    return channel.status(0, 1.0);
+  };
+  EXPECT_TRUE(std::isnan(status_after(100.0).test_ratio)) << "no line yet";
+  for (int i = 0; i < 99; ++i) status_after(100.0);
+  const ReadingStatus glitch = status_after(104.0);
+  EXPECT_EQ(glitch.value, 104.0);
+  EXPECT_NEAR(glitch.expected, 100.0, 1e-9);
+  EXPECT_NEAR(glitch.test_ratio, 4.0, 1e-9);  // 4 of 1 % of 100
+  EXPECT_NEAR(status_after(100.5).test_ratio, 0.5, 1e-9);
 }
 
 // It is held for 50 ms; what stays where it went is true, and the channel has jumped.

@@ -12,6 +12,8 @@
 #include "tests/daemon/test_vehicle.h"
 
 namespace beltgrip::daemon {
+
+using estimator::ReadingVerdict;
 namespace {
 
 RxFrame at(MonoTime t, const can::CanFrame& frame) { return {.t = t, .frame = frame}; }
@@ -159,7 +161,7 @@ TEST(InputMonitor, J1939FollowsTheFirstSourceThatGivesAValueUntilItIsStale) {
   bench.from(0x0F, 20, MonoTime{2 * kMillisecond});
   EXPECT_EQ(bench.value(), 10.0);
   bench.monitor.update(MonoTime{100 * kMillisecond}, bench.faults);
-  ASSERT_EQ(bench.monitor.quality(Role::kEngineSpeed), SignalQuality::kStale);
+  ASSERT_EQ(bench.monitor.verdict(Role::kEngineSpeed), ReadingVerdict::kStale);
   bench.from(0x0F, 0xFF, MonoTime{101 * kMillisecond});  // not available: nothing to follow
   EXPECT_EQ(bench.value(), 10.0);
   bench.from(0x0F, 21, MonoTime{102 * kMillisecond});
@@ -329,20 +331,20 @@ TEST(InputMonitor, StaleAfterFiftyMillisecondsOrTwoAndAHalfPeriods) {
     Bench bench(
         one_signal(Role::kPrimarySpeed, signal_def(16, can::ValueType::kUnsigned), 8, period_ms));
     bench.monitor.update(MonoTime{}, bench.faults);
-    EXPECT_EQ(bench.monitor.quality(Role::kPrimarySpeed), SignalQuality::kMissing);
-    EXPECT_EQ(bench.monitor.quality(Role::kSecondarySpeed), SignalQuality::kUnbound);
+    EXPECT_EQ(bench.monitor.verdict(Role::kPrimarySpeed), ReadingVerdict::kMissing);
+    EXPECT_EQ(bench.monitor.verdict(Role::kSecondarySpeed), ReadingVerdict::kUnbound);
     bench.monitor.on_frame(at(MonoTime::of_ns(100), raw_frame(5)), bench.faults);
     const auto limit = Duration::of_ms(limit_ms);
     bench.monitor.update(MonoTime::of_ns(100) + limit, bench.faults);
-    EXPECT_EQ(bench.monitor.quality(Role::kPrimarySpeed), SignalQuality::kValid) << period_ms;
+    EXPECT_EQ(bench.monitor.verdict(Role::kPrimarySpeed), ReadingVerdict::kValid) << period_ms;
     EXPECT_FALSE(bench.faults.has(Fault::kInputStale));
     bench.monitor.update(MonoTime::of_ns(101) + limit, bench.faults);
-    EXPECT_EQ(bench.monitor.quality(Role::kPrimarySpeed), SignalQuality::kStale) << period_ms;
+    EXPECT_EQ(bench.monitor.verdict(Role::kPrimarySpeed), ReadingVerdict::kStale) << period_ms;
     EXPECT_TRUE(bench.faults.has(Fault::kInputStale));
     EXPECT_TRUE(bench.monitor.any_lost());
     bench.monitor.on_frame(at(MonoTime::of_ns(102) + limit, raw_frame(5)), bench.faults);
     bench.monitor.update(MonoTime::of_ns(102) + limit, bench.faults);
-    EXPECT_EQ(bench.monitor.quality(Role::kPrimarySpeed), SignalQuality::kValid);
+    EXPECT_EQ(bench.monitor.verdict(Role::kPrimarySpeed), ReadingVerdict::kValid);
   }
 }
 
@@ -367,15 +369,15 @@ TEST(InputMonitor, ThePeriodIsLearnedFromTheMiddleOfEightIntervals) {
     bench.monitor.on_frame(at(t, raw_frame(static_cast<std::uint64_t>(++frames))), bench.faults);
     bench.monitor.update(t, bench.faults);
     if (frames < 9) {
-      EXPECT_EQ(bench.monitor.quality(Role::kPrimarySpeed), SignalQuality::kLearning);
+      EXPECT_EQ(bench.monitor.verdict(Role::kPrimarySpeed), ReadingVerdict::kLearning);
     }
   }
   EXPECT_EQ(bench.monitor.period(Role::kPrimarySpeed), 40 * kMillisecond);
-  EXPECT_EQ(bench.monitor.quality(Role::kPrimarySpeed), SignalQuality::kValid);
+  EXPECT_EQ(bench.monitor.verdict(Role::kPrimarySpeed), ReadingVerdict::kValid);
   bench.monitor.update(t + 100 * kMillisecond, bench.faults);
-  EXPECT_EQ(bench.monitor.quality(Role::kPrimarySpeed), SignalQuality::kValid);
+  EXPECT_EQ(bench.monitor.verdict(Role::kPrimarySpeed), ReadingVerdict::kValid);
   bench.monitor.update(t + 101 * kMillisecond, bench.faults);
-  EXPECT_EQ(bench.monitor.quality(Role::kPrimarySpeed), SignalQuality::kStale);
+  EXPECT_EQ(bench.monitor.verdict(Role::kPrimarySpeed), ReadingVerdict::kStale);
 }
 
 TEST(InputMonitor, StampsThatRunBackwardsAreCountedAndHeldBack) {
@@ -405,8 +407,8 @@ struct Speeds {
     bench.monitor.on_frame(at(t, test::speeds_frame(primary, secondary)), bench.faults);
     bench.monitor.update(t, bench.faults);
   }
-  SignalQuality primary() const { return bench.monitor.quality(Role::kPrimarySpeed); }
-  SignalQuality secondary() const { return bench.monitor.quality(Role::kSecondarySpeed); }
+  ReadingVerdict primary() const { return bench.monitor.verdict(Role::kPrimarySpeed); }
+  ReadingVerdict secondary() const { return bench.monitor.verdict(Role::kSecondarySpeed); }
   Bench bench;
   MonoTime t{};
 };
@@ -414,31 +416,31 @@ struct Speeds {
 TEST(InputMonitor, ASpeedThatStandsStillWhileTheOtherMovesIsFrozen) {
   Speeds speeds;
   for (int i = 0; i < 100; ++i) speeds.drive(105.0 + 0.1 * (i % 3), 236.0 + 0.2 * (i % 5));
-  EXPECT_EQ(speeds.primary(), SignalQuality::kValid);
+  EXPECT_EQ(speeds.primary(), ReadingVerdict::kValid);
   MonoTime frozen_at{};
   const MonoTime from = speeds.t;
   for (int i = 0; i < 100 && frozen_at == MonoTime{}; ++i) {
     speeds.drive(105.0, 236.0 - 4.0 * i);  // gone down by 15 % after 9 steps
-    if (speeds.primary() == SignalQuality::kFrozen) frozen_at = speeds.t;
+    if (speeds.primary() == ReadingVerdict::kFrozen) frozen_at = speeds.t;
   }
   EXPECT_LE(frozen_at - from, 220 * kMillisecond);
-  EXPECT_EQ(speeds.secondary(), SignalQuality::kValid);
+  EXPECT_EQ(speeds.secondary(), ReadingVerdict::kValid);
   EXPECT_TRUE(speeds.bench.monitor.any_lost());
   EXPECT_TRUE(speeds.bench.faults.has(Fault::kInputFrozen));
   speeds.drive(105.5, 100.0);
-  EXPECT_EQ(speeds.primary(), SignalQuality::kValid);
+  EXPECT_EQ(speeds.primary(), ReadingVerdict::kValid);
 }
 
 TEST(InputMonitor, AConstantSpeedIsNotFrozenInAnExperiment) {
   Speeds speeds;  // a rig that holds the primary speed, while the belt slips by 12 %
   for (int i = 0; i < 500; ++i) {
     speeds.drive(105.0, 236.0 * (1.0 - 0.12 * i / 500.0));
-    ASSERT_EQ(speeds.primary(), SignalQuality::kValid) << i;
+    ASSERT_EQ(speeds.primary(), ReadingVerdict::kValid) << i;
   }
   Speeds standing;
   for (int i = 0; i < 500; ++i) {
     standing.drive(0.0, 0.0);
-    ASSERT_EQ(standing.primary(), SignalQuality::kValid) << i;
+    ASSERT_EQ(standing.primary(), ReadingVerdict::kValid) << i;
   }
 }
 
@@ -487,13 +489,40 @@ TEST_F(Spikes, AreLeftOutWhereverTheyGo) {
     for (int length = 1; length <= 3; ++length) {
       for (int i = 0; i < length; ++i) {
         ASSERT_NEAR(tell(spike * kSpeed), kSpeed, 1.0) << spike << " " << i;
-        ASSERT_EQ(bench_.monitor.quality(Role::kPrimarySpeed), SignalQuality::kValid);
+        ASSERT_EQ(bench_.monitor.verdict(Role::kPrimarySpeed), ReadingVerdict::kValid);
       }
       ASSERT_NEAR(tell(kSpeed), kSpeed, 1.0);
       EXPECT_TRUE(bench_.faults.has(Fault::kInputRange)) << spike;
       run_steady(20);
     }
   }
+}
+
+// Of the spike itself, though it is not taken; and since when the role is what it is.
+TEST_F(Spikes, TheStatusSaysWhatWasExpected) {
+  const auto status = [&] { return bench_.monitor.status(Role::kPrimarySpeed); };
+  EXPECT_EQ(status().verdict, ReadingVerdict::kMissing);
+  tell(kSpeed);
+  const std::int64_t begin_ns = t_.ns();
+  EXPECT_EQ(status().value, kSpeed);
+  EXPECT_TRUE(std::isnan(status().test_ratio));
+  run_steady(100);
+  EXPECT_EQ(status().verdict, ReadingVerdict::kValid);
+  EXPECT_EQ(status().since_ns, begin_ns);
+  EXPECT_LT(status().test_ratio, 1.0);
+  // Uniform over 1, rounded to 0.25; a line through five values lies off by as much again.
+  EXPECT_NEAR(std::sqrt(status().variance), std::sqrt(2.1 / 12.0), 0.15);
+  tell(1.5 * kSpeed);
+  EXPECT_EQ(status().value, 1.5 * kSpeed);
+  EXPECT_NEAR(status().expected, kSpeed, 2.0);
+  EXPECT_GT(status().test_ratio, 100.0);
+  t_ += kSecond;
+  bench_.monitor.update(t_, bench_.faults);
+  EXPECT_EQ(status().verdict, ReadingVerdict::kStale);
+  EXPECT_EQ(status().since_ns, t_.ns());
+  t_ += kSecond;
+  bench_.monitor.update(t_, bench_.faults);
+  EXPECT_EQ(status().since_ns, (t_ - kSecond).ns());
 }
 
 TEST_F(Spikes, WhatStaysIsFollowed) {

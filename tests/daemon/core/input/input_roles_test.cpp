@@ -12,6 +12,8 @@
 #include "daemon/core/input/input_monitor.h"
 
 namespace beltgrip::daemon {
+
+using estimator::ReadingVerdict;
 namespace {
 
 can::SignalDef signal_def(std::uint32_t length, double scale = 1.0, double offset = 0.0) {
@@ -64,8 +66,8 @@ constexpr can::CanId kId{0x100, false};
 
 TEST(Roles, WhatIsBoundIsMissingUntilItComes) {
   const Bench bench({bound(Role::kOilTemperature, kId)});
-  EXPECT_EQ(bench.monitor.quality(Role::kOilTemperature), SignalQuality::kMissing);
-  EXPECT_EQ(bench.monitor.quality(Role::kEngineSpeed), SignalQuality::kUnbound);
+  EXPECT_EQ(bench.monitor.verdict(Role::kOilTemperature), ReadingVerdict::kMissing);
+  EXPECT_EQ(bench.monitor.verdict(Role::kEngineSpeed), ReadingVerdict::kUnbound);
 }
 
 TEST(Roles, AnExperimentOfAnotherNeedsItsSignal) {
@@ -327,12 +329,12 @@ TEST_F(Learning, OfPagesTheLongestButOne) {
 
 TEST_F(Learning, IsStaleAfterASecondAndBeginsAnew) {
   tell({0, 40, 40, 40, 40, 40});
-  const auto quality_after = [&](Duration silence) {
+  const auto verdict_after = [&](Duration silence) {
     bench_->monitor.update(t_ + silence, bench_->faults);
-    return bench_->monitor.quality(Role::kPrimarySpeed);
+    return bench_->monitor.verdict(Role::kPrimarySpeed);
   };
-  EXPECT_EQ(quality_after(kSecond), SignalQuality::kLearning);
-  EXPECT_EQ(quality_after(kSecond + kNanosecond), SignalQuality::kStale);
+  EXPECT_EQ(verdict_after(kSecond), ReadingVerdict::kLearning);
+  EXPECT_EQ(verdict_after(kSecond + kNanosecond), ReadingVerdict::kStale);
   t_ += 2 * kSecond;
   tell({0, 20, 20, 20, 20, 20, 20});  // with the silence seven intervals
   EXPECT_FALSE(period());

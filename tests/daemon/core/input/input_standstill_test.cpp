@@ -11,6 +11,8 @@
 #include "daemon/core/input/input_monitor.h"
 
 namespace beltgrip::daemon {
+
+using estimator::ReadingVerdict;
 namespace {
 
 constexpr Duration kPeriod = 10 * kMillisecond;
@@ -64,7 +66,7 @@ class Bus {
     monitor.update(t_, faults);
   }
   MonoTime t() const { return t_; }
-  SignalQuality quality(std::size_t signal) const { return monitor.quality(kRoles[signal]); }
+  ReadingVerdict verdict(std::size_t signal) const { return monitor.verdict(kRoles[signal]); }
   bool heard(std::size_t signal) const {
     return !sent[signal].empty() && t_ - sent[signal].back().t <= kSilence;
   }
@@ -184,10 +186,10 @@ void drive(std::mt19937_64& random, Counts& counts) {
     std::optional<Role> first;
     for (std::size_t each = 0; each < kSignals; ++each) {
       if (found[each]) stands[each] = bus.course[each].since();
-      const SignalQuality expected = !bus.heard(each) ? SignalQuality::kStale
-                                     : stands[each]   ? SignalQuality::kFrozen
-                                                      : SignalQuality::kValid;
-      ASSERT_EQ(bus.quality(each), expected) << "signal " << each << ", sample " << i;
+      const ReadingVerdict expected = !bus.heard(each) ? ReadingVerdict::kStale
+                                      : stands[each]   ? ReadingVerdict::kFrozen
+                                                       : ReadingVerdict::kValid;
+      ASSERT_EQ(bus.verdict(each), expected) << "signal " << each << ", sample " << i;
       if (stands[each] && !first) first = kRoles[each];
       (stands[each] ? counts.frozen : counts.live) += 1;
     }
@@ -215,12 +217,12 @@ TEST(Standstill, IsSeenWhenAnotherAccountSeesIt) {
 class Speeds : public testing::Test {
  protected:
   // The primary at 105 rad/s, the secondary at this speed.
-  SignalQuality tell(double secondary_rad_s, bool secondary_comes = true) {
+  ReadingVerdict tell(double secondary_rad_s, bool secondary_comes = true) {
     bus_.tick();
     bus_.send(kPrimary, primary_rad_s_);
     if (secondary_comes) bus_.send(kSecondary, secondary_rad_s);
     bus_.update();
-    return bus_.quality(kPrimary);
+    return bus_.verdict(kPrimary);
   }
   Bus bus_;
   double primary_rad_s_ = 105.0;
@@ -242,11 +244,11 @@ TEST_F(Speeds, FifteenPercentAndAFifthOfASecond) {
     primary_rad_s_ = 105.0;
     tell(c.from_rad_s);
     for (int ms = 10; ms < 200; ms += 10) {
-      ASSERT_EQ(tell(c.to_rad_s), SignalQuality::kValid) << ms;
+      ASSERT_EQ(tell(c.to_rad_s), ReadingVerdict::kValid) << ms;
     }
-    EXPECT_EQ(tell(c.to_rad_s), c.frozen ? SignalQuality::kFrozen : SignalQuality::kValid)
+    EXPECT_EQ(tell(c.to_rad_s), c.frozen ? ReadingVerdict::kFrozen : ReadingVerdict::kValid)
         << c.from_rad_s << " " << c.to_rad_s;
-    EXPECT_EQ(bus_.quality(kSecondary), SignalQuality::kValid);
+    EXPECT_EQ(bus_.verdict(kSecondary), ReadingVerdict::kValid);
     if (!c.frozen) continue;
     tell(c.to_rad_s);
     tell(c.to_rad_s);
@@ -257,20 +259,20 @@ TEST_F(Speeds, FifteenPercentAndAFifthOfASecond) {
 // The other way round.
 TEST_F(Speeds, TheSecondaryAsWell) {
   for (int i = 0; i < 21; ++i) {
-    EXPECT_EQ(bus_.quality(kSecondary), i < 2 ? bus_.quality(kSecondary) : SignalQuality::kValid);
+    EXPECT_EQ(bus_.verdict(kSecondary), i < 2 ? bus_.verdict(kSecondary) : ReadingVerdict::kValid);
     primary_rad_s_ = i < 1 ? 105.0 : 125.0;
     tell(236.25);
   }
-  EXPECT_EQ(bus_.quality(kSecondary), SignalQuality::kFrozen);
-  EXPECT_EQ(bus_.quality(kPrimary), SignalQuality::kValid);
+  EXPECT_EQ(bus_.verdict(kSecondary), ReadingVerdict::kFrozen);
+  EXPECT_EQ(bus_.verdict(kPrimary), ReadingVerdict::kValid);
 }
 
 // What the other was before it fell silent says nothing of what it is now.
 TEST_F(Speeds, ASilenceOfTheOtherBeginsAnew) {
   tell(200.0);
-  for (int i = 0; i < 30; ++i) EXPECT_EQ(tell(200.0, false), SignalQuality::kValid);
-  ASSERT_EQ(bus_.quality(kSecondary), SignalQuality::kStale);
-  for (int i = 0; i < 50; ++i) EXPECT_EQ(tell(100.0), SignalQuality::kValid) << i;
+  for (int i = 0; i < 30; ++i) EXPECT_EQ(tell(200.0, false), ReadingVerdict::kValid);
+  ASSERT_EQ(bus_.verdict(kSecondary), ReadingVerdict::kStale);
+  for (int i = 0; i < 50; ++i) EXPECT_EQ(tell(100.0), ReadingVerdict::kValid) << i;
 }
 
 // --- what else has shown it, and what is then said ----------------------------------------------
@@ -287,7 +289,7 @@ TEST(Lost, WhatStandsStillIsNamedUntilItMoves) {
   bus.monitor.stands_still(Role::kSecondaryPressure);
   EXPECT_EQ(bus.monitor.frozen(), Role::kSecondaryPressure);  // at once
   for (int i = 0; i < 3; ++i) tell(5e5);
-  EXPECT_EQ(bus.quality(kPressure), SignalQuality::kFrozen);
+  EXPECT_EQ(bus.verdict(kPressure), ReadingVerdict::kFrozen);
   const Stop stop = bus.monitor.lost(bus.t());
   EXPECT_EQ(stop.reason, estimator::StopReason::kInputFrozen);
   EXPECT_STREQ(stop.cause.what, "stands still for");
@@ -295,7 +297,7 @@ TEST(Lost, WhatStandsStillIsNamedUntilItMoves) {
   EXPECT_STREQ(stop.cause.unit, "s");
   EXPECT_EQ(stop.cause.role, Role::kSecondaryPressure);
   tell(5.005e5);
-  EXPECT_EQ(bus.quality(kPressure), SignalQuality::kValid);
+  EXPECT_EQ(bus.verdict(kPressure), ReadingVerdict::kValid);
   EXPECT_EQ(bus.monitor.frozen(), std::nullopt);
 }
 

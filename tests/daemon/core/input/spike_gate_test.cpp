@@ -22,6 +22,7 @@ struct Rule {
   std::vector<double> away;  // left out, as shares of their bounds
   double usual = 0.0;
   int learned = 0;
+  double expected = 0.0, tested_by = 0.0;  // of the last value; 0: not tested
 
   // A straight line through the last five, by the slope between all pairs of them.
   double line_ahead(std::size_t steps) const {
@@ -35,16 +36,19 @@ struct Rule {
   }
 
   Verdict judge(double value, std::size_t most) {
+    tested_by = 0.0;
     if (course.size() < 5) {
       course.push_back(value);
       return Verdict::kTaken;
     }
     const std::size_t missing = away.size();
-    const double off = std::fabs(value - line_ahead(missing + 1));
+    expected = line_ahead(missing + 1);
+    const double off = std::fabs(value - expected);
     double bound = 5.5 * usual;
     bound = std::max(bound, 4.0 * step);
     bound = std::max(bound, 0.001 * std::fabs(value));
     bound += 0.25 * static_cast<double>(missing) * bound;
+    if (learned >= 30) tested_by = bound;
     if (learned >= 30 && off > bound) {
       if (missing < most) {
         away.push_back(off / bound);
@@ -74,7 +78,7 @@ TEST(SpikeGate, DoesWhatItsRuleSays) {
   std::mt19937 random(11);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> share(0.0, 1.0);
-  int seen[3] = {};
+  int seen[3] = {}, tested = 0;
   for (int run = 0; run < 2000; ++run) {
     // A tenth has no noise at all: the resolution or a thousandth of the value is the bound then.
     const double noise = run % 10 == 0 ? 0.0 : std::exp(4.0 * share(random) - 3.0);
@@ -101,10 +105,20 @@ TEST(SpikeGate, DoesWhatItsRuleSays) {
       }
       const Verdict wanted = rule.judge(value, most);
       ASSERT_EQ(gate.judge(value, most), wanted) << run << ' ' << i;
+      const estimator::ReadingStatus status = gate.status();
+      ASSERT_EQ(std::isfinite(status.test_ratio), rule.tested_by > 0.0) << run << ' ' << i;
+      if (rule.tested_by > 0.0) {
+        ++tested;
+        ASSERT_EQ(status.value, value);
+        ASSERT_NEAR(status.expected, rule.expected, 1e-9);
+        ASSERT_NEAR(status.test_ratio * rule.tested_by, std::fabs(value - rule.expected), 1e-8);
+        ASSERT_NEAR(std::sqrt(2.0 * status.variance / M_PI), rule.usual, 1e-9);
+      }
       ++seen[static_cast<int>(wanted)];
     }
   }
   for (const int each : seen) EXPECT_GT(each, 500);
+  EXPECT_GT(tested, 100'000);
 }
 
 // A level course with no noise, in steps of 1: 4 is the most that goes on from it.

@@ -12,6 +12,8 @@
 #include "daemon/core/loop/pipeline.h"
 
 namespace beltgrip::daemon {
+
+using estimator::ReadingVerdict;
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -421,11 +423,11 @@ TEST(UdsClient, TheSignalIsValidOnlyWhileAnswersCome) {
     }
     const SignalObservation seen = pipeline.signal(role);
     if (t >= MonoTime{kStep} && t < MonoTime{5 * kSecond}) {
-      ASSERT_EQ(seen.quality, SignalQuality::kValid) << t;
+      ASSERT_EQ(seen.status.verdict, ReadingVerdict::kValid) << t;
       ASSERT_EQ(seen.value, 500e3);
     }
     if (t > MonoTime{5 * kSecond + 130 * kMillisecond}) {
-      ASSERT_EQ(seen.quality, SignalQuality::kStale) << t;
+      ASSERT_EQ(seen.status.verdict, ReadingVerdict::kStale) << t;
     }
   }
   EXPECT_GT(requests, 100U);

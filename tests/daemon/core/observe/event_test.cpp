@@ -15,6 +15,8 @@
 #include "daemon/core/experiment/arming.h"
 
 namespace beltgrip::daemon {
+
+using estimator::ReadingVerdict;
 namespace {
 
 using estimator::PeakKind;
@@ -171,7 +173,7 @@ TEST(ReasonsNow, SayTheFigureBesideTheLimit) {
   config.experiment.primary_speed_min_rad_s = 100.0;
   SampleReport report;
   Signals signals{};
-  for (SignalObservation& each : signals) each.quality = SignalQuality::kUnbound;
+  for (SignalObservation& each : signals) each.status.verdict = ReadingVerdict::kUnbound;
   const auto now = [&] {
     std::vector<Reason> all;
     each_inhibit(config, report, signals, [&](Reason each) { all.push_back(std::move(each)); });
@@ -194,9 +196,10 @@ TEST(ReasonsNow, SayTheFigureBesideTheLimit) {
   EXPECT_EQ(figure(Inhibit::kOil), "35 degC, limit 40 degC");
   EXPECT_EQ(figure(Inhibit::kCooldown), "limits 60 s and 1000 m");
   signals[static_cast<std::size_t>(Role::kAcceleratorPedal)] = {
-      .quality = SignalQuality::kValid, .seen = true, .value = 0.125, .t = {}};
+      .status = {.verdict = ReadingVerdict::kValid}, .seen = true, .value = 0.125, .t = {}};
   EXPECT_EQ(figure(Inhibit::kPedal), "12.5 %, limit 2 %");
-  signals[static_cast<std::size_t>(Role::kSecondaryPressure)].quality = SignalQuality::kStale;
+  signals[static_cast<std::size_t>(Role::kSecondaryPressure)].status.verdict =
+      ReadingVerdict::kStale;
   EXPECT_EQ(figure(Inhibit::kInputs), "secondary_pressure stale");
   report.obstacle = {.what = "the ramp would last for", .figure = 18.0, .limit = 15.0, .unit = "s"};
   EXPECT_EQ(figure(Inhibit::kTime), "the ramp would last for 18 s, limit 15 s");

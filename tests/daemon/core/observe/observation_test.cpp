@@ -14,6 +14,8 @@
 #include "tests/daemon/test_vehicle.h"
 
 namespace beltgrip::daemon {
+
+using estimator::ReadingVerdict;
 namespace {
 
 struct Pair {
@@ -127,12 +129,12 @@ TEST(Observation, ShowsSignalsCountersAndState) {
   EXPECT_GT(meters.sample_to_frame.count(), 20U);
   EXPECT_EQ(meters.sample_to_frame.maximum(), Duration{});
   const SignalObservation& speed = seen.signals[static_cast<std::size_t>(Role::kPrimarySpeed)];
-  EXPECT_EQ(speed.quality, SignalQuality::kValid);
+  EXPECT_EQ(speed.status.verdict, ReadingVerdict::kValid);
   ASSERT_TRUE(speed.seen);
   EXPECT_LE(seen.t - speed.t, 50 * kMillisecond);
   EXPECT_NEAR(speed.value, seen.report.sample.omega_p_rad_s, 0.05 * speed.value);
   const SignalObservation& oil = seen.signals[static_cast<std::size_t>(Role::kOilTemperature)];
-  EXPECT_EQ(oil.quality, pipeline.signal(Role::kOilTemperature).quality);
+  EXPECT_EQ(oil.status.verdict, pipeline.signal(Role::kOilTemperature).status.verdict);
 }
 
 TEST(Observation, IsRareUnlessSomethingIsNews) {
