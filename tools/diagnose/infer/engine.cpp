@@ -143,7 +143,13 @@ class Descent {
     take_stand();
     return !ends;
   }
-  Optimum optimum() && { return std::move(best_); }
+  Optimum optimum() && {
+    if (with_fit()) {
+      best_.fit = fit_linear(best_.summaries, columns_, engine_.prior(parameters_, best_.state),
+                             best_.fit.scatter, 0);
+    }
+    return std::move(best_);
+  }
 
  private:
   bool with_fit() const { return scatter_iterations_ > 0; }
@@ -177,7 +183,7 @@ class Descent {
     best_.summaries = summaries_at(best_.state, at_, parameters_);
     if (with_fit()) {
       best_.fit = fit_linear(best_.summaries, columns_, engine_.prior(parameters_, best_.state),
-                             best_.fit.scatter, scatter_iterations_);
+                             best_.fit.scatter, scatter_iterations_, Wanted::kStep);
     }
     best_.objective = standing(best_.state, best_.summaries, best_.fit.scatter);
   }

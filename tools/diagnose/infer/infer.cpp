@@ -484,18 +484,35 @@ NormalEquations reduce(const std::vector<Summary>& summaries, const Picked& pick
   return out;
 }
 
+Eigen::LDLT<MatrixXd> decomposed(const NormalEquations& equations, const Prior& prior) {
+  const Index n = equations.total.cols() - 1;
+  MatrixXd information = equations.total.topLeftCorner(n, n);
+  information.diagonal() += prior.precision;
+  return Eigen::LDLT<MatrixXd>(information);
+}
+
+VectorXd step_of(const Eigen::LDLT<MatrixXd>& ldlt, const NormalEquations& equations,
+                 const Prior& prior) {
+  VectorXd right = -equations.total.topRightCorner(equations.total.cols() - 1, 1);
+  right += prior.precision.cwiseProduct(prior.pull);
+  return ldlt.solve(right);
+}
+
+// Of each column, its square by the inverse of what is decomposed, which is not needed for it.
+VectorXd squares_by_inverse(const Eigen::LDLT<MatrixXd>& ldlt, const MatrixXd& columns) {
+  MatrixXd roots = ldlt.transpositionsP() * columns;
+  ldlt.matrixL().solveInPlace(roots);
+  return roots.cwiseAbs2().transpose() * ldlt.vectorD().cwiseInverse();
+}
+
 Fit solve(const NormalEquations& equations, const Prior& prior, const Scatter& scatter,
           Wanted wanted) {
   const MatrixXd& total = equations.total;
   const Index n = total.cols() - 1;
-  MatrixXd information = total.topLeftCorner(n, n);
-  VectorXd right = -total.topRightCorner(n, 1);
-  information.diagonal() += prior.precision;
-  right += prior.precision.cwiseProduct(prior.pull);
-  const Eigen::LDLT<MatrixXd> ldlt(information);
+  const Eigen::LDLT<MatrixXd> ldlt = decomposed(equations, prior);
   Fit fit;
   fit.scatter = scatter;
-  fit.step = ldlt.solve(right);
+  fit.step = step_of(ldlt, equations, prior);
   if (wanted == Wanted::kCovariance) fit.covariance = ldlt.solve(MatrixXd::Identity(n, n));
   const VectorXd off = fit.step - prior.pull;
   VectorXd full(n + 1);
@@ -533,19 +550,21 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
     std::vector<RandomSquare> posterior(is_last ? 0 : runs);
     const NormalEquations equations =
         reduce(summaries, picked, scatter, is_last ? nullptr : &posterior);
-    Fit fit = solve(equations, prior, scatter, is_last ? wanted : Wanted::kCovariance);
-    if (is_last) return fit;
+    if (is_last) return solve(equations, prior, scatter, wanted);
+    const Eigen::LDLT<MatrixXd> ldlt = decomposed(equations, prior);
     VectorXd full(n + 1);
-    full << fit.step, 1.0;
+    full << step_of(ldlt, equations, prior), 1.0;
+    MatrixXd levers(n, kRandomEffects * static_cast<Index>(runs));
     Eigen::Array<double, kRandomEffects, 1> square =
         Eigen::Array<double, kRandomEffects, 1>::Zero();
     for (std::size_t e = 0; e < runs; ++e) {
       const Eigen::Matrix<double, kRandomEffects, 1> u = -posterior[e] * (picked.ua[e] * full);
-      const RandomRows lever = posterior[e] * picked.ua[e].leftCols(n);
-      const RandomRows spread = lever * fit.covariance;
-      square += u.array().square() + posterior[e].diagonal().array() +
-                spread.cwiseProduct(lever).rowwise().sum().array();
+      square += u.array().square() + posterior[e].diagonal().array();
+      levers.middleCols<kRandomEffects>(kRandomEffects * static_cast<Index>(e)) =
+          picked.ua[e].leftCols(n).transpose() * posterior[e];
     }
+    square +=
+        squares_by_inverse(ldlt, levers).reshaped(kRandomEffects, runs).rowwise().sum().array();
     const double count = std::max(1.0, static_cast<double>(runs));
     scatter.variance = scatter_variance(square / count, static_cast<double>(runs));
     scatter.variance = scatter.variance.min(kScatterCap * kScatterCap * usual.variance);
