@@ -560,11 +560,14 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
     for (std::size_t e = 0; e < runs; ++e) {
       const Eigen::Matrix<double, kRandomEffects, 1> u = -posterior[e] * (picked.ua[e] * full);
       square += u.array().square() + posterior[e].diagonal().array();
+      if (n == 0) continue;
       levers.middleCols<kRandomEffects>(kRandomEffects * static_cast<Index>(e)) =
           picked.ua[e].leftCols(n).transpose() * posterior[e];
     }
-    square +=
-        squares_by_inverse(ldlt, levers).reshaped(kRandomEffects, runs).rowwise().sum().array();
+    if (levers.size() > 0) {
+      square +=
+          squares_by_inverse(ldlt, levers).reshaped(kRandomEffects, runs).rowwise().sum().array();
+    }
     const double count = std::max(1.0, static_cast<double>(runs));
     scatter.variance = scatter_variance(square / count, static_cast<double>(runs));
     scatter.variance = scatter.variance.min(kScatterCap * kScatterCap * usual.variance);
