@@ -36,7 +36,7 @@ struct ReadingStatus {
   double test_ratio = kUnknown;
 };
 
-inline constexpr bool is_doubtful(ReadingVerdict verdict) noexcept {
+constexpr bool is_doubtful(ReadingVerdict verdict) noexcept {
   return verdict != ReadingVerdict::kValid && verdict != ReadingVerdict::kUnbound;
 }
 inline std::string_view verdict_text(ReadingVerdict verdict) {
