@@ -39,8 +39,11 @@ inline constexpr double kRequestSlipRate_1_s = 0.12;      // measured: a belt th
 inline constexpr double kRequestSlipRateFrom_share = 0.0075;
 // Beyond the peak, as it is estimated. Adhesive wear begins at a line of load and sliding speed;
 // the one hard point is 3 kN, 0.8 m/s, 0.5 kW for seconds (the paper).
-inline constexpr double kRequestEnergy_J =
-    60.0;  // with what is still to come; measured: < 100 then
+// With what is still to come; measured: < 100 then. At 75 J 83 and 86 of 98 peaks in reach come to
+// a value in lab and production noise (80 and 83), but 2 of 884 requests break the promise
+// (campaign
+// --seeds 6000 --from 1810001 --nothing-wrong --noise production: 151 and 111 J).
+inline constexpr double kRequestEnergy_J = 60.0;
 inline constexpr double kRequestPower_W = 400.0;           // chosen: 0.8 of the paper's point
 inline constexpr double kRequestFast_m_s = 0.4;            // chosen: half of what is promised
 inline constexpr double kRequestFast_s = 0.6;              // chosen, above it
