@@ -1,5 +1,10 @@
 // A reading that jumps for a few frames and comes back is none: it is held where its course was.
 // What stays away longer is true and passes. No shaft jumps: it has inertia. Real-time thread.
+//
+// The daemon's spike gate is another: it leaves out single frames before there are samples, so that
+// no guard of a request sees them. This one judges samples, whoever reads them, and says of a jump
+// that comes back within a fifth of a second that no value follows. Either one off, tests fail that
+// the other does not mend (tests/FIGURES.md).
 #pragma once
 
 #include <algorithm>
