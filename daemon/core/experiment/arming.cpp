@@ -25,7 +25,7 @@ constexpr double kPeakSlipLow_share = 0.035;
 // 0.102 beside it in tests/FIGURES.md; less refuses most of the peaks in reach, with more two of
 // the five drives of reachability.cpp slip.
 constexpr double kLeastFriction = 0.085;
-// What a fifth more or less of these numbers changes has not been measured.
+// What a fifth more or less of each number here changes: a table in tests/FIGURES.md.
 // Chosen: what is known may have worn, by more than the 3 % that the history tells.
 constexpr double kKnownLeast = 0.95;
 constexpr double kDetection_s = 0.03;  // derived: six samples, of filters and sampler
