@@ -24,10 +24,13 @@ constexpr double kFalseName = 0.005;
 constexpr double kFalseUnknown = 0.005;
 constexpr int kRefined = 9;           // candidates refitted per step
 constexpr std::size_t kFromAfar = 5;  // of these, from afar
-constexpr double kPlain = 2.0;        // times the threshold: no chance
-constexpr double kFar = 1000.0;       // gain of a candidate: the machine alone is far from the data
-constexpr double kGainMin = 4.0;      // chosen: of a candidate, two sigmas
-constexpr double kNearShare = 0.4;    // chosen, of the linear loss, between kNear and kNearMax
+// Of these, fitted before what the next have to reach is asked. Chosen, for any number of threads:
+// fewer keep fewer threads busy, more are fitted in vain.
+constexpr std::size_t kTogether = 4;
+constexpr double kPlain = 2.0;      // times the threshold: no chance
+constexpr double kFar = 1000.0;     // gain of a candidate: the machine alone is far from the data
+constexpr double kGainMin = 4.0;    // chosen: of a candidate, two sigmas
+constexpr double kNearShare = 0.4;  // chosen, of the linear loss, between kNear and kNearMax
 constexpr double kNearMax = 400.0;
 // Of the log evidence. Derived: e^-40 is a fiftieth of the last bit of a double (2^-52 = e^-36), so
 // that what is less probable by so much adds nothing to a sum; a larger number adds nothing either.
@@ -643,16 +646,26 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
     const double in_curve_max = possible ? kInCurveMax : 2.0;
     const std::vector<int> candidates =
         candidates_of(engine, scores, in_curve_max, scattered, out.not_confirmed);
+    // What has less than the best by more than the odds of a class is no rival of it: a log
+    // evidence is no more than the log likelihood, the sizes only cost. Beside accepted effects it
+    // may be more once one of those has gone out (without_superfluous).
+    const auto worth_now = [&] {
+      return found && set.empty() ? std::max(worth, best.log_evidence - std::log(kClassOdds))
+                                  : worth;
+    };
     const auto consider_all = [&](bool from_afar) {
-      std::vector<std::optional<Hypothesis>> fits(candidates.size());
-      in_parallel(engine.jobs(), candidates.size(), [&](std::size_t i) {
-        if (!stop())
-          fits[i] = fitted(engine, scores, base, plus(set, candidates[i]),
-                           from_afar && i < kFromAfar, worth);
-      });
-      for (std::optional<Hypothesis>& fit : fits) {
-        if (!fit || fit->is_given_up()) continue;
-        consider(without_superfluous(engine, std::move(*fit), out.threshold));
+      for (std::size_t first = 0; first < candidates.size(); first += kTogether) {
+        std::vector<std::optional<Hypothesis>> fits(std::min(kTogether, candidates.size() - first));
+        const double reach = worth_now();
+        in_parallel(engine.jobs(), fits.size(), [&](std::size_t i) {
+          if (stop()) return;
+          fits[i] = fitted(engine, scores, base, plus(set, candidates[first + i]),
+                           from_afar && first + i < kFromAfar, reach);
+        });
+        for (std::optional<Hypothesis>& fit : fits) {
+          if (!fit || fit->is_given_up()) continue;
+          consider(without_superfluous(engine, std::move(*fit), out.threshold));
+        }
       }
     };
     consider_all(far);
