@@ -451,17 +451,24 @@ void Engine::fit_machine() {
   };
   // The same measure for every start: no weights, scatter between experiments counted.
   const Whitening plain = identity_whitening(campaign_);
+  const auto information_of = [&](const Optimum& at) {
+    const auto n = static_cast<Index>(nuisances_.size());
+    MatrixXd out = MatrixXd::Identity(n, n);
+    for (const Summary& each : at.summaries) out += each.aa.topLeftCorner(n, n);
+    return out;
+  };
   const auto measure = [&](Attempt& attempt) {
     const Optimum at =
         minimise(coarse_.back(), nuisances_, attempt.last, plain, default_scatter(), 0, 0);
-    const auto n = static_cast<Index>(nuisances_.size());
     attempt.objective = at.objective;
-    attempt.information = MatrixXd::Identity(n, n);
-    for (const Summary& each : at.summaries) attempt.information += each.aa.topLeftCorner(n, n);
+    attempt.information = information_of(at);
   };
-  const auto is_same_place = [&](const Attempt& a, const Attempt& b) {
-    const VectorXd apart = prior(nuisances_, a.last).pull - prior(nuisances_, b.last).pull;
-    return apart.dot(a.information * apart) < kSamePlace * kSamePlace;
+  const auto is_again = [&](const std::vector<Attempt*>& among, const Attempt& attempt) {
+    return std::any_of(among.begin(), among.end(), [&](const Attempt* other) {
+      const VectorXd apart =
+          prior(nuisances_, other->last).pull - prior(nuisances_, attempt.last).pull;
+      return apart.dot(other->information * apart) < kSamePlace * kSamePlace;
+    });
   };
   constexpr std::array kPeaks{0.012, 0.02, 0.035};
   // From the coarsest look, where only what is usual holds the machine, and from one that the data
@@ -469,39 +476,47 @@ void Engine::fit_machine() {
   constexpr std::array<std::size_t, 2> kFirstLooks{0, 2};
   std::array<Attempt, kPeaks.size() * kFirstLooks.size()> attempts;
   for (std::size_t i = 0; i < attempts.size(); ++i) {
-    Attempt& attempt = attempts[i];
     const double peak = kPeaks[i % kPeaks.size()];
-    ModelState state = start;
-    state.nuisance[kLnMuMax] = ln_mu_seen;
-    state.nuisance[kLnPeakSlipOverdrive] = std::log(peak);
-    state.nuisance[kLnPeakSlipLow] = std::log(1.4 * peak);
-    attempt.first = state;
+    ModelState& first = attempts[i].first;
+    first = start;
+    first.nuisance[kLnMuMax] = ln_mu_seen;
+    first.nuisance[kLnPeakSlipOverdrive] = std::log(peak);
+    first.nuisance[kLnPeakSlipLow] = std::log(1.4 * peak);
+    attempts[i].last = first;
     // To the sharp one: far from the optimum every misfit is beyond all noise.
-    Whitening& whitening = attempt.whitening;
-    whitening = identity_whitening(campaign_);
-    for (std::size_t look = 0; look < coarse_.size(); ++look) {
-      if (look >= kFirstLooks[i / kPeaks.size()]) {
-        state =
-            minimise(coarse_[look], nuisances_, state, whitening, default_scatter(), 8, 0).state;
-        reweigh(coarse_[look], state, whitening);
-      }
-      attempt.way.push_back(state);
-    }
-    attempt.last = state;
-    measure(attempt);
+    attempts[i].whitening = identity_whitening(campaign_);
   }
-  // What lies behind here does not come first there, and what has come to the same place goes on as
-  // one.
-  const auto most =
-      std::max_element(attempts.begin(), attempts.end(), [](const Attempt& a, const Attempt& b) {
-        return a.objective < b.objective;
-      })->objective;
+  // What has come to the same place goes on as one.
+  std::vector<Attempt*> going;
+  for (std::size_t look = 0; look < coarse_.size(); ++look) {
+    for (std::size_t i = 0; i < attempts.size(); ++i) {
+      if (kFirstLooks[i / kPeaks.size()] != look) continue;
+      attempts[i].way.assign(look, attempts[i].first);
+      going.push_back(&attempts[i]);
+    }
+    std::vector<Attempt*> apart;
+    for (Attempt* const attempt : going) {
+      const Optimum at = minimise(coarse_[look], nuisances_, attempt->last, attempt->whitening,
+                                  default_scatter(), 8, 0);
+      attempt->last = at.state;
+      attempt->information = information_of(at);
+      if (is_again(apart, *attempt)) continue;
+      reweigh(coarse_[look], attempt->last, attempt->whitening);
+      attempt->way.push_back(attempt->last);
+      apart.push_back(attempt);
+    }
+    going = std::move(apart);
+  }
+  for (Attempt* const attempt : going) measure(*attempt);
+  // What lies behind here does not come first there.
+  const double most =
+      (*std::max_element(going.begin(), going.end(), [](const Attempt* a, const Attempt* b) {
+        return a->objective < b->objective;
+      }))->objective;
   std::vector<Attempt*> finalists;
-  for (Attempt& attempt : attempts) {
-    const bool is_again =
-        std::any_of(finalists.begin(), finalists.end(),
-                    [&](const Attempt* other) { return is_same_place(*other, attempt); });
-    if (!(attempt.objective < most - kBehind) && !is_again) finalists.push_back(&attempt);
+  for (Attempt* const attempt : going) {
+    const bool is_behind = attempt->objective < most - kBehind;
+    if (!is_behind && !is_again(finalists, *attempt)) finalists.push_back(attempt);
   }
   for (Attempt* const attempt : finalists) {
     for (const int iterations : {8, 6}) {
