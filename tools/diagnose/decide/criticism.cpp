@@ -135,10 +135,10 @@ Criticism criticise(const Engine& engine, Steps steps) {
       {"belt_passage", belt_line(engine.campaign(), out.belt_Hz), kBeltLine},
       {"whiteness", fine ? decades(least_whiteness(engine)) : 0.0, decades(kWhiteness)},
       {"scatter_friction", ratio.friction, kScatterFriction},
-      {"scatter_ratio", ratio.ratio, kScatterRatio},
+      {"scatter_ratio", ratio.ratio, out.base.from_replicates ? kScatterRatio : kUnusualRatio},
       {"scatter_torque", ratio.torque, kScatterTorque},
-      {"unusual_scatter", std::max({unusual.friction, unusual.ratio, unusual.torque}),
-       kUnusualScatter},
+      {"unusual_scatter", std::max(unusual.friction, unusual.torque), kUnusualScatter},
+      {"unusual_ratio", unusual.ratio, kUnusualRatio},
       {"unusual_friction", unusual.friction, kUnusualFriction},
   };
   return out;
@@ -181,7 +181,7 @@ bool may_be_scatter(const Cell& cell, const Criticism& criticism, bool has_balan
     case Injection::kTorque:
       return any || fails("scatter_torque");
     case Injection::kRatio:
-      return any || fails("scatter_ratio");
+      return fails("scatter_ratio") || fails("unusual_ratio");
   }
   return false;
 }
@@ -218,7 +218,7 @@ Unexplained what_is_left(const Criticism& criticism, bool has_balance) {
   }
   const bool scatters = fails("scatter_friction") || fails("scatter_ratio") ||
                         fails("scatter_torque") || fails("unusual_scatter") ||
-                        fails("unusual_friction");
+                        fails("unusual_ratio") || fails("unusual_friction");
   const bool stands_out = fails("law_cell") || fails("smooth_cell");
   if (!stands_out) {
     const auto found = std::find_if(
@@ -236,14 +236,15 @@ Unexplained what_is_left(const Criticism& criticism, bool has_balance) {
       return criticism.test(name).value / criticism.test(name).limit;
     };
     const double friction = std::max(over("scatter_friction"), over("unusual_friction"));
-    const double ratio = over("scatter_ratio"), torque = over("scatter_torque");
+    const double ratio = std::max(over("scatter_ratio"), over("unusual_ratio"));
+    const double torque = over("scatter_torque");
     out.acts_on = friction >= std::max(ratio, torque) ? "friction"
                   : ratio >= torque                   ? "ratio"
                                                       : "torque";
     out.kind = MisfitKind::kBetweenRuns;
     double times = criticism.test("scatter_" + out.acts_on).value;
-    if (out.acts_on == "friction")
-      times = std::max(times, criticism.test("unusual_friction").value);
+    if (out.acts_on != "torque")
+      times = std::max(times, criticism.test("unusual_" + out.acts_on).value);
     out.share = std::max(0.0, 1.0 - 1.0 / std::max(times * times, 1.0));
   } else {
     out.acts_on = "friction";
