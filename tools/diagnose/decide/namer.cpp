@@ -67,6 +67,9 @@ constexpr double kOfNoise = 0.5;
 constexpr double kDisagreement = 0.05;   // p of a size that experiments do not agree on
 constexpr double kLeftOutMin = 0.0;      // of the log predictive density
 constexpr double kLeftOutPlain = 200.0;  // the same: beyond doubt, however few experiments show it
+// The same at the lower end of its interval over the experiments, nats. Derived: odds of 20 to 1,
+// as of levels left out.
+constexpr double kLeftOutSure = 3.0;
 // Chosen, times the threshold: sums of exponential variables have heavier tails than the normal.
 constexpr double kRippleTail = 3.0;
 
@@ -166,10 +169,14 @@ bool is_beyond_holding(const Engine& engine, int slot, double size) {
          std::abs(size) >= half_step(engine.campaign(), which);
 }
 
+bool is_of_consequence(const Engine& engine, int slot, double size) {
+  const double typical = engine.campaign().slots[static_cast<std::size_t>(slot)].row->typical;
+  return std::abs(size) > kOfConsequence * typical;
+}
+
 // Far below the usual size it has to stand out by more. ln_odds: that it is there.
 bool is_worth_a_name(const Engine& engine, int slot, double size, double ln_odds) {
-  const double typical = engine.campaign().slots[static_cast<std::size_t>(slot)].row->typical;
-  return std::abs(size) > kOfConsequence * typical || ln_odds > kSmallLnOdds;
+  return is_of_consequence(engine, slot, size) || ln_odds > kSmallLnOdds;
 }
 
 // A size that no machine has is one where the data do not hold the fit; no tilt shows at one
@@ -495,8 +502,14 @@ void drop_unconfirmed(Engine& engine, Naming& naming) {
     // bent any more counts as much.
     const bool straightened =
         !Engine::curve_is_possible(naming.sharp.state) && Engine::curve_is_possible(whole.state);
+    // What is small beside the scatter of each signal shows in none of them, and all the same in
+    // all at once; of no consequence, it has to show in one. Where all experiments are the same
+    // ramp, each stands in the others, with all that the machine misses: nothing is left out.
+    const bool is_sure = gain.density && gain.density->low > kLeftOutSure &&
+                         is_of_consequence(engine, slot, whole.state.effects[slot]) &&
+                         !repeats_one(engine.campaign());
     // What shows in one or two experiments only is not beyond the chance of drawing them.
-    const bool helps = gain.better() || straightened || density > kLeftOutPlain;
+    const bool helps = gain.better() || straightened || is_sure || density > kLeftOutPlain;
     // One signal may be predicted a little worse where all at once are predicted better, beyond the
     // chance of drawing the experiments.
     const bool on_the_whole = gain.density && gain.density->low > 0.0;
