@@ -35,10 +35,10 @@ struct DiagnoseOptions {
 
 bool is_table(const std::string& path) { return path.ends_with(".csv"); }
 
-daemon::Config load(const DiagnoseOptions& options) {
+daemon::ConfigResult load(const DiagnoseOptions& options) {
   const bool tables = std::all_of(options.logs.begin(), options.logs.end(), is_table) &&
                       std::all_of(options.held_out.begin(), options.held_out.end(), is_table);
-  const daemon::ConfigResult result = daemon::load_config(
+  daemon::ConfigResult result = daemon::load_config(
       options.config, tables ? daemon::ConfigScope::kVariator : daemon::ConfigScope::kSignals);
   for (const std::string& warning : result.warnings) text::warn(warning);
   if (!result.config) {
@@ -47,7 +47,7 @@ daemon::Config load(const DiagnoseOptions& options) {
     }
     throw Failure{result.exit_code(), result.errors.back().text};
   }
-  return *result.config;
+  return result;
 }
 
 diagnose::SignalTable read(const std::string& path, const daemon::Config& config) {
@@ -114,7 +114,8 @@ void show_progress(double share, const std::string& what) {
 
 void run_diagnose(const DiagnoseOptions& options) {
   end_in_good_order();
-  const daemon::Config config = load(options);
+  const daemon::ConfigResult loaded = load(options);
+  const daemon::Config& config = *loaded.config;
   diagnose::Request request;
   daemon::ModelFile before = diagnose::nominal_model(config.variator);
   if (!options.model.empty()) {
@@ -125,6 +126,7 @@ void run_diagnose(const DiagnoseOptions& options) {
     }
   }
   request.model = before;
+  request.accuracies = loaded.stated;
   request.is_model_given = !options.model.empty();
   Inputs inputs(options.logs);
   inputs.add(options.held_out);

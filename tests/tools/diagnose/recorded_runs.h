@@ -11,14 +11,14 @@
 namespace beltgrip::diagnose {
 
 // Told the inertia that the generator's machine has, and nothing else of it.
-inline Campaign campaign_of(const blind::Trial& trial) {
+inline Campaign campaign_of(const blind::Trial& trial, const Accuracies& accuracies = {}) {
   estimator::VariatorParameters variator;
   variator.primary_inertia_kg_m2 = trial.machine.primary_inertia_kg_m2;
   std::vector<ExperimentData> runs;
   for (const std::string& text : blind::record(trial).csv) {
     runs.push_back(prepare(parse_csv(text, "run.csv"), variator));
   }
-  return make_campaign(std::move(runs), nominal_model(variator));
+  return make_campaign(std::move(runs), nominal_model(variator), accuracies);
 }
 
 }  // namespace beltgrip::diagnose

@@ -17,6 +17,9 @@ namespace beltgrip::diagnose {
 enum EndStopIndex : int { kOverdriveStop = 0, kLowStop = 1, kNoStop = -1 };
 inline constexpr int kStops = 2;
 
+// One sigma of constant errors of the channels, by role, where somebody stated it; else 0.
+using Accuracies = std::array<estimator::ChannelAccuracy, daemon::kRoleCount>;
+
 // A channel on the grid; NaN where the channel has no data.
 struct GridSignal {
   Eigen::ArrayXd value;

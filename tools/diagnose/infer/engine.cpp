@@ -323,7 +323,8 @@ double leaves(const Campaign& campaign, const ModelState& state) {
 
 }  // namespace
 
-Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model) {
+Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model,
+                       const Accuracies& accuracies) {
   Campaign out;
   out.runs = std::move(runs);
   out.variator = model.variator;
@@ -335,6 +336,11 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model)
   if (const auto ripple = model.effects.find("speed_ripple"); ripple != model.effects.end()) {
     out.known_ripples = ripple->second.parameters;
   }
+  const auto gain_of = [&](Role role) { return accuracies[static_cast<std::size_t>(role)].gain; };
+  out.nuisances[kSecondaryTorqueGain].tolerance = std::hypot(
+      gain_of(Role::kSecondaryTorque),
+      gain_of(out.runs.size() > 0 && out.runs[0].torque_is_engine ? Role::kEngineTorque
+                                                                  : Role::kPrimaryTorque));
   for (const ExperimentData& run : out.runs) {
     out.has_balance |= run.valid_count > 0 && run.torque_s.present;
     out.has_tracking |= run.valid_count > 0 && run.command.present;
@@ -362,6 +368,8 @@ Engine::Engine(Campaign campaign, int jobs) : jobs_(jobs), campaign_(std::move(c
     const bool is_secondary =
         i == kSecondaryInertia_kgm2 || i == kSecondaryLoss_Nm || i == kSecondaryLossPerSpeed_Nms;
     if (is_secondary && !campaign_.has_balance) continue;
+    const bool is_known = campaign_.nuisances[kSecondaryTorqueGain].tolerance == 0.0;
+    if (i == kSecondaryTorqueGain && (is_known || !campaign_.has_balance)) continue;
     if ((i == kCommandGain || i == kCommandOffset_Pa) && !campaign_.has_tracking) continue;
     nuisances_.push_back(i);
   }
@@ -848,8 +856,8 @@ void Engine::move(const std::vector<int>& parameters, const VectorXd& step, doub
       value += by;
       // The data hold it far better than the usual values do: without a bound any drag would be the
       // machine's own, and what it explains would be no gain.
-      if (parameters[j] == kLossPerkN_Nm) {
-        const NuisanceRow& row = campaign_.nuisances[kLossPerkN_Nm];
+      if (parameters[j] == kLossPerkN_Nm || parameters[j] == kSecondaryTorqueGain) {
+        const NuisanceRow& row = campaign_.nuisances[static_cast<std::size_t>(parameters[j])];
         value = std::clamp(value, row.nominal - kReach * row.tolerance,
                            row.nominal + kReach * row.tolerance);
       }

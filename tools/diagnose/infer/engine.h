@@ -186,6 +186,7 @@ class Engine {
   Remembered<ModelState> far_states_{kFarStatesKept};
 };
 
-Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model);
+Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model,
+                       const Accuracies& accuracies = {});
 
 }  // namespace beltgrip::diagnose

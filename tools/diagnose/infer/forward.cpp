@@ -112,7 +112,7 @@ ArrayXd grip_of(const ExperimentData& data, const Quantities& q) {
 // With everything that the free shaft does not decide taken from q.
 Pass integrate(const ExperimentData& data, const Quantities& q, const ArrayXd& measured_grip,
                const std::array<CurveShape, kStops>& curve, double inertia_kg_m2,
-               double configured_inertia_kg_m2) {
+               double configured_inertia_kg_m2, double secondary_torque_gain) {
   const int n = data.size();
   const bool secondary = !data.torque_is_engine;
   Pass out{ArrayXd::Zero(n), ArrayXd::Zero(n), std::vector<bool>(data.valid.size(), false)};
@@ -126,7 +126,8 @@ Pass integrate(const ExperimentData& data, const Quantities& q, const ArrayXd& m
     if (!secondary) {
       by.torque_Nm = q.belt_torque[k] + configured_inertia_kg_m2 * data.omega_p.slope[k];
     } else if (data.torque_s.present) {
-      by.torque_Nm = -data.torque_s.value[k] - q.secondary_loss_Nm[k];
+      by.torque_Nm =
+          -data.torque_s.value[k] / (1.0 + secondary_torque_gain) - q.secondary_loss_Nm[k];
     } else {
       by.torque_Nm = inertia_kg_m2 * following(k) - q.belt_torque[k] / q.ratio[k];
     }
@@ -203,7 +204,7 @@ Forward run_forward(const Campaign& campaign, int run, const ModelState& state) 
     const Quantities q = quantities(campaign, simulated, run, state);
     if (pass == 0) measured_grip = grip_of(data, q);
     last = integrate(simulated, q, measured_grip, shapes(state.nuisance, q), inertia_kg_m2,
-                     campaign.variator.primary_inertia_kg_m2);
+                     campaign.variator.primary_inertia_kg_m2, state.nuisance[kSecondaryTorqueGain]);
     const ArrayXd& modelled = secondary ? q.omega_s : q.omega_p;
     double change = last.grips == out.grips ? 0.0 : 1.0;
     for (int k = 0; k < data.size(); ++k) {
@@ -241,8 +242,10 @@ Forward run_forward(const Campaign& campaign, int run, const ModelState& state) 
   } else if (!secondary && data.torque_s.present) {
     const Quantities q = quantities(campaign, simulated, run, state);
     add("secondary_torque", data.torque_s.value,
-        last.belt_torque / q.ratio -
-            state.nuisance[kSecondaryInertia_kgm2] * data.omega_s.slow_slope - q.secondary_loss_Nm);
+        (1.0 + state.nuisance[kSecondaryTorqueGain]) *
+            (last.belt_torque / q.ratio -
+             state.nuisance[kSecondaryInertia_kgm2] * data.omega_s.slow_slope -
+             q.secondary_loss_Nm));
   }
   return out;
 }

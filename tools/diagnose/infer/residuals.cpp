@@ -312,6 +312,8 @@ std::optional<QuantityChange> known_change(const ExperimentData& data, const Res
       return balance_change(-at.measured.ratio);
     case kSecondaryLossPerSpeed_Nms:
       return balance_change(-at.measured.ratio * at.measured.omega_s);
+    case kSecondaryTorqueGain:  // by the torque of the foot point: no noise in a regressor
+      return balance_change(at.clean_Nm);
     default:
       return std::nullopt;
   }

@@ -32,6 +32,9 @@ Named to_file(int index, double value) {
   }
 }
 
+// No part of the machine that a model file describes.
+bool is_of_sensor(int index) { return index == kSecondaryTorqueGain; }
+
 }  // namespace
 
 ModelFile nominal_model(const estimator::VariatorParameters& variator) {
@@ -39,6 +42,7 @@ ModelFile nominal_model(const estimator::VariatorParameters& variator) {
   out.variator = variator;
   const NuisanceTable table = default_nuisances();
   for (int i = 0; i < kNuisanceCount; ++i) {
+    if (is_of_sensor(i)) continue;
     const Named named = to_file(i, table[static_cast<std::size_t>(i)].nominal);
     (daemon::is_friction_key(named.name) ? out.friction : out.driveline)[named.name] = named.value;
   }
@@ -48,6 +52,7 @@ ModelFile nominal_model(const estimator::VariatorParameters& variator) {
 NuisanceTable nuisances_of(const ModelFile& model) {
   NuisanceTable table = default_nuisances();
   for (int i = 0; i < kNuisanceCount; ++i) {
+    if (is_of_sensor(i)) continue;
     auto& row = table[static_cast<std::size_t>(i)];
     const std::string name = to_file(i, row.nominal).name;
     const auto& section = daemon::is_friction_key(name) ? model.friction : model.driveline;
@@ -74,6 +79,7 @@ NuisanceTable nuisances_of(const ModelFile& model) {
 
 void store_machine(const Eigen::VectorXd& nuisance, ModelFile& model) {
   for (int i = 0; i < kNuisanceCount; ++i) {
+    if (is_of_sensor(i)) continue;
     const Named named = to_file(i, nuisance[i]);
     (daemon::is_friction_key(named.name) ? model.friction : model.driveline)[named.name] =
         named.value;

@@ -56,6 +56,7 @@ NuisanceTable default_nuisances() {
       {"secondary_inertia_kg_m2", 0.1, 0.3, 1e-3},
       {"secondary_loss_constant_Nm", 0.5, 0.6, 1e-2},
       {"secondary_loss_per_rad_s_Nm", 2e-3, 4e-3, 1e-4},
+      {"secondary_torque_gain", 0.0, 0.0, 1e-4},
       {"command_offset_Pa", 0.0, 1e5, 10.0},
       {"command_gain", 0.0, 0.1, 1e-4},
   }};
@@ -217,9 +218,10 @@ Unloaded unloaded_of(const ExperimentData& run, const estimator::VariatorParamet
 // the fast slope it would stand against a torque that no longer has what is fast, and what stands
 // behind the belt would be fitted to the noise of the speed's slope.
 ArrayXd balance_of(const ExperimentData& run, const Readings& read, const Context& c,
-                   const ArrayXd& ratio, double inertia_kg_m2) {
-  ArrayXd out = c.belt_torque + run.torque.slow - read.torque_Nm -
-                ratio * (run.torque_s.slow + inertia_kg_m2 * c.slope_s + c.secondary_loss_Nm);
+                   const ArrayXd& ratio, double inertia_kg_m2, double gain) {
+  ArrayXd out =
+      c.belt_torque + run.torque.slow - read.torque_Nm -
+      ratio * (run.torque_s.slow / (1.0 + gain) + inertia_kg_m2 * c.slope_s + c.secondary_loss_Nm);
   if (run.torque_is_engine) {
     out += c.variator.primary_inertia_kg_m2 * (run.omega_p.slope - run.omega_p.slow_slope);
   }
@@ -303,7 +305,8 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
     c.secondary_loss_Nm =
         nuisance[kSecondaryLoss_Nm] + nuisance[kSecondaryLossPerSpeed_Nms] * c.omega_s;
     apply(Stage::kSecondaryShaft);
-    q.balance = balance_of(run, read, c, ratio, nuisance[kSecondaryInertia_kgm2]);
+    q.balance = balance_of(run, read, c, ratio, nuisance[kSecondaryInertia_kgm2],
+                           nuisance[kSecondaryTorqueGain]);
     q.secondary_loss_Nm = std::move(c.secondary_loss_Nm);
   }
   if (run.command.present) {

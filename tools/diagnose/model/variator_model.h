@@ -4,7 +4,7 @@
 //   F_s = A p_s + F_spring + c omega_s^2          T_belt = T_p - J d(omega_p)/dt - loss
 //   sigma = 1 - omega_s / (omega_p r_g)           capacity K = 2 R_p F_s mu_max / cos(theta)
 //   T_belt = K g(sigma / sigma_peak)
-//   balance: T_belt - r_g (T_s + J_s d(omega_s)/dt + loss_s)
+//   balance: T_belt - r_g (T_s / (1 + gain_s) + J_s d(omega_s)/dt + loss_s)
 #pragma once
 
 #include <Eigen/Core>
@@ -48,7 +48,8 @@ enum Nuisance : int {
   kSecondaryInertia_kgm2,
   kSecondaryLoss_Nm,
   kSecondaryLossPerSpeed_Nms,
-  kCommandOffset_Pa,  // tracking residual only
+  kSecondaryTorqueGain,  // T_measured = (1 + gain) T_true, as far as the sensors' accuracies go
+  kCommandOffset_Pa,     // tracking residual only
   kCommandGain,
   kNuisanceCount
 };

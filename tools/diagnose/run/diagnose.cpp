@@ -83,7 +83,8 @@ class Run {
     }
     check_friction(runs, request_.model.variator, implausible_);
     progress(0.1, "fit");
-    Engine engine(make_campaign(std::move(runs), request_.model), request_.jobs);
+    Engine engine(make_campaign(std::move(runs), request_.model, request_.accuracies),
+                  request_.jobs);
     Naming naming = name_effects(engine, stop());
     progress(0.6, "tests");
     const Learning learning = criticise_and_learn(engine, naming);
@@ -530,7 +531,9 @@ class Run {
            low ? kLnPeakSlipLow : kLnPeakSlipOverdrive);
       if (low && uses_stop(engine, kOverdriveStop)) continue;
       tell("mu_max", peak.ln_mu,
-           std::hypot(peak.ln_mu_sigma, mu_of_class(engine, naming, peak, stop)), kLnMuMax);
+           std::hypot(peak.ln_mu_sigma, mu_of_class(engine, naming, peak, stop),
+                      mu_of_sensors(engine)),
+           kLnMuMax);
     }
   }
 
@@ -548,6 +551,24 @@ class Run {
       }
     }
     return std::sqrt(squares / weights);
+  }
+
+  // What torque and pressure may have it off by, as far as somebody stated their accuracies, one
+  // sigma: nothing in these data says more of them.
+  double mu_of_sensors(const Engine& engine) const {
+    const Campaign& campaign = engine.campaign();
+    const auto accuracy = [&](Role role) {
+      return request_.accuracies[static_cast<std::size_t>(role)];
+    };
+    const bool is_engine = campaign.runs[0].torque_is_engine;
+    const auto torque = accuracy(is_engine ? Role::kEngineTorque : Role::kPrimaryTorque);
+    const auto pressure = accuracy(Role::kSecondaryPressure);
+    const double torque_Nm = typical(engine, &ExperimentData::torque);
+    const double pressure_Pa = typical(engine, &ExperimentData::pressure);
+    const double area_m2 = campaign.variator.secondary_piston_area_m2;
+    const double by_pressure = area_m2 * std::hypot(pressure.bias, pressure.gain * pressure_Pa) /
+                               (area_m2 * pressure_Pa + campaign.variator.secondary_spring_force_N);
+    return std::hypot(torque.bias / torque_Nm, torque.gain, by_pressure);
   }
 
   void tell_machine(const std::string& name, const Interval& fitted, double of_model,

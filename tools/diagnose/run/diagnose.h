@@ -17,6 +17,7 @@ struct Request {
   std::vector<SignalTable> held_out;     // empty: experiments are held out in turn
   ModelFile model;
   bool is_model_given = false;  // else it is the usual machine
+  Accuracies accuracies{};      // what is known of the sensors'
   bool with_plots = false;
   int jobs = 1;                // threads; the answer is the same for every number
   std::function<bool()> stop;  // true: end with what is known

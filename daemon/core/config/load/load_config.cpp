@@ -48,6 +48,7 @@ class Loader {
   std::optional<std::uint8_t> bus_of(const std::string& key, const TomlNode& node);
   void read_model_file();
   void settle_sensors();
+  estimator::ChannelAccuracy accuracy(Role role) const;
 
   const TomlNode* section(std::string_view name) const { return section_of(root_, name); }
   bool has_role(Role role) const;
@@ -78,19 +79,20 @@ void Loader::load(ConfigScope scope) {
   std::sort(config_.roles.begin(), config_.roles.end(),
             [](const RoleBinding& a, const RoleBinding& b) { return a.role < b.role; });
   config_.estimator.torque_is_engine = !has_role(Role::kPrimaryTorque);
+  for (std::size_t i = 0; i < result_.stated.size(); ++i) {
+    result_.stated[i] = accuracy(static_cast<Role>(i));
+  }
   if (scope == ConfigScope::kAll) assume(root_, model_keys_, sensors_, config_);
   settle_sensors();
   result_.config = std::move(config_);
 }
 
+estimator::ChannelAccuracy Loader::accuracy(Role role) const {
+  const SensorText& text = sensors_[static_cast<std::size_t>(role)];
+  return {text.bias.value_or(0.0), text.gain.value_or(0.0)};
+}
+
 void Loader::settle_sensors() {
-  const auto accuracy = [&](Role role) {
-    const SensorText& text = sensors_[static_cast<std::size_t>(role)];
-    estimator::ChannelAccuracy out;
-    out.bias = text.bias.value_or(out.bias);
-    out.gain = text.gain.value_or(out.gain);
-    return out;
-  };
   config_.sensors = {
       accuracy(Role::kPrimarySpeed), accuracy(Role::kSecondarySpeed),
       accuracy(Role::kSecondaryPressure),

@@ -1,6 +1,7 @@
 // Reads the configuration and every file that it names. Start-up and tools only.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +16,8 @@ struct ConfigResult {
   std::optional<Config> config;       // set when errors is empty
   std::vector<ConfigError> errors;    // all of them
   std::vector<std::string> warnings;  // problems of the DBC files and the like, one line each
+  // What [sensors] states, by role; what it leaves out is 0.
+  std::array<estimator::ChannelAccuracy, kRoleCount> stated{};
 
   int exit_code() const { return errors.empty() ? 0 : errors.front().exit_code; }
 };

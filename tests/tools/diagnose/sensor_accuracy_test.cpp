@@ -1,0 +1,57 @@
+// Sensors are off by what somebody stated of them: that is no finding, and part of what mu_max is
+// known to. The recordings are the blind generator's.
+#include <gtest/gtest.h>
+
+#include "tests/tools/diagnose/recorded_runs.h"
+#include "tools/diagnose/decide/namer.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+struct Diagnosed {
+  std::vector<std::string> names;
+  double gain = 0.0;  // named, and the sensors' own
+};
+
+Diagnosed diagnosed(double torque_gain, double accuracy) {
+  blind::Trial trial;
+  trial.seed = 7;
+  blind::Random random(trial.seed);
+  trial.plan = blind::draw_plan(random, trial.machine.setting, 10);
+  trial.planted.push_back({"torque_gain", {{"gain", torque_gain}}, {}});
+  Accuracies accuracies{};
+  accuracies[static_cast<std::size_t>(Role::kPrimaryTorque)].gain = 0.6 * accuracy;
+  accuracies[static_cast<std::size_t>(Role::kSecondaryTorque)].gain = 0.8 * accuracy;
+  Engine engine(campaign_of(trial, accuracies));
+  const Naming naming = name_effects(engine, [] { return false; });
+  Diagnosed out;
+  out.gain = -naming.hypothesis.state.nuisance[kSecondaryTorqueGain];
+  for (const Accepted& each : naming.accepted) {
+    const Slot& slot = engine.campaign().slots[static_cast<std::size_t>(each.slot)];
+    out.names.emplace_back(slot.row->id);
+    if (slot.row->id == "torque_gain") out.gain += naming.hypothesis.state.effects[each.slot];
+  }
+  return out;
+}
+
+TEST(SensorAccuracy, OfBothTorquesIsNoGain) {
+  const Diagnosed d = diagnosed(0.02, 0.02);
+  EXPECT_TRUE(d.names.empty());
+  EXPECT_NEAR(d.gain, 0.02, 0.005);
+}
+
+TEST(SensorAccuracy, ThatNobodyStatedExcusesNothing) {
+  const Diagnosed d = diagnosed(0.02, 0.0);
+  ASSERT_EQ(d.names.size(), 1U);
+  EXPECT_EQ(d.names.front(), "torque_gain");
+}
+
+TEST(SensorAccuracy, ExcusesNoGainFarBeyondIt) {
+  const Diagnosed d = diagnosed(0.08, 0.01);
+  ASSERT_EQ(d.names.size(), 1U);
+  EXPECT_EQ(d.names.front(), "torque_gain");
+  EXPECT_NEAR(d.gain, 0.08, 0.005);
+}
+
+}  // namespace
+}  // namespace beltgrip::diagnose
