@@ -45,7 +45,8 @@ inline constexpr double kScatterTorque = 2.2;
 // The same over what rigs usually scatter by, however much replicates do.
 inline constexpr double kUnusualScatter = 4.0;
 // Of the ratio. Derived: belts seat anew by up to 0.05 % of it from one experiment to the next, 3.3
-// times the usual, and a dozen experiments tell that to 22 %; two of these above.
+// times the usual, and a dozen experiments tell that to 22 %; two of these above. A fifth less: two
+// healthy campaigns of other make alarm (4.3 and 4.5); a fifth more: not run.
 inline constexpr double kUnusualRatio = 4.8;
 // Of the friction alone, which scatters less from rig to rig than seats and torque zeros do. Above
 // 95 of 96 healthy campaigns of other make (1.9, whatever scatters); the other's pressure moves in

@@ -662,7 +662,12 @@ class Run {
       const Slot& slot = campaign.slots[static_cast<std::size_t>(each.slot)];
       const auto& h = naming.hypothesis;
       const double value = h.state.effects[each.slot];
-      const double half = quantile_975(each.degrees) * each.sigma;
+      // How far the sensors' own gain goes stands in no covariance once it has come to its bound.
+      const double stated = slot.row->id == "torque_gain" && campaign.has_balance
+                                ? campaign.nuisances[kSecondaryTorqueGain].tolerance
+                                : 0.0;
+      const double half =
+          std::hypot(quantile_975(each.degrees) * each.sigma, estimator::kNormal95 * stated);
       const auto found = std::find_if(out().findings.begin(), out().findings.end(),
                                       [&](const Finding& f) { return f.effect == slot.row->id; });
       Finding& finding = found == out().findings.end() ? out().findings.emplace_back() : *found;
