@@ -224,6 +224,10 @@ bool is_own(const Engine& engine, const std::vector<int>& slots, const UnknownGr
   });
 }
 
+// What follows the clamp force is tested and told, and no cause: in a ramp it is the friction curve
+// by another name.
+bool is_curve(const UnknownGroup& group) { return group.depends_on == "secondary_pressure"; }
+
 // The group that explains what the best hypothesis cannot, if there is one.
 std::optional<UnknownGroup> better_group(const Engine& engine, const Hypothesis& best, double gain,
                                          double threshold) {
@@ -234,7 +238,7 @@ std::optional<UnknownGroup> better_group(const Engine& engine, const Hypothesis&
         group.left_out_gain <= kLeftOutMin) {
       continue;
     }
-    if (!is_own(engine, best.slots, group)) return group;
+    if (!is_curve(group) && !is_own(engine, best.slots, group)) return group;
   }
   return std::nullopt;
 }
@@ -813,7 +817,7 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop) {
     const double bound = chance_threshold(static_cast<int>(groups.size()), kFalseUnknown);
     const auto left = std::find_if(groups.begin(), groups.end(), [&](const UnknownGroup& group) {
       return group.chi2 > bound && group.gain > bound && group.gain > kShareOfFirst * first_gain &&
-             group.size > 1.0 && group.left_out_gain > kLeftOutMin &&
+             group.size > 1.0 && group.left_out_gain > kLeftOutMin && !is_curve(group) &&
              !is_own(engine, engine.accepted(), group);
     });
     if (left == groups.end()) return out;

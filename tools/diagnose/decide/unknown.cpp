@@ -33,8 +33,6 @@ constexpr std::array<double, 5> kMatters{5e-3, 2e-4, 0.2, 5e-3, 20.0};
 // A gain and a force are told from friction by the torque behind the belt alone, and along what
 // does not move within a ramp.
 bool sensible(const Campaign& campaign, const std::string& variable, std::size_t injection) {
-  // In a ramp the friction curve by another name.
-  if (variable == "secondary_pressure") return false;
   if (injection < 3) return variable != "torque" || injection == 0;
   return campaign.has_balance &&
          (variable == "oil_temperature" || variable == "primary_speed" || variable == "time");
