@@ -141,5 +141,13 @@ TEST(Acceleration, IsNoneWhereAShaftIsHeld) {
   EXPECT_TRUE((variable("acceleration")->value(run, 0) == run.omega_p.slow_slope).all());
 }
 
+// A belt that seats anew by more than belts do. Ten times what is usual: a hundredth is usual.
+TEST(Scatter, OfTheRatioBeyondWhatSeatsDoIsToldAsThat) {
+  const Unexplained told = what_is_left(failing({"unusual_ratio"}), true);
+  EXPECT_EQ(told.acts_on, "ratio");
+  EXPECT_EQ(told.kind, MisfitKind::kBetweenRuns);
+  EXPECT_NEAR(told.share, 0.99, 1e-12);
+}
+
 }  // namespace
 }  // namespace beltgrip::diagnose
