@@ -35,10 +35,15 @@ struct DiagnoseOptions {
 
 bool is_table(const std::string& path) { return path.ends_with(".csv"); }
 
-daemon::ConfigResult load(const DiagnoseOptions& options) {
+struct Loaded {
+  daemon::Config config;
+  diagnose::Accuracies stated;  // of the sensors
+};
+
+Loaded load(const DiagnoseOptions& options) {
   const bool tables = std::all_of(options.logs.begin(), options.logs.end(), is_table) &&
                       std::all_of(options.held_out.begin(), options.held_out.end(), is_table);
-  daemon::ConfigResult result = daemon::load_config(
+  const daemon::ConfigResult result = daemon::load_config(
       options.config, tables ? daemon::ConfigScope::kVariator : daemon::ConfigScope::kSignals);
   for (const std::string& warning : result.warnings) text::warn(warning);
   if (!result.config) {
@@ -47,7 +52,7 @@ daemon::ConfigResult load(const DiagnoseOptions& options) {
     }
     throw Failure{result.exit_code(), result.errors.back().text};
   }
-  return result;
+  return {*result.config, result.stated};
 }
 
 diagnose::SignalTable read(const std::string& path, const daemon::Config& config) {
@@ -114,8 +119,7 @@ void show_progress(double share, const std::string& what) {
 
 void run_diagnose(const DiagnoseOptions& options) {
   end_in_good_order();
-  const daemon::ConfigResult loaded = load(options);
-  const daemon::Config& config = *loaded.config;
+  const auto [config, stated] = load(options);
   diagnose::Request request;
   daemon::ModelFile before = diagnose::nominal_model(config.variator);
   if (!options.model.empty()) {
@@ -126,7 +130,7 @@ void run_diagnose(const DiagnoseOptions& options) {
     }
   }
   request.model = before;
-  request.accuracies = loaded.stated;
+  request.accuracies = stated;
   request.is_model_given = !options.model.empty();
   Inputs inputs(options.logs);
   inputs.add(options.held_out);
