@@ -1,6 +1,7 @@
 // Several numbers at once, in registers of the compiler's vector extension.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 namespace beltgrip::diagnose {
@@ -25,5 +26,27 @@ inline bool has_four() { return __builtin_cpu_supports("avx2") != 0; }
 #define BELTGRIP_FOUR
 inline bool has_four() { return false; }
 #endif
+
+// row(k) for each k, which touches nothing that another one writes: many at a time. The same
+// arithmetic by any registers: the same bits.
+template <typename Row>
+BELTGRIP_LANES void all_rows(std::ptrdiff_t count, Row row) {
+#pragma GCC ivdep
+  for (std::ptrdiff_t k = 0; k < count; ++k) row(k);
+}
+// row by value: what stands in no memory but its own is kept in registers.
+template <typename Row>
+BELTGRIP_FOUR void rows_by_four(std::ptrdiff_t count, Row row) {
+  all_rows(count, row);
+}
+template <typename Row>
+void rows_by_two(std::ptrdiff_t count, Row row) {
+  all_rows(count, row);
+}
+template <typename Row>
+void for_rows(std::ptrdiff_t count, const Row& row) {
+  static const bool kHasFour = has_four();
+  kHasFour ? rows_by_four(count, row) : rows_by_two(count, row);
+}
 
 }  // namespace beltgrip::diagnose

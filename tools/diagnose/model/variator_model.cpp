@@ -8,6 +8,7 @@
 
 #include "tools/diagnose/model/curve_family.h"
 #include "tools/diagnose/model/effects/effect.h"
+#include "tools/diagnose/model/lanes.h"
 #include "tools/diagnose/model/learned.h"
 
 namespace beltgrip::diagnose {
@@ -188,45 +189,161 @@ void CurveShape::add_fall(double size, Point& point) const {
 }
 
 namespace {
-bool is_zero(const ArrayXd& values) {
-  return std::all_of(values.begin(), values.end(), [](double v) { return v == 0.0; });
+// Slow, and mostly there is nothing, or the same in all of the experiment: one exponential then, as
+// Eigen has it of a pair and of an odd last one.
+void multiply_by_exp(const ArrayXd& ln, ArrayXd& values) {
+  if (ln.size() == 0) return;
+  const bool is_same = std::all_of(ln.begin(), ln.end(), [&](double v) { return v == ln[0]; });
+  if (!is_same) {
+    values *= ln.exp();
+  } else if (ln[0] != 0.0) {
+    const Eigen::Index odd = ln.size() % 2;
+    const ArrayXd factor = ArrayXd::Constant(2 + odd, ln[0]).exp();
+    values.head(ln.size() - odd) *= factor[0];
+    values.tail(odd) *= factor[factor.size() - 1];
+  }
 }
 
-// Ratio without load, and capacity per clamp force but for what changes the friction.
-struct Unloaded {
-  ArrayXd ratio, lever_m;
+constexpr double kLeastShare = 0.05;    // chosen, of the radius: no deformation leaves less
+constexpr double kLeastForce_N = 50.0;  // chosen, of what a force is divided by
+
+// The passes over the samples, between which the effects act. Each row by itself, in place and
+// without columns between: what an array expression would say, in the same order.
+class Passes {
+ public:
+  Passes(const ExperimentData& run, const Readings& read,
+         const estimator::VariatorParameters& variator, const Eigen::VectorXd& nuisance)
+      : run_(run), read_(read), variator_(variator), nuisance_(nuisance), n_(run.size()) {}
+
+  void force(Context& c) const {
+    const double area_m2 = variator_.secondary_piston_area_m2;
+    const BesidePressure beside(variator_);
+    c.force_N.resize(n_);
+    for_rows(n_, [=, pressure_Pa = c.pressure.data(), omega_s = c.omega_s.data(),
+                  out_N = c.force_N.data()](Row k) BELTGRIP_INLINE {
+      out_N[k] = area_m2 * pressure_Pa[k] + beside.at_N(omega_s[k]);
+    });
+  }
+  void loss(Context& c) const {
+    const double constant_Nm = nuisance_[kLossConstant_Nm];
+    const double per_speed_Nms = nuisance_[kLossPerSpeed_Nms];
+    const double per_N_Nm = nuisance_[kLossPerkN_Nm] * 1e-3;
+    c.loss_Nm.resize(n_);
+    for_rows(n_, [=, omega_p = c.omega_p.data(), force_N = c.force_N.data(),
+                  out_Nm = c.loss_Nm.data()](Row k) BELTGRIP_INLINE {
+      out_Nm[k] = constant_Nm + per_speed_Nms * omega_p[k] + per_N_Nm * force_N[k];
+    });
+    if (!run_.torque_is_engine) return;
+    for_rows(n_, [inertia_kg_m2 = variator_.primary_inertia_kg_m2,
+                  slope = run_.omega_p.slope.data(), slow_slope = run_.omega_p.slow_slope.data(),
+                  slope_p = c.slope_p.data(), out_Nm = c.loss_Nm.data()](Row k) BELTGRIP_INLINE {
+      out_Nm[k] += inertia_kg_m2 * (slope[k] + slope_p[k] - slow_slope[k]);
+    });
+  }
+  void belt(Context& c) const {
+    c.belt_torque.resize(n_);
+    c.deformation.resize(n_);
+    for_rows(n_,
+             [per_N = nuisance_[kDeformationPerkN] * 1e-3, torque_Nm = c.torque.data(),
+              loss_Nm = c.loss_Nm.data(), force_N = c.force_N.data(), out_Nm = c.belt_torque.data(),
+              out_share = c.deformation.data()](Row k) BELTGRIP_INLINE {
+               out_Nm[k] = torque_Nm[k] - loss_Nm[k];
+               out_share[k] = per_N * force_N[k];
+             });
+  }
+  ArrayXd ratio(const Context& c) const {
+    const double low = variator_.ratio_low * std::exp(nuisance_[kLnRatioLow]);
+    const double overdrive = variator_.ratio_overdrive * std::exp(nuisance_[kLnRatioOverdrive]);
+    ArrayXd out(n_);
+    for_rows(n_, [=, stop = run_.stop.data(), deformation = c.deformation.data(),
+                  to = out.data()](Row k) BELTGRIP_INLINE {
+      const double unloaded = stop[k] == kLowStop ? low : overdrive;
+      to[k] = unloaded * std::max(1.0 - deformation[k], kLeastShare);
+    });
+    multiply_by_exp(c.ln_ratio, out);
+    return out;
+  }
+  void slip(const ArrayXd& ratio, Context& c) const {
+    c.slip_share.resize(n_);
+    for_rows(n_, [omega_p = c.omega_p.data(), omega_s = c.omega_s.data(), at = ratio.data(),
+                  out_share = c.slip_share.data()](Row k)
+                     BELTGRIP_INLINE { out_share[k] = 1.0 - omega_s[k] / (omega_p[k] * at[k]); });
+  }
+  // What effects change of the clamp force counts as a share of it, without the pressure's noise:
+  // else a hypothesis with more force would divide that noise by more, and fit better for that
+  // alone.
+  ArrayXd capacity(const Context& c) const {
+    const double gain =
+        2.0 / std::cos(variator_.half_wedge_angle_rad) * std::exp(nuisance_[kLnMuMax]);
+    const double low_m = gain * variator_.primary_radius_low_m;
+    const double overdrive_m = gain * variator_.primary_radius_overdrive_m;
+    const double area_m2 = variator_.secondary_piston_area_m2;
+    const BesidePressure beside(variator_);
+    ArrayXd out(n_);
+    for_rows(n_, [=, stop = run_.stop.data(), pressure_Pa = read_.pressure_Pa.data(),
+                  sharp_Pa = run_.pressure.sharp.data(), omega_s = c.omega_s.data(),
+                  force_N = c.force_N.data(), to = out.data()](Row k) BELTGRIP_INLINE {
+      const double lever_m = stop[k] == kLowStop ? low_m : overdrive_m;
+      const double beside_N = beside.at_N(omega_s[k]);
+      const double read_N = area_m2 * pressure_Pa[k] + beside_N;
+      const double calm_N = area_m2 * sharp_Pa[k] + beside_N;
+      const double counts_N =
+          read_N * (1.0 + (force_N[k] - read_N) / std::max(calm_N, kLeastForce_N));
+      to[k] = lever_m * std::max(counts_N, kLeastForce_N);
+    });
+    multiply_by_exp(c.ln_friction, out);
+    return out;
+  }
+  void secondary_loss(Context& c) const {
+    c.secondary_loss_Nm =
+        nuisance_[kSecondaryLoss_Nm] + nuisance_[kSecondaryLossPerSpeed_Nms] * c.omega_s;
+  }
+  // From the slow copies of all channels, the inertia's share of the engine's torque among them: by
+  // the fast slope it would stand against a torque that no longer has what is fast, and what stands
+  // behind the belt would be fitted to the noise of the speed's slope.
+  ArrayXd balance(const Context& c, const ArrayXd& ratio) const {
+    const double inertia_kg_m2 = nuisance_[kSecondaryInertia_kgm2];
+    const double gain = 1.0 + nuisance_[kSecondaryTorqueGain];
+    ArrayXd out(n_);
+    for_rows(n_, [=, belt_Nm = c.belt_torque.data(), slow_Nm = run_.torque.slow.data(),
+                  read_Nm = read_.torque_Nm.data(), slow_s_Nm = run_.torque_s.slow.data(),
+                  slope_s = c.slope_s.data(), loss_s_Nm = c.secondary_loss_Nm.data(),
+                  at = ratio.data(), to = out.data()](Row k) BELTGRIP_INLINE {
+      const double behind_Nm = slow_s_Nm[k] / gain + inertia_kg_m2 * slope_s[k] + loss_s_Nm[k];
+      to[k] = belt_Nm[k] + slow_Nm[k] - read_Nm[k] - at[k] * behind_Nm;
+    });
+    if (run_.torque_is_engine) {
+      out += variator_.primary_inertia_kg_m2 * (run_.omega_p.slope - run_.omega_p.slow_slope);
+    }
+    return out;
+  }
+  ArrayXd tracking(const Context& c) const {
+    ArrayXd out(n_);
+    for_rows(n_, [gain = 1.0 + nuisance_[kCommandGain], offset_Pa = nuisance_[kCommandOffset_Pa],
+                  pressure_Pa = read_.pressure_Pa.data(), track_Pa = c.track.data(),
+                  to = out.data()](Row k)
+                     BELTGRIP_INLINE { to[k] = pressure_Pa[k] - gain * track_Pa[k] - offset_Pa; });
+    return out;
+  }
+
+ private:
+  using Row = std::ptrdiff_t;
+  struct BesidePressure {
+    explicit BesidePressure(const estimator::VariatorParameters& variator)
+        : spring_N(variator.secondary_spring_force_N),
+          per_speed2_N_s2(variator.secondary_centrifugal_N_s2) {}
+    double spring_N, per_speed2_N_s2;
+    BELTGRIP_LANES double at_N(double omega_s) const {
+      return spring_N + per_speed2_N_s2 * (omega_s * omega_s);
+    }
+  };
+
+  const ExperimentData& run_;
+  const Readings& read_;
+  const estimator::VariatorParameters& variator_;
+  const Eigen::VectorXd& nuisance_;
+  Row n_;
 };
-
-Unloaded unloaded_of(const ExperimentData& run, const estimator::VariatorParameters& variator,
-                     const Eigen::VectorXd& nuisance) {
-  const int n = run.size();
-  Unloaded out{ArrayXd(n), ArrayXd(n)};
-  const double ratio_low = variator.ratio_low * std::exp(nuisance[kLnRatioLow]);
-  const double ratio_overdrive = variator.ratio_overdrive * std::exp(nuisance[kLnRatioOverdrive]);
-  const double gain = 2.0 / std::cos(variator.half_wedge_angle_rad) * std::exp(nuisance[kLnMuMax]);
-  const double lever_low_m = gain * variator.primary_radius_low_m;
-  const double lever_overdrive_m = gain * variator.primary_radius_overdrive_m;
-  for (int k = 0; k < n; ++k) {
-    const bool low = run.stop[static_cast<std::size_t>(k)] == kLowStop;
-    out.ratio[k] = low ? ratio_low : ratio_overdrive;
-    out.lever_m[k] = low ? lever_low_m : lever_overdrive_m;
-  }
-  return out;
-}
-
-// From the slow copies of all channels, the inertia's share of the engine's torque among them: by
-// the fast slope it would stand against a torque that no longer has what is fast, and what stands
-// behind the belt would be fitted to the noise of the speed's slope.
-ArrayXd balance_of(const ExperimentData& run, const Readings& read, const Context& c,
-                   const ArrayXd& ratio, double inertia_kg_m2, double gain) {
-  ArrayXd out =
-      c.belt_torque + run.torque.slow - read.torque_Nm -
-      ratio * (run.torque_s.slow / (1.0 + gain) + inertia_kg_m2 * c.slope_s + c.secondary_loss_Nm);
-  if (run.torque_is_engine) {
-    out += c.variator.primary_inertia_kg_m2 * (run.omega_p.slope - run.omega_p.slow_slope);
-  }
-  return out;
-}
 }  // namespace
 
 Quantities evaluate(const ExperimentData& run, int experiment,
@@ -270,49 +387,28 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
     for (const estimator::LearnedTerm& each : effects.learned) apply_learned(c, each, stage);
     for (const estimator::LearnedTerm& each : effects.learned_too) apply_learned(c, each, stage);
   };
+  const Passes pass(run, read, variator, nuisance);
   apply(Stage::kMeasurement);
-  const ArrayXd beside_pressure_N =
-      variator.secondary_spring_force_N + variator.secondary_centrifugal_N_s2 * c.omega_s.square();
-  c.force_N = variator.secondary_piston_area_m2 * c.pressure + beside_pressure_N;
+  pass.force(c);
   apply(Stage::kForce);
-  c.loss_Nm = nuisance[kLossConstant_Nm] + nuisance[kLossPerSpeed_Nms] * c.omega_p +
-              nuisance[kLossPerkN_Nm] * 1e-3 * c.force_N;
-  if (run.torque_is_engine) {
-    c.loss_Nm +=
-        variator.primary_inertia_kg_m2 * (run.omega_p.slope + c.slope_p - run.omega_p.slow_slope);
-  }
+  pass.loss(c);
   apply(Stage::kDriveline);
-  c.belt_torque = c.torque - c.loss_Nm;
-  c.deformation = nuisance[kDeformationPerkN] * 1e-3 * c.force_N;
-  auto [ratio, lever_m] = unloaded_of(run, variator, nuisance);
+  pass.belt(c);
   apply(Stage::kRatio);
-  ratio *= (1.0 - c.deformation).max(0.05);
-  if (!is_zero(c.ln_ratio)) ratio *= c.ln_ratio.exp();  // hardly ever there, and slow
-  c.slip_share = 1.0 - c.omega_s / (c.omega_p * ratio);
+  ArrayXd ratio = pass.ratio(c);
+  pass.slip(ratio, c);
   apply(Stage::kFriction);
 
   Quantities q;
-  q.slip_share = std::move(c.slip_share);
-  // What effects change of the clamp force counts as a share of it, without the pressure's noise:
-  // else a hypothesis with more force would divide that noise by more, and fit better for that
-  // alone.
-  const double area_m2 = variator.secondary_piston_area_m2;
-  const ArrayXd read_N = area_m2 * read.pressure_Pa + beside_pressure_N;
-  const ArrayXd calm_N = area_m2 * run.pressure.sharp + beside_pressure_N;
-  q.capacity = lever_m * (read_N * (1.0 + (c.force_N - read_N) / calm_N.max(50.0))).max(50.0);
-  if (!is_zero(c.ln_friction)) q.capacity *= c.ln_friction.exp();
+  q.capacity = pass.capacity(c);
   if (run.torque_s.present) {
-    c.secondary_loss_Nm =
-        nuisance[kSecondaryLoss_Nm] + nuisance[kSecondaryLossPerSpeed_Nms] * c.omega_s;
+    pass.secondary_loss(c);
     apply(Stage::kSecondaryShaft);
-    q.balance = balance_of(run, read, c, ratio, nuisance[kSecondaryInertia_kgm2],
-                           nuisance[kSecondaryTorqueGain]);
+    q.balance = pass.balance(c, ratio);
     q.secondary_loss_Nm = std::move(c.secondary_loss_Nm);
   }
-  if (run.command.present) {
-    q.tracking =
-        read.pressure_Pa - (1.0 + nuisance[kCommandGain]) * c.track - nuisance[kCommandOffset_Pa];
-  }
+  if (run.command.present) q.tracking = pass.tracking(c);
+  q.slip_share = std::move(c.slip_share);
   q.ratio = std::move(ratio);
   q.deformation = std::move(c.deformation);
   q.force_N = std::move(c.force_N);
