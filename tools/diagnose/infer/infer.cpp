@@ -296,8 +296,8 @@ std::vector<WhiteBlock> whitened(const Campaign& campaign, int run, const RawCol
         to.setZero();
       } else {
         const bool rests = e < whitening.rest.size() && !whitening.rest[e][kind].empty();
-        whiten(data, whitening.filter[kind], rests ? less_rests(whitening.rest[e][kind], in) : in,
-               weight[kind], to.data());
+        const ArrayXd less = rests ? less_rests(whitening.rest[e][kind], in) : ArrayXd();
+        whiten(data, whitening.filter[kind], rests ? less : in, weight[kind], to.data());
       }
       if (beside == nullptr) continue;
       if (next < beside->size() && (*beside)[next] == column) {
@@ -338,13 +338,8 @@ RawColumns raw_columns(const Campaign& campaign, int run, const ModelState& stat
   out.columns.reserve(parameters.size() + 1 + kRandomEffects);
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   for (std::size_t j = 0; j < parameters.size(); ++j) {
-    const double unit = scale[static_cast<Index>(j)];
-    if (first_knot(parameters[j]) >= 0) {
-      out.columns.emplace_back()[kFrictionResidual] = mode_rows(data, at, parameters[j], unit);
-    } else {
-      out.columns.push_back(
-          valid_rows(data, derivative(campaign, run, state, at, parameters[j]), unit));
-    }
+    out.columns.push_back(
+        derivative_rows(campaign, run, state, at, parameters[j], scale[static_cast<Index>(j)]));
   }
   if (extra) {
     for (const ResidualColumns& column : extra(run, at)) {

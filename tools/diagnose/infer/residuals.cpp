@@ -7,6 +7,7 @@
 #include "estimator/statistics/order.h"
 #include "tools/diagnose/infer/foot_points.h"
 #include "tools/diagnose/model/curve_family.h"
+#include "tools/diagnose/model/lanes.h"
 
 namespace beltgrip::diagnose {
 using Eigen::ArrayXd;
@@ -41,18 +42,28 @@ std::array<CurveShape, kStops> shapes(const Eigen::VectorXd& nuisance, const Qua
 }
 
 namespace {
-// One sigma of what the noise of the clamp force comes to in the torque that the belt carries. The
+using Row = std::ptrdiff_t;
+constexpr double kLeast_N = 50.0;  // chosen, of what a noise of the force is divided by
+
+// Variance of what the noise of the clamp force comes to in the torque that the belt carries. The
 // force as configured: its noise is the same share of it in every hypothesis (evaluate()), and one
 // with less force would be forgiven more else.
-double carried_noise_Nm(const Campaign& campaign, const ExperimentData& data, int k,
-                        double belt_torque_Nm) {
+ArrayXd carried_variance_Nm2(const Campaign& campaign, const ExperimentData& data,
+                             const ArrayXd& belt_torque_Nm) {
   const estimator::VariatorParameters& variator = campaign.variator;
-  constexpr double kLeast_N = 50.0;
-  const double force_N =
-      variator.secondary_piston_area_m2 * data.pressure.value[k] +
-      variator.secondary_spring_force_N +
-      variator.secondary_centrifugal_N_s2 * data.omega_s.value[k] * data.omega_s.value[k];
-  return belt_torque_Nm * campaign.noise.force_N / std::max(force_N, kLeast_N);
+  ArrayXd out(data.size());
+  for_rows(data.size(),
+           [noise_N = campaign.noise.force_N, area_m2 = variator.secondary_piston_area_m2,
+            spring_N = variator.secondary_spring_force_N,
+            per_speed2_N_s2 = variator.secondary_centrifugal_N_s2,
+            pressure_Pa = data.pressure.value.data(), omega_s = data.omega_s.value.data(),
+            torque_Nm = belt_torque_Nm.data(), to = out.data()](Row k) BELTGRIP_INLINE {
+             const double force_N =
+                 area_m2 * pressure_Pa[k] + spring_N + per_speed2_N_s2 * omega_s[k] * omega_s[k];
+             const double carried_Nm = torque_Nm[k] * noise_N / std::max(force_N, kLeast_N);
+             to[k] = carried_Nm * carried_Nm;
+           });
+  return out;
 }
 }  // namespace
 
@@ -71,7 +82,9 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
   const double slip_variance =
       campaign.slip_noise_share_of(run) * campaign.slip_noise_share_of(run);
   const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
+  out.carried_variance_Nm2 = carried_variance_Nm2(campaign, data, q.belt_torque);
   std::array<std::vector<int>, kStops> at_stop;  // samples
+  for (std::vector<int>& each : at_stop) each.reserve(static_cast<std::size_t>(data.valid_count));
   for (const auto& [begin, end] : data.stretches) {
     for (int k = begin; k < end; ++k) {
       at_stop[static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)])].push_back(k);
@@ -84,9 +97,8 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
           std::span(all).subspan(first, std::min(FootBatch::kMost, all.size() - first));
       FootBatch batch(curve[stop], std::exp(q.ln_peak_slip[stop]), slip_variance);
       for (const int k : samples) {
-        const double carried_Nm = carried_noise_Nm(campaign, data, k, q.belt_torque[k]);
         batch.add(q.slip_share[k], q.belt_torque[k], q.capacity[k], data.slip_spread_share2[k],
-                  sensor_variance + carried_Nm * carried_Nm);
+                  sensor_variance + out.carried_variance_Nm2[k]);
       }
       batch.find();
       for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -119,6 +131,10 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
   return out;
 }
 
+namespace {
+constexpr double kMoveMost = 0.2;  // chosen, of the clamp force: no foot point is farther
+}  // namespace
+
 // The foot point of what stands in the regressors: of the misfit in torque, the clamp force takes
 // its share.
 void move_to_foot(const Campaign& campaign, int run, Residuals& at) {
@@ -130,24 +146,72 @@ void move_to_foot(const Campaign& campaign, int run, Residuals& at) {
   at.clean_pressure_Pa = data.pressure.value;
   at.clean_reading_Nm = data.torque.value;
   for (const auto& [begin, end] : data.stretches) {
-    for (int k = begin; k < end; ++k) {
-      // Share of the misfit that is the clamp force's: its noise comes with the torque it carries.
-      const double carried_Nm = carried_noise_Nm(campaign, data, k, q.belt_torque[k]);
-      const double carried_variance = carried_Nm * carried_Nm;
-      const double force_share = carried_variance / (sensor_variance + carried_variance);
-      const double off_Nm = q.belt_torque[k] - at.model_Nm[k];
-      const double force_Nm = off_Nm * force_share;
-      if (at.model_Nm[k] != 0.0) {
-        const double relative = std::clamp(force_Nm / at.model_Nm[k], -0.2, 0.2);
-        at.clean_pressure_Pa[k] +=
-            relative * q.force_N[k] / campaign.variator.secondary_piston_area_m2;
-        at.clean_Nm[k] *= 1.0 + relative;
-      }
-      at.clean_reading_Nm[k] -= off_Nm - (at.clean_Nm[k] - at.model_Nm[k]);
-    }
+    for_rows(end - begin, [=, area_m2 = campaign.variator.secondary_piston_area_m2,
+                           carried_Nm2 = at.carried_variance_Nm2.data() + begin,
+                           belt_Nm = q.belt_torque.data() + begin,
+                           model_Nm = at.model_Nm.data() + begin,
+                           force_N = q.force_N.data() + begin,
+                           clean_Pa = at.clean_pressure_Pa.data() + begin,
+                           clean_Nm = at.clean_Nm.data() + begin,
+                           reading_Nm = at.clean_reading_Nm.data() + begin](Row k) BELTGRIP_INLINE {
+      // Of the misfit that is the clamp force's: its noise comes with the torque it
+      // carries.
+      const double force_share = carried_Nm2[k] / (sensor_variance + carried_Nm2[k]);
+      const double off_Nm = belt_Nm[k] - model_Nm[k];
+      const bool carries = model_Nm[k] != 0.0;
+      const double share = off_Nm * force_share / (carries ? model_Nm[k] : 1.0);
+      const double most = share < -kMoveMost ? -kMoveMost : share > kMoveMost ? kMoveMost : share;
+      const double relative = carries ? most : 0.0;
+      const double moved_Nm = model_Nm[k] * (1.0 + relative);
+      clean_Pa[k] += relative * force_N[k] / area_m2;
+      clean_Nm[k] = moved_Nm;
+      reading_Nm[k] -= off_Nm - (moved_Nm - model_Nm[k]);
+    });
   }
   if (q.balance.size() > 0) at.output_torque = at.clean_Nm / q.ratio;
 }
+
+namespace {
+// A valid sample as the departure of its friction curve sees it.
+struct CurveSample {
+  SplinePosition position;  // of |foot|
+  double capacity_Nm = 0.0;
+  double weight = 0.0;  // of a change of the curve in the residual, with its sign
+};
+
+// One row of the modes: all at once.
+BELTGRIP_LANES void fill_row(const CurveSample& sample, const ModeCubics& cubics, double* row,
+                             Row to_next_mode) {
+  const auto& c = cubics[sample.position.interval];
+  const double u = sample.position.u;
+  std::array<double, kModesAbreast> of_mode;
+  for (std::size_t i = 0; i < kModesAbreast; ++i) {
+    const double departure = c[0][i] + u * (c[1][i] + u * (c[2][i] + u * c[3][i]));
+    of_mode[i] = sample.capacity_Nm * departure * sample.weight;
+  }
+  for (std::size_t i = 0; i < kShapeKnots; ++i, row += to_next_mode) *row = of_mode[i];
+}
+
+void fill_modes(const ExperimentData& data, Residuals& at) {
+  const int rows = data.valid_count;
+  at.modes.resize(rows, kShapeKnots);
+  at.is_low.resize(rows);
+  std::vector<CurveSample> samples;
+  samples.reserve(static_cast<std::size_t>(rows));
+  for (const auto& [begin, end] : data.stretches) {
+    for (int k = begin; k < end; ++k) {
+      const int stop = data.stop[static_cast<std::size_t>(k)];
+      const bool counts = at.weight[k] > 0.0;
+      at.is_low[static_cast<Row>(samples.size())] = stop == kLowStop ? 1.0 : 0.0;
+      if (counts) at.has_stop[static_cast<std::size_t>(stop)] = true;
+      samples.push_back({spline_position(std::abs(at.foot[k])), at.measured.capacity[k],
+                         counts ? -std::copysign(at.weight[k], at.foot[k]) : 0.0});
+    }
+  }
+  for_rows(rows, [rows, from = samples.data(), to = at.modes.data(), &cubics = mode_cubics()](
+                     Row row) BELTGRIP_INLINE { fill_row(from[row], cubics, to + row, rows); });
+}
+}  // namespace
 
 void prepare_derivatives(const Campaign& campaign, int run, const ModelState& state,
                          Residuals& at) {
@@ -155,66 +219,82 @@ void prepare_derivatives(const Campaign& campaign, int run, const ModelState& st
   move_to_foot(campaign, run, at);
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   at.there = quantities(campaign, data, {at.clean_pressure_Pa, at.clean_reading_Nm}, run, state);
-  int row = -1;
-  for (const auto& [begin, end] : data.stretches) {
-    for (int k = begin; k < end; ++k) {
-      ++row;
-      if (!(at.weight[k] > 0.0)) continue;
-      at.on_curve[static_cast<std::size_t>(data.stop[static_cast<std::size_t>(k)])].push_back(
-          {k, row, spline_position(std::abs(at.foot[k])), at.measured.capacity[k],
-           -std::copysign(at.weight[k], at.foot[k])});
-    }
-  }
-}
-
-ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
-                          const QuantityChange& change) {
-  ResidualColumns out;
-  const auto n = at.foot.size();
-  if (change.torque.size() + change.slip_share.size() + change.ln_capacity.size() > 0) {
-    ArrayXd friction = ArrayXd::Zero(n);
-    if (change.torque.size() > 0) friction += change.torque;
-    if (change.slip_share.size() > 0) friction -= at.slope * change.slip_share;
-    if (change.ln_capacity.size() > 0) friction -= at.clean_Nm * change.ln_capacity;
-    out[kFrictionResidual] = (at.weight > 0.0).select(friction * at.weight, 0.0);
-  }
-  const auto other = [&](const ArrayXd& values, const auto& scale) -> ArrayXd {
-    if (values.size() == 0) return {};
-    return (at.weight > 0.0).select(values * scale, 0.0);
-  };
-  if (campaign.has_balance) {
-    out[kBalanceResidual] = other(change.balance, at.balance_weight);
-  }
-  if (campaign.has_tracking) {
-    out[kTrackingResidual] = other(change.tracking, 1.0 / campaign.noise.tracking_Pa);
-  }
-  return out;
+  fill_modes(data, at);
 }
 
 namespace {
-// Of one mode of the friction curve of one stop; the place of a sample in the column is one of its
-// numbers.
-void add_mode(const std::vector<CurveSample>& samples, int mode, double scale,
-              int CurveSample::*place, ArrayXd& column) {
-  const CurveShape& shape = mode_shape(mode);
-  double* const to = column.data();
-  for (const CurveSample& each : samples) {
-    to[each.*place] = each.capacity_Nm * shape.departure(each.position) * each.weight * scale;
+// The samples of some stretches, one behind the other.
+ResidualColumns propagated(const Campaign& campaign, const Residuals& at,
+                           const QuantityChange& change, std::span<const Stretch> stretches,
+                           double scale) {
+  int rows = 0;
+  for (const Stretch& each : stretches) rows += each.end - each.begin;
+  const auto column = [&](const auto& fill) {
+    ArrayXd out(rows);
+    Row row = 0;
+    for (const auto& [begin, end] : stretches) {
+      fill(begin, end - begin, out.data() + row);
+      row += end - begin;
+    }
+    return out;
+  };
+  // Of a change that there may be none of.
+  const auto from = [](const ArrayXd& values, int begin) {
+    return values.size() > 0 ? values.data() + begin : nullptr;
+  };
+  ResidualColumns out;
+  if (change.torque.size() + change.slip_share.size() + change.ln_capacity.size() > 0) {
+    out[kFrictionResidual] = column([&](int begin, Row count, double* to) {
+      for_rows(count,
+               [=, torque = from(change.torque, begin), slip_share = from(change.slip_share, begin),
+                ln_capacity = from(change.ln_capacity, begin), slope = at.slope.data() + begin,
+                clean_Nm = at.clean_Nm.data() + begin, weight = at.weight.data() + begin](Row k)
+                   BELTGRIP_INLINE {
+                     double friction = 0.0;
+                     if (torque != nullptr) friction += torque[k];
+                     if (slip_share != nullptr) friction -= slope[k] * slip_share[k];
+                     if (ln_capacity != nullptr) friction -= clean_Nm[k] * ln_capacity[k];
+                     to[k] = (weight[k] > 0.0 ? friction * weight[k] : 0.0) * scale;
+                   });
+    });
   }
+  if (campaign.has_balance && change.balance.size() > 0) {
+    out[kBalanceResidual] = column([&](int begin, Row count, double* to) {
+      for_rows(count, [=, balance = change.balance.data() + begin,
+                       balance_weight = at.balance_weight.data() + begin,
+                       weight = at.weight.data() + begin](Row k) BELTGRIP_INLINE {
+        to[k] = (weight[k] > 0.0 ? balance[k] * balance_weight[k] : 0.0) * scale;
+      });
+    });
+  }
+  if (campaign.has_tracking && change.tracking.size() > 0) {
+    out[kTrackingResidual] = column([&](int begin, Row count, double* to) {
+      for_rows(count, [=, per_Pa = 1.0 / campaign.noise.tracking_Pa,
+                       tracking = change.tracking.data() + begin,
+                       weight = at.weight.data() + begin](Row k) BELTGRIP_INLINE {
+        to[k] = (weight[k] > 0.0 ? tracking[k] * per_Pa : 0.0) * scale;
+      });
+    });
+  }
+  return out;
+}
+}  // namespace
+
+ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
+                          const QuantityChange& change) {
+  const Stretch all{0, static_cast<int>(at.foot.size())};
+  return propagated(campaign, at, change, {&all, 1}, 1.0);
 }
 
+namespace {
 // The form in overdrive is that of both end stops; the other is what the low one differs by.
-ArrayXd mode_column(const Residuals& at, int parameter, double scale, int CurveSample::*place,
-                    int size) {
+ArrayXd mode_rows(const Residuals& at, int parameter, double scale) {
   const int first = first_knot(parameter);
-  const std::vector<CurveSample>& low = at.on_curve[kLowStop];
-  const std::vector<CurveSample>& overdrive = at.on_curve[kOverdriveStop];
   const bool is_of_both = first == kShapeOverdrive;
-  if (low.empty() && (overdrive.empty() || !is_of_both)) return {};
-  ArrayXd out = ArrayXd::Zero(size);
-  add_mode(low, parameter - first, scale, place, out);
-  if (is_of_both) add_mode(overdrive, parameter - first, scale, place, out);
-  return out;
+  if (!at.has_stop[kLowStop] && !(is_of_both && at.has_stop[kOverdriveStop])) return {};
+  const auto mode = at.modes.col(parameter - first);
+  if (is_of_both) return mode * scale;
+  return mode * scale * at.is_low;
 }
 
 bool energy_acts(const Campaign& campaign, const ModelState& state) {
@@ -231,19 +311,16 @@ bool energy_acts(const Campaign& campaign, const ModelState& state) {
 
 namespace {
 
-// A change of the belt's torque at one stop, by sample; zero where the stop is never used.
-template <typename Change>
-ResidualColumns at_stop(const ExperimentData& data, const Residuals& at, int stop, Change change) {
+// Of the slip at the peak of one stop; none where the stop is never used.
+QuantityChange peak_change(const ExperimentData& data, const Residuals& at, int stop, double peak) {
   if (std::find(data.stop.begin(), data.stop.end(), stop) == data.stop.end()) return {};
-  ResidualColumns out;
-  ArrayXd& column = out[kFrictionResidual];
-  column = ArrayXd::Zero(data.size());
-  for (int k = 0; k < data.size(); ++k) {
-    if (data.stop[static_cast<std::size_t>(k)] == stop && at.weight[k] > 0.0) {
-      column[k] = -change(k) * at.weight[k];
-    }
-  }
-  return out;
+  QuantityChange change;
+  change.torque.resize(data.size());
+  for_rows(data.size(), [=, stops = data.stop.data(), slope = at.slope.data(),
+                         foot = at.foot.data(), to = change.torque.data()](Row k) BELTGRIP_INLINE {
+    to[k] = stops[k] == stop ? slope[k] * foot[k] * peak : 0.0;
+  });
+  return change;
 }
 
 QuantityChange torque_change(const ArrayXd& torque) {
@@ -360,43 +437,47 @@ QuantityChange difference(const Campaign& campaign, int run, const ModelState& s
 
 }  // namespace
 
-ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& state,
-                           const Residuals& at, int parameter) {
+namespace {
+// Of all but the modes of the friction curve.
+QuantityChange change_by(const Campaign& campaign, int run, const ModelState& state,
+                         const Residuals& at, int parameter) {
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
-  const int n = data.size();
   if (parameter == kLnMuMax) {
     QuantityChange change;
-    change.ln_capacity = ArrayXd::Ones(n);
-    return propagate(campaign, at, change);
+    change.ln_capacity = ArrayXd::Ones(data.size());
+    return change;
   }
   if (parameter == kLnPeakSlipOverdrive || parameter == kLnPeakSlipLow) {
     const int stop = parameter == kLnPeakSlipLow ? kLowStop : kOverdriveStop;
-    const double peak = std::exp(state.nuisance[parameter]);
-    return at_stop(data, at, stop, [&](int k) { return -at.slope[k] * at.foot[k] * peak; });
+    return peak_change(data, at, stop, std::exp(state.nuisance[parameter]));
   }
   // With slip energy at work, whatever moves the slip moves the friction: by differences, below.
   if (!energy_acts(campaign, state)) {
-    if (const auto change = known_change(data, at, parameter)) {
-      return propagate(campaign, at, *change);
-    }
+    if (auto change = known_change(data, at, parameter)) return std::move(*change);
   }
-  if (first_knot(parameter) >= 0) {
-    ResidualColumns out;
-    out[kFrictionResidual] = mode_column(at, parameter, 1.0, &CurveSample::k, n);
-    return out;
-  }
-  return propagate(campaign, at, difference(campaign, run, state, at, parameter));
+  return difference(campaign, run, state, at, parameter);
 }
+}  // namespace
 
-ArrayXd mode_rows(const ExperimentData& data, const Residuals& at, int parameter, double scale) {
-  return mode_column(at, parameter, scale, &CurveSample::row, data.valid_count);
+ResidualColumns derivative_rows(const Campaign& campaign, int run, const ModelState& state,
+                                const Residuals& at, int parameter, double scale) {
+  const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+  if (first_knot(parameter) < 0) {
+    return propagated(campaign, at, change_by(campaign, run, state, at, parameter), data.stretches,
+                      scale);
+  }
+  ResidualColumns out;
+  out[kFrictionResidual] = mode_rows(at, parameter, scale);
+  return out;
 }
 
 ResidualColumns secant(const Campaign& campaign, int run, const ModelState& state,
                        const Residuals& at, int slot, double size) {
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   const double step = size - state.effects[slot];
-  if (step == 0.0) return derivative(campaign, run, state, at, kNuisanceCount + slot);
+  if (step == 0.0) {
+    return propagate(campaign, at, change_by(campaign, run, state, at, kNuisanceCount + slot));
+  }
   ModelState moved = state;
   moved.effects[slot] = size;
   const Quantities there =

@@ -85,15 +85,6 @@ struct Campaign {
   bool has_tracking = false;
 };
 
-// A sample that counts, as the departure of its stop's friction curve sees it.
-struct CurveSample {
-  int k = 0;
-  int row = 0;              // of the valid samples
-  SplinePosition position;  // of |foot|
-  double capacity_Nm = 0.0;
-  double weight = 0.0;  // of a change of the curve in the residual, with its sign
-};
-
 // Residuals of one experiment and what their derivatives need.
 struct Residuals {
   std::array<Eigen::ArrayXd, kResidualKinds> value;  // empty where the kind does not exist
@@ -103,13 +94,19 @@ struct Residuals {
   Eigen::ArrayXd weight;          // 1 / (noise of the distance)
   Eigen::ArrayXd balance_weight;  // 1 / (noise of the balance)
   Quantities measured;            // the model at the state, on the data as they are
+  // Of what the noise of the clamp force comes to in the torque that the belt carries.
+  Eigen::ArrayXd carried_variance_Nm2;
   // By move_to_foot only: of the belt at the foot point, and what the sensors would read there. No
   // noise in a regressor.
   Eigen::ArrayXd clean_Nm, output_torque;
   Eigen::ArrayXd clean_pressure_Pa, clean_reading_Nm;
   // By prepare_derivatives only.
   Quantities there;  // the model on those readings
-  std::array<std::vector<CurveSample>, kStops> on_curve;
+  // A row per valid sample, a column per mode of the friction curve: what it does to the residual;
+  // and 1 where that is the curve of the low end stop, 0 elsewhere.
+  Eigen::ArrayXXd modes;
+  Eigen::ArrayXd is_low;
+  std::array<bool, kStops> has_stop{};
 };
 
 // The model at a state, of the campaign's data or of others in their place; its friction curves.
@@ -122,16 +119,14 @@ std::array<CurveShape, kStops> shapes(const Eigen::VectorXd& nuisance, const Qua
 Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state);
 // Adds what propagate() needs, unless it is there.
 void move_to_foot(const Campaign& campaign, int run, Residuals& at);
-// Adds what derivative() needs, unless it is there; at: the residuals of this state.
+// Adds what derivative_rows() needs, unless it is there; at: the residuals of this state.
 void prepare_derivatives(const Campaign& campaign, int run, const ModelState& state, Residuals& at);
 
 // d(residual)/d(parameter); empty: zero. Parameters are numbered: nuisances first, then slots.
 using ResidualColumns = std::array<Eigen::ArrayXd, kResidualKinds>;
-ResidualColumns derivative(const Campaign& campaign, int run, const ModelState& state,
-                           const Residuals& at, int parameter);
-// The same of a mode of the friction curve (first_knot), a row per valid sample, times scale.
-Eigen::ArrayXd mode_rows(const ExperimentData& data, const Residuals& at, int parameter,
-                         double scale);
+// A row per valid sample, times scale.
+ResidualColumns derivative_rows(const Campaign& campaign, int run, const ModelState& state,
+                                const Residuals& at, int parameter, double scale);
 
 // The change of the residual from the state's size of a slot to another one, per unit of it.
 ResidualColumns secant(const Campaign& campaign, int run, const ModelState& state,

@@ -146,4 +146,20 @@ const CurveShape& mode_shape(int mode) {
   return kModes[static_cast<std::size_t>(mode)];
 }
 
+const ModeCubics& mode_cubics() {
+  static const ModeCubics kCubics = [] {
+    ModeCubics out{};
+    for (std::size_t interval = 0; interval < out.size(); ++interval) {
+      for (std::size_t mode = 0; mode < kShapeKnots; ++mode) {
+        const std::array<double, 4>& cubic = mode_shape(static_cast<int>(mode)).cubic(interval);
+        for (std::size_t power = 0; power < cubic.size(); ++power) {
+          out[interval][power][mode] = cubic[power];
+        }
+      }
+    }
+    return out;
+  }();
+  return kCubics;
+}
+
 }  // namespace beltgrip::diagnose

@@ -22,6 +22,12 @@ const KnotMatrix& curve_modes();
 const KnotMatrix& curve_modes_inverse();
 // The departure of one sigma of a mode.
 const CurveShape& mode_shape(int mode);
+// The cubics of all modes side by side, by interval of SplinePosition and power of its u. The last
+// ones are zero: whole registers of modes.
+inline constexpr std::size_t kModesAbreast = 16;
+static_assert(kModesAbreast >= kShapeKnots);
+using ModeCubics = std::array<std::array<std::array<double, kModesAbreast>, 4>, kShapeKnots + 1>;
+const ModeCubics& mode_cubics();
 
 // What no friction does: by how much the slope of a curve grows from one interval between its knots
 // to the next on the way to the peak, and its derivatives by the modes.

@@ -152,6 +152,8 @@ class CurveShape {
     out.value *= std::copysign(1.0, x);
     return out;
   }
+  // Of the departure in an interval, by the power of its abscissa from the interval's left end.
+  const std::array<double, 4>& cubic(std::size_t interval) const { return cubic_[interval]; }
   double departure(const SplinePosition& at) const {  // of the value, without the fall
     const auto& c = cubic_[at.interval];
     const double u = at.u;
