@@ -1,5 +1,7 @@
 #include "tools/cli/log_table.h"
 
+#include <malloc.h>
+
 #include <memory>
 #include <optional>
 
@@ -66,6 +68,8 @@ diagnose::SignalTable read_log(const std::string& path, const daemon::Config& co
     each.t_s.shrink_to_fit();
     each.value.shrink_to_fit();
   }
+  // What the columns have grown out of lies between them, and the next log's would come on top.
+  malloc_trim(0);
   diagnose::close_gaps(table);
   return table;
 }
