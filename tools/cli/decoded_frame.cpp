@@ -158,7 +158,6 @@ class JsonFrames : public FrameWriter {
     std::vector<Labels> labels;  // of the signals that have any
     std::vector<Label> of_labels;
 
-    std::uint32_t size() const { return static_cast<std::uint32_t>(all.size()); }
     std::string_view head() const { return {all.data(), head_end}; }
     // With the comma before it.
     std::string_view key(std::size_t i) const {
@@ -177,28 +176,38 @@ class JsonFrames : public FrameWriter {
     return texts;
   }
 
-  static void fill(Texts& texts, const ChosenMessage& message) {
+  void fill(Texts& texts, const ChosenMessage& message) {
     const can::MessageDef& definition = *message.definition;
-    texts.all = R"(,"extended":)" + std::string(definition.id.extended ? "true" : "false") +
-                R"(,"message":)" + json_text(definition.name) + R"(,"signals":{)";
-    texts.head_end = texts.size();
+    std::string& all = scratch_;
+    const auto size = [&] { return static_cast<std::uint32_t>(all.size()); };
+    all = R"(,"extended":)";
+    all += definition.id.extended ? "true" : "false";
+    all += R"(,"message":)";
+    all += json_text(definition.name);
+    all += R"(,"signals":{)";
+    texts.head_end = size();
+    texts.keys.reserve(definition.signals.size());
     for (const can::SignalDef& signal : definition.signals) {
-      texts.all += ',' + json_text(signal.name) + ':';
-      texts.keys.push_back({texts.size(), message.decimals[texts.keys.size()]});
+      all += ',';
+      all += json_text(signal.name);
+      all += ':';
+      texts.keys.push_back({size(), message.decimals[texts.keys.size()]});
     }
     for (std::uint32_t i = 0; i < definition.signals.size(); ++i) {
       const can::SignalDef& signal = definition.signals[i];
       if (signal.values.empty()) continue;
       const auto first = static_cast<std::uint32_t>(texts.of_labels.size());
       for (const auto& [value, text] : signal.values) {
-        const std::uint32_t begin = texts.size();
-        texts.all += json_text(signal.name) + ':' + json_text(text);
-        texts.of_labels.push_back({value, begin, texts.size()});
+        const std::uint32_t begin = size();
+        all += json_text(signal.name);
+        all += ':';
+        all += json_text(text);
+        texts.of_labels.push_back({value, begin, size()});
       }
       texts.labels.push_back({i, message.codec.signal(i).is_float(), first,
                               static_cast<std::uint32_t>(texts.of_labels.size())});
     }
-    texts.all.shrink_to_fit();
+    texts.all = all;  // no larger than it is
     texts.of_labels.shrink_to_fit();
   }
 
@@ -242,6 +251,7 @@ class JsonFrames : public FrameWriter {
 
   bool with_raw_;
   std::vector<Texts> texts_;
+  std::string scratch_;  // what the text of the next message is put together in
   std::string interface_;
   std::string interface_json_ = R"("")";
 };

@@ -90,10 +90,25 @@ class JsonWriter {
     const auto end = std::to_chars(buffer, buffer + sizeof buffer, number).ptr;
     return raw({buffer, static_cast<std::size_t>(end - buffer)});
   }
+  // Nearly all text.
+  static bool is_plain(std::string_view text) {
+    bool plain = true;
+    for (const char c : text) plain &= c >= 0x20 && c < 0x7F && c != '"' && c != '\\';
+    return plain;
+  }
   void quote(std::string_view text) {
-    if (!can::is_utf8(text)) return quote(can::utf8_from_windows_1252(text));
-    static constexpr char kHex[] = "0123456789abcdef";
     text_ += '"';
+    if (is_plain(text)) {
+      text_ += text;
+    } else if (can::is_utf8(text)) {
+      escape(text);
+    } else {
+      escape(can::utf8_from_windows_1252(text));
+    }
+    text_ += '"';
+  }
+  void escape(std::string_view text) {
+    static constexpr char kHex[] = "0123456789abcdef";
     for (std::size_t i = 0; i < text.size(); ++i) {
       const char c = text[i];
       const auto byte = static_cast<unsigned char>(c);
@@ -114,7 +129,6 @@ class JsonWriter {
         text_ += c;
       }
     }
-    text_ += '"';
   }
 
   std::string text_;
