@@ -336,13 +336,22 @@ class CsvFrames : public FrameWriter {
     *at++ = ',';
     at = std::copy(interface_cell_.begin(), interface_cell_.end(), at);
     std::size_t column = 0;
-    frame.values.for_each_present([&](std::size_t i) {
-      const std::size_t next = frame.message.columns[i] + std::size_t{1};
-      at = write_commas(at, next - column);
+    const auto go_to = [&](std::size_t next) {
+      const std::size_t count = next - column;
       column = next;
+      if (count < kCommasApart) {
+        at = write_commas(at, count);
+        return;
+      }
+      out.append(row_.data(), at);
+      out.append(count, ',');
+      at = row_.data();
+    };
+    frame.values.for_each_present([&](std::size_t i) {
+      go_to(frame.message.columns[i] + std::size_t{1});
       at = write_cell(frame, i, at);
     });
-    at = write_commas(at, columns_ - column);
+    go_to(columns_);
     *at++ = '\n';
     out.append(row_.data(), at);
   }
@@ -376,6 +385,10 @@ class CsvFrames : public FrameWriter {
     row_.resize(2 * text::kNumberLongest + interface_cell_.size() +
                 columns_ * (text::kNumberLongest + 1));
   }
+
+  // Chosen: so many are written where they stay, not copied there. A fifth less or more: the same
+  // time.
+  static constexpr std::size_t kCommasApart = 64;
 
   bool with_raw_;
   std::size_t columns_ = 0;
