@@ -40,5 +40,33 @@ TEST(SlowGain, SamplesThatAreNotThereCountForNothing) {
   EXPECT_NEAR(energy.slow, energy.whole, 1e-9);
 }
 
+Hypothesis usual() {
+  Hypothesis out;
+  out.state.nuisance = Eigen::VectorXd::Zero(kNuisanceCount);
+  const NuisanceTable table = default_nuisances();
+  for (int i = 0; i < kNuisanceCount; ++i) {
+    out.state.nuisance[i] = table[static_cast<std::size_t>(i)].nominal;
+  }
+  out.fit.scatter = default_scatter();
+  return out;
+}
+
+TEST(SlowGain, SeatsThatScatterAsUsualAgainAreAMachine) {
+  constexpr int kSeat = 1;
+  Hypothesis scattered = usual();
+  scattered.fit.scatter.variance[kSeat] *= 64.0;
+  EXPECT_TRUE(mends_machine(scattered, usual()));
+  EXPECT_FALSE(mends_machine(usual(), scattered));
+  EXPECT_FALSE(mends_machine(scattered, scattered));
+  EXPECT_FALSE(mends_machine(usual(), usual()));
+}
+
+TEST(SlowGain, ACurveThatFrictionHasAgainIsAMachine) {
+  Hypothesis bent = usual();
+  bent.state.nuisance.segment(kShapeOverdrive, kShapeKnots).array() -= 0.6;
+  EXPECT_TRUE(mends_machine(bent, usual()));
+  EXPECT_FALSE(mends_machine(bent, bent));
+}
+
 }  // namespace
 }  // namespace beltgrip::diagnose

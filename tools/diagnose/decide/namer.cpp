@@ -478,6 +478,7 @@ std::optional<int> gains_by_noise(Engine& engine, const Naming& naming) {
     std::vector<int> others = set;
     std::erase(others, slot);
     const Hypothesis without = without_slot(engine, naming, others);
+    if (mends_machine(without, whole)) continue;
     const double gain = 2.0 * (whole.log_likelihood - without.log_likelihood);
     if (gain_of_noise(engine, without, whole) > kOfNoise * gain) return slot;
   }

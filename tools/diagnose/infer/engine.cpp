@@ -670,10 +670,7 @@ std::vector<RandomVector> Engine::offsets() const {
   return out;
 }
 
-bool Engine::scatters_unusually() const {
-  constexpr double kUnusual = 3.0;  // times the usual
-  return (base_.scatter.variance > kUnusual * kUnusual * default_scatter().variance).any();
-}
+bool Engine::scatters_unusually() const { return is_unusual(base_.scatter).any(); }
 
 std::vector<Score> Engine::screen_with_usual_scatter() const {
   const std::vector<int> base = with_nuisances(accepted_);

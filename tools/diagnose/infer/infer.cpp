@@ -231,6 +231,11 @@ bool is_beyond_scatter(const Scatter& scatter) {
   return scatter.variance[kLevel] >= kScatterCap * kScatterCap * default_scatter().variance[kLevel];
 }
 
+Eigen::Array<bool, kRandomEffects, 1> is_unusual(const Scatter& scatter) {
+  constexpr double kUnusual = 3.0;  // times the usual
+  return scatter.variance > kUnusual * kUnusual * default_scatter().variance;
+}
+
 bool parts_experiments(const Scatter& without, const Scatter& with) {
   constexpr double kMore = 4.0;  // of the variance, on balance of all kinds
   // By what healthy experiments differ anyway, none has been driven apart.

@@ -67,6 +67,8 @@ struct Scatter {
 Scatter default_scatter();
 // Of the friction's level: more than any scatter is, so that its estimate ends at a bound.
 bool is_beyond_scatter(const Scatter& scatter);
+// Of each kind: by more than experiments with one machine do.
+Eigen::Array<bool, kRandomEffects, 1> is_unusual(const Scatter& scatter);
 // A cause that acts in every experiment makes them more alike. What fits within each of them and
 // drives them apart is none: a noise in the regressors that it happens to divide.
 bool parts_experiments(const Scatter& without, const Scatter& with);

@@ -51,4 +51,10 @@ double gain_of_noise(const Engine& engine, const Hypothesis& without, const Hypo
   return (before.whole - after.whole) - (before.slow - after.slow);
 }
 
+bool mends_machine(const Hypothesis& without, const Hypothesis& with) {
+  const bool straightens =
+      !Engine::curve_is_possible(without.state) && Engine::curve_is_possible(with.state);
+  return straightens || (is_unusual(without.fit.scatter) && !is_unusual(with.fit.scatter)).any();
+}
+
 }  // namespace beltgrip::diagnose

@@ -19,4 +19,8 @@ ResidualEnergy energy_of(const Eigen::VectorXd& white, Eigen::Index from, Eigen:
 // shows.
 double gain_of_noise(const Engine& engine, const Hypothesis& without, const Hypothesis& with);
 
+// `without` has a curve or a scatter between experiments that no machine has, `with` has none: that
+// is a course, and two fits of which one is no machine compare nothing by their residuals.
+bool mends_machine(const Hypothesis& without, const Hypothesis& with);
+
 }  // namespace beltgrip::diagnose
