@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "estimator/statistics/order.h"
+#include "tools/diagnose/infer/noise_balance.h"
 #include "tools/diagnose/infer/parallel.h"
 #include "tools/diagnose/model/curve_family.h"
 
@@ -542,6 +543,12 @@ void Engine::fit_machine() {
   first_ = best.first;
   way_ = best.way;
   whitening_ = best.whitening;
+  // Told from the residual only once the machine is near; then all looks by that.
+  balance_noise(state_, campaign_);
+  for (std::size_t look = 0; look < coarse_.size(); ++look) {
+    coarse_[look].noise = campaign_.noise.times(kCoarseness[look]);
+    coarse_[look].slip_noise_share = campaign_.slip_noise_share;
+  }
   noise_version_ = next_version();
 }
 

@@ -6,6 +6,7 @@
 
 #include "estimator/statistics/order.h"
 #include "tools/diagnose/infer/foot_points.h"
+#include "tools/diagnose/infer/noise_probe.h"
 #include "tools/diagnose/model/curve_family.h"
 #include "tools/diagnose/model/lanes.h"
 
@@ -492,24 +493,6 @@ ResidualColumns secant(const Campaign& campaign, int run, const ModelState& stat
   return propagate(campaign, at, change);
 }
 
-namespace {
-// Of noise alone, with its sigma: a fourth difference. Of a motion that swings with 0.4 Hz a
-// hundredth is left, where a second difference over as long takes all of it for noise.
-struct NoiseProbe {
-  int lag;             // samples
-  double correlation;  // of two that lie so far apart: they share samples of the local fit
-
-  double at(const ArrayXd& y, int k) const {
-    const double fourth =
-        y[k - 2 * lag] - 4.0 * y[k - lag] + 6.0 * y[k] - 4.0 * y[k + lag] + y[k + 2 * lag];
-    // Gaussian weights: at twice the distance the fourth power.
-    return fourth / std::sqrt(70.0 - 112.0 * correlation + 56.0 * std::pow(correlation, 4.0));
-  }
-};
-constexpr NoiseProbe kFastProbe{2, 0.13};             // 0.2 s, weights of 0.07 s
-constexpr NoiseProbe kSlowProbe{kBalanceStep, 0.37};  // 0.5 s, weights of 0.25 s
-}  // namespace
-
 NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& state) {
   std::vector<double> slip_share, torque, tracking, force;
   std::array<std::vector<double>, kStops> balance;
@@ -519,7 +502,7 @@ NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& st
     const auto collect = [&](const ArrayXd& y, std::vector<double>& into, int stop = kNoStop) {
       if (y.size() == 0) return;
       const NoiseProbe& probe = stop == kNoStop ? kFastProbe : kSlowProbe;
-      const int reach = 2 * probe.lag;
+      const int reach = probe.reach();
       for (int k = reach; k + reach < data.size(); k += 2) {
         const auto before = static_cast<std::size_t>(k - reach);
         const auto after = static_cast<std::size_t>(k) + static_cast<std::size_t>(reach);
@@ -573,7 +556,7 @@ std::vector<double> estimate_slip_noise_shares(const Campaign& campaign, const M
     const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
     const Quantities q = quantities(campaign, data, run, state);
     std::vector<double> slip_share;
-    constexpr int kReach = 2 * kFastProbe.lag;
+    constexpr int kReach = kFastProbe.reach();
     for (int k = kReach; k + kReach < data.size(); ++k) {
       if (!data.valid[static_cast<std::size_t>(k - kReach)] ||
           !data.valid[static_cast<std::size_t>(k) + kReach]) {
