@@ -53,5 +53,29 @@ TEST(SensorAccuracy, ExcusesNoGainFarBeyondIt) {
   EXPECT_NEAR(d.gain, 0.08, 0.005);
 }
 
+std::vector<std::string> names_of_offset(double offset_Pa, double stated_Pa) {
+  blind::Trial trial;
+  trial.seed = 7;
+  blind::Random random(trial.seed);
+  trial.plan = blind::draw_plan(random, trial.machine.setting, 10);
+  trial.planted.push_back({"pressure_offset", {{"offset_Pa", offset_Pa}}, {}});
+  Accuracies accuracies{};
+  accuracies[static_cast<std::size_t>(Role::kSecondaryPressure)].bias = stated_Pa;
+  Engine engine(campaign_of(trial, accuracies));
+  const Naming naming = name_effects(engine, [] { return false; });
+  std::vector<std::string> out;
+  for (const Accepted& each : naming.accepted) {
+    out.emplace_back(engine.campaign().slots[static_cast<std::size_t>(each.slot)].row->id);
+  }
+  return out;
+}
+
+TEST(SensorAccuracy, ThatWasStatedOfThePressureIsNoOffset) {
+  constexpr double kOffset_Pa = 40e3;
+  EXPECT_EQ(names_of_offset(kOffset_Pa, 0.0).size(), 1U);
+  EXPECT_EQ(names_of_offset(kOffset_Pa, 0.1 * kOffset_Pa).size(), 1U);
+  EXPECT_TRUE(names_of_offset(kOffset_Pa, kOffset_Pa).empty());
+}
+
 }  // namespace
 }  // namespace beltgrip::diagnose

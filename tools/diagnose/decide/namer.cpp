@@ -53,6 +53,9 @@ constexpr double kShareOfFirst = 0.02;
 // Of the gain: a name that explains as much is no such difference, be the first as large as it may.
 constexpr double kOwnGain = 100.0, kOwnShare = 5e-4;
 constexpr double kHeld = 0.5;
+// Of what was stated of a sensor. As far as the gain of one torque against the other may be the
+// sensors' own (kReach of the engine); a fifth less or more: not run.
+constexpr double kStatedSigmas = 3.0;
 constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
 // Log odds that what is of no consequence is there. How small it is says what it matters, not
 // whether it is there; but what the form of the friction leaves in healthy machines is small as
@@ -171,6 +174,32 @@ bool is_beyond_holding(const Engine& engine, int slot, double size) {
          std::abs(size) >= half_step(engine.campaign(), which);
 }
 
+// One sigma of a constant error that was stated of the sensor whose error this slot is, in its
+// unit; 0: nothing was.
+double stated_sigma(const Campaign& campaign, const Slot& slot) {
+  const auto of = [&](Role role) { return campaign.accuracies[static_cast<std::size_t>(role)]; };
+  const std::string_view id = slot.row->id;
+  if (id == "pressure_offset") return of(Role::kSecondaryPressure).bias;
+  if (id == "spring_force") {
+    return campaign.variator.secondary_piston_area_m2 * of(Role::kSecondaryPressure).bias;
+  }
+  if (id == "pressure_gain") return of(Role::kSecondaryPressure).gain;
+  if (id == "torque_bias") {
+    const bool is_engine = campaign.runs.size() > 0 && campaign.runs[0].torque_is_engine;
+    return of(is_engine ? Role::kEngineTorque : Role::kPrimaryTorque).bias;
+  }
+  if (id == "speed_scale") {
+    return of(slot.row->parameter == "primary" ? Role::kPrimarySpeed : Role::kSecondarySpeed).gain;
+  }
+  return 0.0;
+}
+
+// What a sensor may be off by, as stated, is no finding.
+bool is_beyond_sensors(const Engine& engine, int slot, double size) {
+  const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
+  return std::abs(size) >= kStatedSigmas * stated_sigma(engine.campaign(), which);
+}
+
 bool is_of_consequence(const Engine& engine, int slot, double size) {
   const double typical = engine.campaign().slots[static_cast<std::size_t>(slot)].row->typical;
   return std::abs(size) > kOfConsequence * typical;
@@ -186,7 +215,8 @@ bool is_worth_a_name(const Engine& engine, int slot, double size, double ln_odds
 bool credible(const Engine& engine, int slot, double size) {
   const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
   const EffectRow& row = *which.row;
-  if (!is_beyond_holding(engine, slot, size)) return false;
+  if (!is_beyond_holding(engine, slot, size) || !is_beyond_sensors(engine, slot, size))
+    return false;
   if (row.id == "radius_tilt" && !engine.campaign().torque_varies) return false;
   const double whole = engine.campaign().switched_on[slot] + size;
   return std::abs(size) / row.typical < kBelievable && whole < row.high &&
@@ -302,6 +332,7 @@ bool stands_beside(const Engine& engine, const Hypothesis& rival, int of_rival, 
                    int slot) {
   const double size = rival.state.effects[of_rival];
   const Rival what{.is_too_small = !is_beyond_holding(engine, of_rival, size) ||
+                                   !is_beyond_sensors(engine, of_rival, size) ||
                                    !is_worth_a_name(engine, of_rival, size, ln_odds),
                    .is_possible = credible(engine, rival),
                    .repeats_one = repeats_one(engine.campaign())};
@@ -383,6 +414,9 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
         promoted = Promotion{other, ranked[i].second, out.slot};
       }
       if (is_in_curve(naming, ranked[i].second)) continue;  // never a name
+      out.is_of_sensors |=
+          !is_beyond_sensors(engine, ranked[i].second, other.state.effects[ranked[i].second]) &&
+          other.log_evidence > whole.log_evidence - std::log(kClassOdds);
       if (other.log_evidence > whole.log_evidence &&
           stands_beside(engine, other, ranked[i].second, ln_odds, out.slot)) {
         continue;
@@ -455,7 +489,8 @@ void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& 
     const auto doubtful =
         std::find_if(naming.accepted.begin(), naming.accepted.end(), [&](const Accepted& each) {
           const double size = naming.hypothesis.state.effects[each.slot];
-          return each.ln_odds < std::log(kThereOdds) || !credible(engine, each.slot, size) ||
+          return each.ln_odds < std::log(kThereOdds) || each.is_of_sensors ||
+                 !credible(engine, each.slot, size) ||
                  !is_worth_a_name(engine, each.slot, size, each.ln_odds) ||
                  each.probability < kUnlikely ||
                  estimator::student_p(size / each.sigma, each.degrees) > kDisagreement;

@@ -333,6 +333,7 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model,
   out.slots = make_slots(out.runs.all());
   out.switched_on = slot_values(model, out.slots);
   out.learned = daemon::learned_terms(model);
+  out.accuracies = accuracies;
   out.torque_varies = torque_varies(out.runs.all());
   if (const auto ripple = model.effects.find("speed_ripple"); ripple != model.effects.end()) {
     out.known_ripples = ripple->second.parameters;

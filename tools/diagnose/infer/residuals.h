@@ -72,6 +72,7 @@ struct Campaign {
   Eigen::VectorXd switched_on;  // sizes that the model file gives; states come on top
   std::map<std::string, double> known_ripples;  // of the model file, by shaft
   std::vector<estimator::LearnedTerm> learned;  // of the model file
+  Accuracies accuracies{};                      // stated of the sensors
   NoiseLevels noise;
   std::vector<double> slip_noise_share;  // per experiment: its noise of slip over noise.slip
   double slip_noise_share_of(int run) const {
