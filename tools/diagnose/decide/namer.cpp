@@ -103,6 +103,19 @@ ModelState with_one_curve(const Engine& engine) {
   return out;
 }
 
+// Where the curve is flat about its peak, both may have slid along it together: the state with the
+// form that friction usually has and its peaks where they usually are.
+ModelState with_usual_curve(const Engine& engine) {
+  ModelState out = engine.state();
+  for (const int p : engine.active_nuisances()) {
+    const bool is_form = p >= kShapeOverdrive && p <= kEndOfShapes;
+    if (is_form || p == kLnPeakSlipOverdrive || p == kLnPeakSlipLow) {
+      out.nuisance[p] = engine.campaign().nuisances[static_cast<std::size_t>(p)].nominal;
+    }
+  }
+  return out;
+}
+
 // The slots to refit: by gain and by significance, none that is barred.
 std::vector<int> shortlist(const std::vector<Score>& scores, int count, double in_curve_max,
                            const std::vector<int>& barred) {
@@ -603,6 +616,10 @@ Hypothesis fitted(Engine& engine, const std::vector<Score>& scores, const Hypoth
   if (afar) or_better(engine.refine_from_afar(candidate, better()));
   if (id_of(engine, candidate.back()) == "friction_ratio") {
     or_better(engine.refine_from(with_one_curve(engine), candidate, Engine::kSteps, better()));
+    // Once, as it goes to its end: along a flat curve each step gains little.
+    if (candidate.size() == 1) {
+      or_better(engine.refine_from(with_usual_curve(engine), candidate, kSettling));
+    }
   }
   return h;
 }
