@@ -339,10 +339,13 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model,
     out.known_ripples = ripple->second.parameters;
   }
   const auto gain_of = [&](Role role) { return accuracies[static_cast<std::size_t>(role)].gain; };
-  out.nuisances[kSecondaryTorqueGain].tolerance = std::hypot(
-      gain_of(Role::kSecondaryTorque),
+  const double primary =
       gain_of(out.runs.size() > 0 && out.runs[0].torque_is_engine ? Role::kEngineTorque
-                                                                  : Role::kPrimaryTorque));
+                                                                  : Role::kPrimaryTorque);
+  const double both = std::hypot(gain_of(Role::kSecondaryTorque), primary);
+  out.nuisances[kSecondaryTorqueGain].tolerance = both;
+  // Derived: of a sum of two independent errors each is expected to have its share of the variance.
+  if (both > 0.0) out.primary_share_of_gain = primary * primary / (both * both);
   for (const ExperimentData& run : out.runs) {
     out.has_balance |= run.valid_count > 0 && run.torque_s.present;
     out.has_tracking |= run.valid_count > 0 && run.command.present;
@@ -593,9 +596,10 @@ double Engine::ln_mu_reached() const {
   for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
     const ExperimentData& data = campaign_.runs[e];
     if (data.valid_count == 0) continue;
-    const Quantities q = evaluate(
-        data, static_cast<int>(e), campaign_.variator, state_.nuisance,
-        Effects{&campaign_.slots, campaign_.switched_on, campaign_.learned, state_.learned});
+    const Quantities q =
+        evaluate(data, static_cast<int>(e), campaign_.variator, state_.nuisance,
+                 Effects{&campaign_.slots, campaign_.switched_on, campaign_.learned, state_.learned,
+                         campaign_.primary_share_of_gain});
     for (int k = 0; k < data.size(); ++k) {
       if (data.valid[static_cast<std::size_t>(k)]) {
         seen.push_back(std::abs(q.belt_torque[k]) / q.capacity[k]);

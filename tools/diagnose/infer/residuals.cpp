@@ -28,7 +28,7 @@ Quantities quantities(const Campaign& campaign, const ExperimentData& data, cons
                       int run, const ModelState& state) {
   return evaluate(data, read, run, campaign.variator, state.nuisance,
                   Effects{&campaign.slots, campaign.switched_on + state.effects, campaign.learned,
-                          state.learned});
+                          state.learned, campaign.primary_share_of_gain});
 }
 
 std::array<CurveShape, kStops> shapes(const Eigen::VectorXd& nuisance, const Quantities& q) {
@@ -360,8 +360,8 @@ QuantityChange deformation_change(const ExperimentData& data, const Residuals& a
 }
 
 // In closed form; nothing: there is none for this parameter.
-std::optional<QuantityChange> known_change(const ExperimentData& data, const Residuals& at,
-                                           int parameter) {
+std::optional<QuantityChange> known_change(const Campaign& campaign, const ExperimentData& data,
+                                           const Residuals& at, int parameter) {
   const int n = data.size();
   switch (parameter) {
     case kLossConstant_Nm:
@@ -390,8 +390,18 @@ std::optional<QuantityChange> known_change(const ExperimentData& data, const Res
       return balance_change(-at.measured.ratio);
     case kSecondaryLossPerSpeed_Nms:
       return balance_change(-at.measured.ratio * at.measured.omega_s);
-    case kSecondaryTorqueGain:  // by the torque of the foot point: no noise in a regressor
-      return balance_change(at.clean_Nm);
+    case kSecondaryTorqueGain: {  // by the torque of the foot point: no noise in a regressor
+      QuantityChange change = balance_change(at.clean_Nm);
+      const double inertia_kg_m2 =
+          data.torque_is_engine
+              ? campaign.primary_share_of_gain * campaign.variator.primary_inertia_kg_m2
+              : 0.0;
+      if (inertia_kg_m2 != 0.0) {
+        change.torque = inertia_kg_m2 * data.omega_p.slow_slope;
+        change.balance += change.torque;
+      }
+      return change;
+    }
     default:
       return std::nullopt;
   }
@@ -454,7 +464,7 @@ QuantityChange change_by(const Campaign& campaign, int run, const ModelState& st
   }
   // With slip energy at work, whatever moves the slip moves the friction: by differences, below.
   if (!energy_acts(campaign, state)) {
-    if (auto change = known_change(data, at, parameter)) return std::move(*change);
+    if (auto change = known_change(campaign, data, at, parameter)) return std::move(*change);
   }
   return difference(campaign, run, state, at, parameter);
 }

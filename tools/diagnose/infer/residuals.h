@@ -82,6 +82,8 @@ struct Campaign {
   // By more than a ramp itself moves it as the belt begins to slip. What follows the torque cannot
   // be told where it does not.
   bool torque_varies = false;
+  // Of the gain of one torque against the other, by the accuracies stated of them.
+  double primary_share_of_gain = 0.0;
   bool has_balance = false;
   bool has_tracking = false;
 };

@@ -234,7 +234,7 @@ class Passes {
       out_Nm[k] = constant_Nm + per_speed_Nms * omega_p[k] + per_N_Nm * force_N[k];
     });
     if (!run_.torque_is_engine) return;
-    for_rows(n_, [inertia_kg_m2 = variator_.primary_inertia_kg_m2,
+    for_rows(n_, [inertia_kg_m2 = c.primary_inertia_kg_m2,
                   slope = run_.omega_p.slope.data(), slow_slope = run_.omega_p.slow_slope.data(),
                   slope_p = c.slope_p.data(), out_Nm = c.loss_Nm.data()](Row k) BELTGRIP_INLINE {
       out_Nm[k] += inertia_kg_m2 * (slope[k] + slope_p[k] - slow_slope[k]);
@@ -313,7 +313,7 @@ class Passes {
       to[k] = belt_Nm[k] + slow_Nm[k] - read_Nm[k] - at[k] * behind_Nm;
     });
     if (run_.torque_is_engine) {
-      out += variator_.primary_inertia_kg_m2 * (run_.omega_p.slope - run_.omega_p.slow_slope);
+      out += c.primary_inertia_kg_m2 * (run_.omega_p.slope - run_.omega_p.slow_slope);
     }
     return out;
   }
@@ -367,6 +367,8 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
             read.torque_Nm,
             run.omega_p.slow_slope,
             run.omega_s.slow_slope,
+            variator.primary_inertia_kg_m2 *
+                (1.0 - effects.primary_share_of_gain * nuisance[kSecondaryTorqueGain]),
             run.command.present ? run.command.value : ArrayXd(),
             {},
             {},

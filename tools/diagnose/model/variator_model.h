@@ -77,6 +77,9 @@ struct Context {
   int experiment = 0;                                 // its place in the order given
   Eigen::ArrayXd omega_p, omega_s, pressure, torque;  // the true ones, as the model believes
   Eigen::ArrayXd slope_p, slope_s;                    // of both speeds, slow copies
+  // Before the belt, in the measure of the primary torque: what that reads too little is missing
+  // of what speeding up takes as well.
+  double primary_inertia_kg_m2 = 0.0;
   Eigen::ArrayXd track;        // what p_s should be by the command (tracking residual)
   Eigen::ArrayXd force_N;      // F_s
   Eigen::ArrayXd loss_Nm;      // between shaft and belt, drag positive

@@ -78,6 +78,9 @@ struct Effects {
   const std::vector<Slot>* slots = nullptr;
   Eigen::VectorXd value;
   std::span<const estimator::LearnedTerm> learned, learned_too;  // what has no slot
+  // Of what kSecondaryTorqueGain says both torques differ by: the share that is the primary one's,
+  // which reads so much less.
+  double primary_share_of_gain = 0.0;
 };
 
 }  // namespace beltgrip::diagnose
