@@ -19,9 +19,8 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kGrid_s = 0.1;
 constexpr double kKernelSigma_s = 0.07;
 constexpr double kSlowSigma_s = 0.25;
-constexpr double kTrim_s = 0.3;            // either end of a gapless stretch
-constexpr double kSlipMax_share = 0.06;    // beyond: damage, not friction to be explained
-constexpr double kSlipRateMax_1_s = 0.03;  // the run-away: ratios of derivatives, no statics
+constexpr double kTrim_s = 0.3;          // either end of a gapless stretch
+constexpr double kSlipMax_share = 0.06;  // beyond: damage, not friction to be explained
 // Derived, at a peak at 1.5 %: there the friction of a mean slip is a mean friction but for 0.2 %.
 constexpr double kSlipRateCalm_1_s = 0.012;
 constexpr double kRatioTolerance = 0.085;  // ln; around an end stop
@@ -637,6 +636,19 @@ SampleFlags judge_samples(const estimator::VariatorParameters& variator,
   return out;
 }
 
+// Where the belt goes on from the end of a stretch, within what is cut off there, to run away.
+void find_run_aways(const std::vector<bool>& runs_away, ExperimentData& data) {
+  const int ends = static_cast<int>(std::lround(kTrim_s / data.dt_s));
+  for (const Stretch& stretch : data.stretches) {
+    const int beyond = std::min(data.size(), stretch.end + ends + 1);
+    int first = stretch.end;
+    while (first < beyond && !runs_away[static_cast<std::size_t>(first)]) ++first;
+    if (first == beyond) continue;
+    const int last = stretch.end - 1;
+    data.run_aways.push_back({last, (first - last) * data.dt_s});
+  }
+}
+
 }  // namespace
 
 ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator,
@@ -660,6 +672,7 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
   const SampleFlags flags = judge_samples(variator, saturated, data);
   trim(flags.runs_away, data);
   mask_and_segment(flags.too_fast, data);
+  find_run_aways(flags.runs_away, data);
   widen_slow(data.pressure, data.dt_s);
   if (data.saturated_pressure) {
     data.notes.push_back(table.name + ": secondary_pressure rests on its bound; left out there");

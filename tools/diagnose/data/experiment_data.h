@@ -42,6 +42,15 @@ struct Rest : Stretch {
   long step = 0;
 };
 
+// Beyond: the run-away, where ratios of derivatives tell nothing of statics.
+inline constexpr double kSlipRateMax_1_s = 0.03;
+
+// Where a stretch of valid samples ends because the belt runs away.
+struct RunAway {
+  int last = 0;        // of the stretch
+  double gap_s = 0.0;  // from there to the first that is too fast
+};
+
 struct ExperimentData {
   std::string name;
   double dt_s = 0.1;
@@ -59,6 +68,7 @@ struct ExperimentData {
   Eigen::ArrayXd slip_spread_share2;
   std::vector<bool> valid;         // may carry a conclusion
   std::vector<Stretch> stretches;  // the valid samples
+  std::vector<RunAway> run_aways;
   int valid_count = 0;
   bool saturated_pressure = false;
   double rounding_slip_share =
