@@ -19,6 +19,7 @@
 #include "tools/diagnose/infer/parallel.h"
 #include "tools/diagnose/infer/peak.h"
 #include "tools/diagnose/infer/residual_tests.h"
+#include "tools/diagnose/infer/uncertainty.h"
 #include "tools/diagnose/model/curve_family.h"
 
 namespace beltgrip::diagnose {
@@ -28,8 +29,6 @@ constexpr int kSamplesMin = 100;             // 10 s of usable data
 constexpr std::size_t kExperimentsMin = 3;   // from where on their scatter is known
 constexpr std::size_t kLearningRunsMin = 6;  // fewer leave no level out
 constexpr int kRoundsMax = 2;                // of learning and naming
-constexpr double kDetectable = 5.0;          // sigmas: found with 90 % and more
-constexpr double kRealistic = 3.0;           // in usual sizes: an effect is hardly ever larger
 constexpr double kAbsorbed = 0.99;           // chosen, of a column: a constant by another name
 
 double quantile_975(double degrees) {
@@ -308,7 +307,8 @@ class Run {
     fill_findings(engine, named ? naming.accepted : std::vector<Accepted>(), naming, gain);
     fill_learned(engine, naming, learning, gain);
     judge(engine, naming, learning, named);
-    count_unexplained(engine, learning.left);
+    count_learned(engine, learning);
+    count_unexplained(engine, naming, learning.left);
     propose(engine, naming, learning);
     answer_.extended = request_.model;
     store_learned();
@@ -424,31 +424,50 @@ class Run {
 
   // What is left unexplained stands in the level of the friction as well: which of the experiments,
   // or which value of what it follows, is the machine's own cannot be said.
-  void count_unexplained(const Engine& engine, const Criticism& left) {
-    const auto mu_max = out().machine.find("mu_max");
-    if (!out().unexplained || left.tests.empty() || mu_max == out().machine.end()) return;
+  void count_unexplained(const Engine& engine, const Naming& naming, const Criticism& left) {
+    if (!out().unexplained || left.tests.empty() || !out().machine.contains("mu_max")) return;
     const Scatter& scatter = engine.scatter();
     if (is_beyond_scatter(scatter)) {
-      out().machine.erase(mu_max);
-      out().notes.emplace_back(
-          "mu_max: experiments differ by more than friction scatters, for no reason found; no "
-          "value");
+      no_mu_max("experiments differ by more than friction scatters, for no reason found");
       return;
     }
     double variance = 0.0;
     const auto fails = [&](const char* name) { return !left.test(name).passed(); };
     if (fails("scatter_friction") || fails("unusual_friction")) variance += scatter.variance[0];
-    if (fails("law_cell") || fails("smooth_cell")) variance += friction_variance(engine, left);
-    Interval& told = mu_max->second;
+    if (fails("law_cell") || fails("smooth_cell")) {
+      variance += friction_variance(engine, left.cells.front());
+    }
+    widen_mu_max(variance + variance_of_halves(engine, naming.last_screen, mu_height_) +
+                 variance_of_bending(engine, naming.hypothesis, mu_height_));
+  }
+
+  void no_mu_max(const std::string& why) {
+    out().machine.erase("mu_max");
+    out().notes.push_back("mu_max: " + why + "; no value");
+  }
+
+  // variance: of its logarithm, beside what its interval counts.
+  void widen_mu_max(double variance) {
+    Interval& told = out().machine.at("mu_max");
     const double half = std::hypot(0.5 * std::log(told.high / told.low),
                                    estimator::kNormal95 * std::sqrt(variance));
     told.low = told.value * std::exp(-half);
     told.high = told.value * std::exp(half);
+    if (half > estimator::kNormal95 * default_nuisances()[kLnMuMax].tolerance) {
+      no_mu_max("what is left unexplained may have it off by more than belts differ");
+    }
+  }
+
+  // A function that was learned is about its mean over the experiments; where on it the machine's
+  // own friction lies is not known.
+  void count_learned(const Engine& engine, const Learning& learning) {
+    double variance = 0.0;
+    for (const Learned& each : learning.terms) variance += friction_variance(engine, each.fit.cell);
+    if (variance > 0.0 && out().machine.contains("mu_max")) widen_mu_max(variance);
   }
 
   // What the function that stands out comes to in the friction, relative, about its mean.
-  static double friction_variance(const Engine& engine, const Criticism& left) {
-    const Cell& cell = left.cells.front();
+  static double friction_variance(const Engine& engine, const Cell& cell) {
     double per_unit = 0.0;
     switch (cell.injection->injection) {
       case Injection::kFriction:
@@ -530,11 +549,62 @@ class Run {
       tell(low ? "peak_slip_low" : "peak_slip_overdrive", peak.ln_slip, peak.ln_slip_sigma,
            low ? kLnPeakSlipLow : kLnPeakSlipOverdrive);
       if (low && uses_stop(engine, kOverdriveStop)) continue;
-      tell("mu_max", peak.ln_mu,
-           std::hypot(peak.ln_mu_sigma, mu_of_class(engine, naming, peak, stop),
-                      mu_of_sensors(engine)),
-           kLnMuMax);
+      const double seen = std::hypot(peak.ln_mu_sigma, mu_of_class(engine, naming, peak, stop),
+                                     mu_of_sensors(engine));
+      mu_height_ = peak.height;
+      open_ = left_open(engine, unseen_in(engine.campaign(), naming), peak.height);
+      tell("mu_max", peak.ln_mu, std::hypot(seen, std::sqrt(open_.variance)), kLnMuMax);
+      if (open_.variance > seen * seen) {
+        note_open();
+      } else {
+        open_ = {};
+      }
     }
+  }
+
+  // Effects that these data do not show. What somebody stated a sensor to be accurate to
+  // is counted as that.
+  std::vector<Score> unseen_in(const Campaign& campaign, const Naming& naming) const {
+    std::map<std::string_view, bool> is_plain;
+    for (const Score& score : naming.last_screen) {
+      const Slot& slot = campaign.slots[static_cast<std::size_t>(score.slot)];
+      is_plain[slot.row->id] |= is_seen(score, slot);
+    }
+    for (const Accepted& each : naming.accepted) {
+      is_plain[campaign.slots[static_cast<std::size_t>(each.slot)].row->id] = true;
+    }
+    const auto& torque = request_.accuracies[static_cast<std::size_t>(
+        campaign.runs[0].torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque)];
+    const auto& pressure = request_.accuracies[static_cast<std::size_t>(Role::kSecondaryPressure)];
+    is_plain["torque_bias"] |= torque.bias > 0.0;
+    is_plain["torque_gain"] |= torque.gain > 0.0;
+    is_plain["pressure_offset"] |= pressure.bias > 0.0;
+    is_plain["pressure_gain"] |= pressure.gain > 0.0;
+    std::vector<Score> out;
+    for (const Score& score : naming.last_screen) {
+      const Slot& slot = campaign.slots[static_cast<std::size_t>(score.slot)];
+      if (!is_plain[slot.row->id]) out.push_back(score);
+    }
+    return out;
+  }
+
+  static std::string open_share(const LeftOpen::Share& share) {
+    return std::string(share.effect) + " (" + text_of(100.0 * std::sqrt(share.variance)) + " %)";
+  }
+
+  // Which effects are behind an interval of mu_max that is wide for what was not seen.
+  void note_open() {
+    constexpr std::size_t kNamed = 3;
+    std::string names;
+    for (std::size_t i = 0; i < std::min(kNamed, open_.by_effect.size()); ++i) {
+      names += (i == 0 ? "" : ", ") + open_share(open_.by_effect[i]);
+    }
+    out().notes.push_back(
+        "mu_max: known to " + text_of(100.0 * std::sqrt(open_.variance)) +
+        " % for what these experiments cannot show, were it there at its usual "
+        "size: " +
+        names + "; to see the first: " +
+        std::string(row_of(std::string(open_.by_effect.front().effect))->separating));
   }
 
   // What another member of the class in a name's place would have mu_max differ by, one sigma: by
@@ -737,7 +807,7 @@ class Run {
           score.sigma > 0.0 ? kDetectable * score.sigma : std::numeric_limits<double>::infinity();
       auto& known = smallest[id];
       if (!known.contains(parameter) || size < known[parameter]) known[parameter] = size;
-      visible[id] |= size < kRealistic * slot.row->typical;
+      visible[id] |= is_seen(score, slot);
       absorbed[id] = std::max(absorbed[id], score.absorbed);
     }
     const auto named = [&](std::string_view id) {
@@ -794,6 +864,12 @@ class Run {
       next("", "repeat the reference three times: how experiments scatter is not known");
       return;
     }
+    if (!open_.by_effect.empty()) {
+      const LeftOpen::Share& most = open_.by_effect.front();
+      next(row_of(std::string(most.effect))->depends_on,
+           "to see " + open_share(most) + ", which leaves most of mu_max open");
+      return;
+    }
     if (!out().not_identifiable.empty()) {
       const std::string& id = out().not_identifiable.front().effect;
       next(row_of(id)->depends_on, "to see " + id);
@@ -809,7 +885,9 @@ class Run {
   Answer answer_;
   Implausible implausible_;
   Steps steps_ = Steps::kFine;
-  Reaches reached_{};  // by what is fitted and what is held out
+  Eigen::VectorXd mu_height_;  // change of ln mu_max per column of the fit
+  LeftOpen open_;              // of mu_max; empty where other errors are larger
+  Reaches reached_{};          // by what is fitted and what is held out
 };
 
 }  // namespace
