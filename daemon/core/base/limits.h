@@ -39,11 +39,13 @@ inline constexpr double kRequestSlipRate_1_s = 0.12;      // measured: a belt th
 inline constexpr double kRequestSlipRateFrom_share = 0.0075;
 // Beyond the peak, as it is estimated. Adhesive wear begins at a line of load and sliding speed;
 // the one hard point is 3 kN, 0.8 m/s, 0.5 kW for seconds (the paper).
-// With what is still to come; measured: < 100 then. At 75 J 83 and 86 of 98 peaks in reach come to
-// a value in lab and production noise (80 and 83), but 2 of 884 requests break the promise
-// (campaign
-// --seeds 6000 --from 1810001 --nothing-wrong --noise production: 151 and 111 J).
-inline constexpr double kRequestEnergy_J = 60.0;
+// With what is still to come, a silence among it, as the motion has it (experiment/reachability).
+// Measured (campaign --seeds 6000 --from 1810001 --nothing-wrong --noise production, 884 requests,
+// 441 peaks in reach): 70 J gives 384 values and breaks nothing; 80 J 389, but two belts with level
+// tops beyond 6 % of slip take 113 and 105 J, for noise makes such a top look as if it rose. Of the
+// 98 peaks from 990001 in lab and production noise 60 J tells 79 and 83, 70 J 86 and 86, 80 J 89
+// and 89.
+inline constexpr double kRequestEnergy_J = 70.0;
 inline constexpr double kRequestPower_W = 400.0;           // chosen: 0.8 of the paper's point
 inline constexpr double kRequestFast_m_s = 0.4;            // chosen: half of what is promised
 inline constexpr double kRequestFast_s = 0.6;              // chosen, above it

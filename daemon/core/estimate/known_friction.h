@@ -44,6 +44,10 @@ class KnownFriction {
   // that errs for a moment reads like a belt that slips, and a belt that is taken for half its
   // friction is never asked again. The second such answer in a row is believed.
   double peak_as_read(const estimator::CurveEstimate& curve, double as_read) const noexcept;
+  // mu* that the belt has carried in the last experiment, where that gave a bound alone; 0: none.
+  double carried() const noexcept {
+    return newest_.kind == estimator::PeakKind::kLowerBound ? newest_.mu_max : 0.0;
+  }
   // What MinClampForce may rest on at this direction and end stop; 0: not known. What the belt has
   // shown since a value was measured, there or elsewhere, lowers it.
   double to_rest_on(const estimator::CurveEstimate& curve) const noexcept;

@@ -210,9 +210,14 @@ RampPoint Arming::point_at(const Now& now, double omega_p_rad_s) const noexcept 
   point.inertia_kg_m2 = inertia_kg_m2_;
   point.own_force_N = now.clamp_force_N;
   point.floor_N = floor_N(ratio * omega_p_rad_s);
-  point.mu_expected = known ? kKnownMargin * now.mu_max_known : settings_.friction_expected;
-  point.mu_least = known ? kKnownLeast * now.mu_max_known
-                         : std::min(kLeastFriction, settings_.friction_expected);
+  if (known) {
+    point.mu_expected = kKnownMargin * now.mu_max_known;
+    point.mu_least = kKnownLeast * now.mu_max_known;
+  } else {  // no less than it has carried
+    point.mu_expected = std::max(settings_.friction_expected, kKnownMargin * now.mu_carried);
+    point.mu_least = std::max(std::min(kLeastFriction, settings_.friction_expected),
+                              kKnownLeast * now.mu_carried);
+  }
   point.peak_slip_share = low ? kPeakSlipLow_share : kPeakSlipOverdrive_share;
   const double fall_max = kPercent * settings_.fall_max_per_percent;
   point.fall = within(now.shown.fall, fall_max);
@@ -299,7 +304,7 @@ std::uint32_t Arming::clearance(const Now& now) noexcept {
     }
     return inhibit_bit(Inhibit::kRamp);
   }
-  plan_ = {crossing, point.mu_expected, point.mu_least, point.primary_radius_m};
+  plan_ = {crossing, point, reaction(now)};
   const double longest_s = seconds(limits::kRequestLongest);
   if (needed_s <= std::min(left_s, longest_s)) return 0U;
   const double most_s = std::min(left_s, longest_s);

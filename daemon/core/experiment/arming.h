@@ -147,6 +147,7 @@ class Arming {
     double clamp_force_N = 0.0;
     double slip_percent = 0.0;          // in the direction of the torque
     double mu_max_known = 0.0;          // the last value; 0: none
+    double mu_carried = 0.0;            // without a value, the last bound; 0: none
     SlipShown shown;                    // at this direction and end stop
     Duration stale = Duration::zero();  // how long the slowest input may be silent
     bool watched = true;                // a speed that stands still would show

@@ -113,7 +113,7 @@ class ClampRequest {
   Stop judge(const Now& now, double floor_N) const noexcept;
   Stop judge_slip(const Now& now) const noexcept;
   Stop judge_damage(const Now& now) const noexcept;
-  Stop judge_room(const Now& now) const noexcept;
+  Stop judge_room() const noexcept;
   Stop judge_lag() const noexcept;
   bool belt_holds() const noexcept;
   Stop judge_floor(const Now& now, double floor_N) const noexcept;
@@ -128,6 +128,12 @@ class ClampRequest {
     return settings_.actuator_dead_time_s + settings_.actuator_lag_s;
   }
   double power_W(const Now& now) const noexcept;
+  RampPoint point_now(const Now& now, double mu) const noexcept;
+  double slip_in_all_share() const noexcept;  // of the belt, from no slip on
+  double room_share(const Now& now) const noexcept;
+  double told_s() const noexcept;  // from a decision to the actuator
+  double energy_to_come_J(const Now& now) const noexcept;
+  void reckon_anew(const Now& now) noexcept;
 
   ExperimentSettings settings_;
   bool standing_ = false;
@@ -153,6 +159,8 @@ class ClampRequest {
   double speed_step_m_s_ = 0.0;
 
   RequestPlan plan_;
+  CrossingSearch anew_;
+  double room_share_ = 0.0;  // of slip in all, for a peak that comes now
   RampLaw law_;
   bool far_ = true;     // the peak, still
   bool rides_ = false;  // on its floor, since then

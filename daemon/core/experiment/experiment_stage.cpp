@@ -98,6 +98,7 @@ bool ExperimentStage::arm(const Now& now, const KnownFriction& known,
       arming.clamp_force_N = now.estimate.measured_force_N();
       arming.slip_percent = curve.sigma_star_percent;
       arming.mu_max_known = known.peak_as_read(curve, friction_as_read);
+      arming.mu_carried = known.carried();
       arming.shown = shown(curve.direction, curve.end_stop);
       arming.stale = now.input.slowest_stale();
       arming.watched = !commands() || state_ != State::kSettling || channels.standstill_shows();

@@ -33,7 +33,8 @@ constexpr double kSlipDetectableFlat_share = 0.008;
 constexpr double kSlipDetectable_s = 0.35;
 constexpr double kFlatFall = 0.05;  // of mu per unit of slip
 constexpr double kSlipSpan = 1.05;  // 1 + sigma, of the slip beyond the peak
-constexpr double kNotCaught = 1e9;
+// So that nothing is divided by zero.
+constexpr double kLeastLag_s = 1e-3, kLeastBeyond_share = 1e-4, kLeastRate_1_s = 1e-3;
 constexpr std::size_t kCorners = 4;
 constexpr int kHalvings = 6;  // chosen: the fall that is survived, to 2 % of what must be
 constexpr int kBisections = 16;
@@ -79,11 +80,26 @@ double last_positive(Function f, double low, double high) noexcept {
 
 Excursion larger(const Excursion& a, const Excursion& b) noexcept {
   return {std::max(a.slip_share, b.slip_share), std::max(a.time_s, b.time_s),
-          std::max(a.area_s, b.area_s), std::max(a.late_s, b.late_s)};
+          std::max(a.area_s, b.area_s)};
 }
 
 double runaway_1_s(const RampPoint& point) noexcept {
   return point.torque_Nm * kSlipSpan / (point.inertia_kg_m2 * point.omega_p_rad_s);
+}
+
+// From the actuator's answer on, x1 beyond the peak with the share y1 of force missing.
+Excursion caught(const RampPoint& point, double a, double x1, double y1, double lag_s) noexcept {
+  const double force_N = peak_force_N(point, point.mu_least);
+  const double g = std::max(0.0, point.own_force_N / force_N - 1.0 + y1);
+  const Recovery recovery(a, runaway_1_s(point), x1, y1, g, lag_s);
+  // Where the own force does not catch the belt any more, slip grows without bound.
+  const double horizon_s = 8.0 * lag_s + 1.0;
+  if (recovery.slope(horizon_s) > 0.0) return {kNotCaught, kNotCaught, kNotCaught};
+  const double top_s = last_positive([&](double t) { return recovery.slope(t); }, 0.0, horizon_s);
+  // Back below the peak's slip.
+  const double end_s =
+      last_positive([&](double t) { return recovery.slip_share(t); }, top_s, horizon_s);
+  return {std::max(x1, recovery.slip_share(top_s)), end_s, recovery.area_s(end_s)};
 }
 
 }  // namespace
@@ -105,27 +121,31 @@ Excursion excursion(const RampPoint& point, const Reaction& reaction, double sli
                     double fall, double slip_detectable_share, double reaction_s) noexcept {
   const double w = runaway_1_s(point);
   const double a = w * fall / point.mu_least;
-  const double lag_s = std::max(reaction.lag_s, 1e-3);
+  const double lag_s = std::max(reaction.lag_s, kLeastLag_s);
   const double y1 = slip_rate_1_s / w;
   const double seen_s = std::log1p(a * slip_detectable_share / slip_rate_1_s) / a;
   const double told_s = seen_s + reaction.detection_s + reaction_s + reaction.dead_time_s;
   const double x1 = slip_rate_1_s / a * std::expm1(a * told_s);
-  const double force_N = peak_force_N(point, point.mu_least);
-  const double g = std::max(0.0, point.own_force_N / force_N - 1.0 + y1);
-  const Recovery recovery(a, w, x1, y1, g, lag_s);
-  // Where the own force does not catch the belt any more, slip grows without bound.
-  const double horizon_s = 8.0 * lag_s + 1.0;
-  if (recovery.slope(horizon_s) > 0.0) return {kNotCaught, kNotCaught, kNotCaught};
-  const double top_s = last_positive([&](double t) { return recovery.slope(t); }, 0.0, horizon_s);
-  Excursion out;
-  out.slip_share = std::max(x1, recovery.slip_share(top_s));
-  // Back below the peak's slip.
-  const double end_s =
-      last_positive([&](double t) { return recovery.slip_share(t); }, top_s, horizon_s);
-  out.time_s = told_s + end_s;
-  out.area_s = (x1 - slip_rate_1_s * told_s) / a + recovery.area_s(end_s);
-  out.late_s = std::max(0.0, reaction_s + end_s - lag_s);
-  return out;
+  const Excursion back = caught(point, a, x1, y1, lag_s);
+  return {back.slip_share, told_s + back.time_s, (x1 - slip_rate_1_s * told_s) / a + back.area_s};
+}
+
+double energy_to_come_J(const RampPoint& point, const Reaction& reaction, const Beyond& now,
+                        double told_s) noexcept {
+  const double w = runaway_1_s(point);
+  const double x0 = std::max(now.beyond_share, kLeastBeyond_share);
+  const double rate_1_s = std::max(now.slip_rate_1_s, kLeastRate_1_s);
+  const double a = std::min(w * point.fall / point.mu_least, rate_1_s / x0);
+  const double y1 = rate_1_s / w - a * x0 / w;
+  const double answered_s = told_s + reaction.dead_time_s;
+  // From x0 on it grows by that rate, e-fold every 1 / a.
+  const double grown_share = rate_1_s / a * std::expm1(a * answered_s);
+  const Excursion back =
+      caught(point, a, x0 + grown_share, y1, std::max(reaction.lag_s, kLeastLag_s));
+  const double beyond_s = x0 * answered_s + (grown_share - rate_1_s * answered_s) / a + back.area_s;
+  if (back.time_s >= kNotCaught) return kNotCaught;
+  return point.torque_Nm * point.omega_p_rad_s *
+         ((now.slip_share - now.beyond_share) * (answered_s + back.time_s) + beyond_s);
 }
 
 double peak_slip_max_share(const Crossing& crossing, const SlipLimits& limits, double torque_Nm,
@@ -135,14 +155,25 @@ double peak_slip_max_share(const Crossing& crossing, const SlipLimits& limits, d
   const double turn_W = std::max(1.0, torque_Nm * omega_p_rad_s);  // of a whole turn of slip
   const Excursion& cost = crossing.dearest;
   const double by_fall = (limits.energy_max_J / turn_W - cost.area_s) / cost.time_s;
-  const double by_stop =
-      (limits.energy_max_J - limits.energy_stop_J) / (turn_W * cost.late_s) - cost.slip_share;
-  return std::min(slip_share - cost.slip_share, std::min(by_fall, by_stop));
+  return std::min(slip_share - cost.slip_share, by_fall);
 }
 
 CrossingSearch::CrossingSearch(const RampPoint& point, const Reaction& reaction,
                                const SlipLimits& limits) noexcept
-    : point_(point), reaction_(reaction), limits_(limits), done_(false) {}
+    : point_(point),
+      reaction_(reaction),
+      limits_(limits),
+      to_try_(kCorners * kSlipRates_1_s.size()),
+      done_(false) {}
+
+CrossingSearch::CrossingSearch(const RampPoint& point, const Reaction& reaction,
+                               const SlipLimits& limits, double slip_rate_1_s) noexcept
+    : CrossingSearch(point, reaction, limits) {
+  const auto* const rate = std::find(kSlipRates_1_s.begin(), kSlipRates_1_s.end(), slip_rate_1_s);
+  if (rate == kSlipRates_1_s.end()) return;
+  tried_ = kCorners * static_cast<std::size_t>(rate - kSlipRates_1_s.begin());
+  to_try_ = tried_ + kCorners;
+}
 
 Excursion CrossingSearch::excursion_at(double slip_rate_1_s, Corner corner,
                                        double fall_share) const noexcept {
@@ -158,7 +189,7 @@ Excursion CrossingSearch::excursion_at(double slip_rate_1_s, Corner corner,
 bool CrossingSearch::step() noexcept {
   if (done_) return true;
   try_corner();
-  done_ = tried_ == kCorners * kSlipRates_1_s.size();
+  done_ = tried_ == to_try_;
   if (done_ && crossing_.slip_rate_1_s <= 0.0) deny();
   return done_;
 }
@@ -173,21 +204,22 @@ void CrossingSearch::try_corner() noexcept {
   const std::size_t at = tried_++ % kCorners;
   const Corner corner{.steep = at % 2 == 0, .fault = at >= 2};
   const Excursion all = excursion_at(rate_1_s, corner, 1.0);
-  const Excursion cost = corner.steep ? Excursion{all.slip_share, all.time_s, all.area_s, 0.0}
-                                      : Excursion{all.slip_share, 0.0, 0.0, all.late_s};
-  if (at == 0) tries_ = {};
+  const Excursion cost = corner.steep ? all : Excursion{all.slip_share, 0.0, 0.0};
+  if (at == 0) {
+    tries_ = {};
+    flat_ = {};
+  }
   tries_.dearest = larger(tries_.dearest, cost);
+  if (!corner.steep) flat_ = larger(flat_, all);
   if (at + 1 < kCorners) return;
   tries_.slip_rate_1_s = rate_1_s;
   tries_.peak_slip_max_share = peak_slip_max_share(tries_, limits_, point_.torque_Nm,
                                                    point_.omega_p_rad_s, point_.primary_radius_m);
   tries_.ramp_top_N_per_s =
       ramp_at_the_top_N_per_s(point_, reaction_.dead_time_s + reaction_.lag_s, rate_1_s);
-  const double told_s = kSlipDetectableFlat_share / rate_1_s + reaction_.detection_s +
-                        reaction_.dead_time_s + reaction_.lag_s;
+  const double turn_W = std::max(1.0, point_.torque_Nm * point_.omega_p_rad_s);
   tries_.peak_slip_detectable_share = std::min(
-      tries_.peak_slip_max_share,
-      limits_.energy_stop_J / (std::max(1.0, point_.torque_Nm * point_.omega_p_rad_s) * told_s));
+      tries_.peak_slip_max_share, (limits_.energy_stop_J / turn_W - flat_.area_s) / flat_.time_s);
   if (tries_.dearest.slip_share < limits::kCrossingSlipBeyond_share &&
       tries_.peak_slip_max_share > point_.peak_slip_share &&
       tries_.peak_slip_detectable_share > crossing_.peak_slip_detectable_share) {
@@ -210,10 +242,8 @@ void CrossingSearch::deny() noexcept {
     return;
   }
   const double turn_W = point_.torque_Nm * point_.omega_p_rad_s;
-  const double fall_J = (point_.peak_slip_share * cost.time_s + cost.area_s) * turn_W;
-  const double flat_J =
-      limits_.energy_stop_J + (point_.peak_slip_share + cost.slip_share) * cost.late_s * turn_W;
-  denied_ = {CrossingWall::kEnergy, std::max(fall_J, flat_J), limits_.energy_max_J};
+  denied_ = {CrossingWall::kEnergy, (point_.peak_slip_share * cost.time_s + cost.area_s) * turn_W,
+             limits_.energy_max_J};
 }
 
 // Is half of the way between survived and lost survived, first with nothing wrong?

@@ -12,8 +12,9 @@
 //                                y = y1 - g (1 - exp(-t / tau)),  g = F_own / F_pk - 1 + y1
 // Friction may fall as steeply as the point says, and is then seen early; or hardly at all, and is
 // seen late: a crossing has to hold for both. Slip energy counts from the peak on: below it, slip
-// is what every such belt does all day. On a flat top the request ends itself for that energy
-// (slip_damage), so that only what comes after its decision needs room beforehand.
+// is what every such belt does all day. On a flat top the request ends itself for that energy,
+// what is still to come counted (slip_damage, energy_to_come_J), so that it needs no room
+// beforehand.
 #pragma once
 
 #include <cstddef>
@@ -28,7 +29,7 @@ struct SlipLimits {
   double slip_max_share = 0.10;  // ever
   double slip_speed_max_m_s = 0.8;
   double energy_max_J = 90.0;  // dissipated beyond the peak; 100 less what a model may be off
-  double energy_stop_J = limits::kRequestEnergy_J;  // there the request ends itself
+  double energy_stop_J = limits::kRequestEnergy_J;  // of a flat top, there the request ends itself
 };
 
 // How long it takes from a fault, or the stop decision, to force.
@@ -72,22 +73,33 @@ struct Excursion {
   double slip_share = 0.0;  // the largest beyond the peak
   double time_s = 0.0;      // spent beyond the peak
   double area_s = 0.0;      // integral of the slip beyond the peak over that time
-  double late_s = 0.0;      // of that time, after the decision and the actuator's own answer
 };
+inline constexpr double kNotCaught = 1e9;
 // What becomes of the slip when the belt passes its peak at this slip rate, friction falls by
 // `fall` behind it, the estimator needs detection_s after slip_detectable_share beyond the peak,
-// and reaction_s passes before the actuator is told. Not caught: all 1e9.
+// and reaction_s passes before the actuator is told. Not caught: all kNotCaught.
 Excursion excursion(const RampPoint& point, const Reaction& reaction, double slip_rate_1_s,
                     double fall, double slip_detectable_share, double reaction_s) noexcept;
+
+// A belt beyond its peak. Slip in all and beyond the peak, and the rate at which it grows.
+struct Beyond {
+  double slip_share = 0.0;
+  double beyond_share = 0.0;
+  double slip_rate_1_s = 0.0;
+};
+// Slip energy, J, from now until the belt is back below its peak, where the actuator is told
+// told_s from now and mu_least is what it has now. Friction may fall as steeply as the point says,
+// but not by more than slip grows for it. kNotCaught or more where it is not caught.
+double energy_to_come_J(const RampPoint& point, const Reaction& reaction, const Beyond& now,
+                        double told_s) noexcept;
 
 // How the belt is to be brought over its peak.
 struct Crossing {
   double slip_rate_1_s = 0.0;     // 0: none is safe
   double ramp_top_N_per_s = 0.0;  // near the peak
-  // What it costs at most, beyond a peak of any slip: slip of all, time and area of a steep fall,
-  // late_s of a flat top. A point in time has room for a crossing while slip + this slip, (slip *
-  // this time + this area) T omega, and (slip + this slip) * this late_s T omega beyond the energy
-  // of the request's own stop, are inside the limits.
+  // What it costs at most, beyond a peak of any slip: slip of all, time and area of a steep fall. A
+  // point in time has room for a crossing while slip + this slip and (slip * this time + this area)
+  // T omega are inside the limits.
   Excursion dearest;
   double peak_slip_max_share = 0.0;  // the latest peak with room, at its point
   // And the latest whose flat top can be told before the request ends itself for its energy.
@@ -117,6 +129,9 @@ class CrossingSearch {
   CrossingSearch() noexcept = default;  // done, nothing found
   CrossingSearch(const RampPoint& point, const Reaction& reaction,
                  const SlipLimits& limits) noexcept;
+  // Of this slip rate alone, one of those that are tried.
+  CrossingSearch(const RampPoint& point, const Reaction& reaction, const SlipLimits& limits,
+                 double slip_rate_1_s) noexcept;
   // One excursion, about 5,000 instructions; true when the crossing stands.
   bool step() noexcept;
   bool done() const noexcept { return done_; }
@@ -141,8 +156,9 @@ class CrossingSearch {
   RampPoint point_;
   Reaction reaction_;
   SlipLimits limits_;
-  std::size_t tried_ = 0;
+  std::size_t tried_ = 0, to_try_ = 0;
   bool done_ = true;
+  Excursion flat_;  // of the rate that is tried
   Crossing tries_, crossing_;
   CrossingDenied denied_;
   // Shares of the falls that must be survived: one that is, one that is not.

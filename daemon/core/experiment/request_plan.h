@@ -7,9 +7,8 @@ namespace beltgrip::daemon {
 
 struct RequestPlan {
   Crossing crossing;
-  double mu_expected = 0.0;  // of the peak, at the most
-  double mu_least = 0.0;     // and at the least
-  double primary_radius_m = 0.0;
+  RampPoint point;  // where it is to cross
+  Reaction reaction;
 };
 
 }  // namespace beltgrip::daemon

@@ -25,7 +25,8 @@ class SlipDamage {
   bool beyond() const noexcept { return beyond_s_ > 0.0; }
   // And what is not forgotten of before.
   double energy_J() const noexcept { return energy_J_; }
-  double fast_s() const noexcept { return fast_s_; }  // faster than kRequestFast_m_s
+  double fast_s() const noexcept { return fast_s_; }    // faster than kRequestFast_m_s
+  double mu_best() const noexcept { return mu_best_; }  // the largest that was carried
   double slip_at_best_share() const noexcept { return slip_at_best_share_; }
 
  private:

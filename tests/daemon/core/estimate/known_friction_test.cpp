@@ -76,6 +76,17 @@ TEST_F(Known, ABoundBelowAValueSaysNothing) {
   EXPECT_EQ(known_.to_rest_on(curve_), 0.09);
 }
 
+// What the next request may rest on where there is no value.
+TEST_F(Known, WhatWasCarriedIsTheLastBoundAndAValueTakesItsPlace) {
+  EXPECT_EQ(known_.carried(), 0.0);
+  take(bound(0.09));
+  EXPECT_EQ(known_.carried(), 0.09);
+  take(bound(0.11));
+  EXPECT_EQ(known_.carried(), 0.11);
+  take(value(0.12));
+  EXPECT_EQ(known_.carried(), 0.0);
+}
+
 TEST_F(Known, OnlyAValueSettlesADoubt) {
   estimator::PeakEstimate none;
   none.contradictory = true;

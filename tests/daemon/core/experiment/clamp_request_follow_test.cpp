@@ -19,9 +19,9 @@ RequestPlan plan() {
   p.crossing.slip_rate_1_s = 0.025;
   p.crossing.ramp_top_N_per_s = 200.0;
   p.crossing.dearest = {0.0, 1e-6, 0.0};
-  p.mu_expected = 0.11;
-  p.mu_least = 0.085;
-  p.primary_radius_m = 0.05;
+  p.point.mu_expected = 0.11;
+  p.point.mu_least = 0.085;
+  p.point.primary_radius_m = 0.05;
   return p;
 }
 

@@ -24,9 +24,15 @@ class Stops : public testing::Test {
     plan_.crossing.slip_rate_1_s = 0.025;
     plan_.crossing.ramp_top_N_per_s = 1.0;
     plan_.crossing.dearest = {0.0, 1e-6, 0.0};
-    plan_.mu_expected = 0.11;
-    plan_.mu_least = 0.085;
-    plan_.primary_radius_m = 0.05;
+    plan_.point.mu_expected = 0.11;
+    plan_.point.mu_least = 0.085;
+    plan_.point.primary_radius_m = 0.05;
+    plan_.point.wedge_cosine = 0.01;  // any force holds the belt
+    plan_.point.inertia_kg_m2 = 0.18;
+    plan_.point.fall = 0.8;
+    plan_.point.fall_at_fault = 0.4;
+    plan_.point.peak_slip_share = 0.02;
+    plan_.reaction = {.detection_s = 0.03, .stale_s = 0.05, .dead_time_s = 0.06, .lag_s = 0.15};
     now_ = {MonoTime{kSecond}, 100.0, 100.0 * kRatio, -50.0, 4000.0, 0.05};
     floor_N_ = kFloor_N;
   }
@@ -122,9 +128,11 @@ TEST_F(Stops, CreepIsNoSlipBeyondAPeak) {
 }
 
 TEST_F(Stops, TwelvePercentOfSlipASecondWhateverFrictionDoes) {
+  now_.torque_Nm = -3.0;
   begin();
   EXPECT_EQ(grow(0.1195, 1.0), StopReason::kSlip);
   SetUp();
+  now_.torque_Nm = -3.0;
   begin();
   grow(0.1205, 1.0);
   expect(StopReason::kSlipRate, "slip grows by", 12.05, 12.0, "%/s");
@@ -145,21 +153,21 @@ TEST_F(Stops, TwelvePercentASecondWhileTheNoiseIsNotKnown) {
   expect(StopReason::kSlipRate, "slip grows by", 12.5, 12.0, "%/s");
 }
 
-// The ramp holds 2.5 % a second. 1.1 more are allowed where there is no noise.
+// The ramp holds 2.5 % a second. 3 more are allowed where there is no noise.
 TEST_F(Stops, AHeldRateAndALittleMoreOnceFrictionIsLevel) {
   now_.torque_Nm = -3.0;
   begin();
-  EXPECT_EQ(grow(0.0355, 0.015), StopReason::kSlip);
+  EXPECT_EQ(grow(0.0545, 0.015), StopReason::kSlip);
   SetUp();
   now_.torque_Nm = -3.0;
   begin();
-  grow(0.0365, 0.015);
-  expect(StopReason::kSlipRate, "slip grows by", 3.65, 3.6, "%/s");
+  grow(0.0555, 0.015);
+  expect(StopReason::kSlipRate, "slip grows by", 5.55, 5.5, "%/s");
 }
 
 // A wave of slip whose half period is one window and one sample: the rate then changes by twice its
 // amplitude R from a window to the next, in the root mean square by root 2 times R; of one rate
-// that is R. With R = 0.5 % a second the limit is 2.5 + 4.5 * 0.5 = 4.75.
+// that is R. With R = 1 % a second the limit is 2.5 + 4.5 * 1 = 7.
 TEST_F(Stops, AHeldRateAndFourAndAHalfDeviationsOfItsNoise) {
   double slope = 0.0, squares = 0.0;  // of a wave of height 1 over 60 ms, as least squares have it
   for (int i = -6; i <= 6; ++i) {
@@ -167,33 +175,58 @@ TEST_F(Stops, AHeldRateAndFourAndAHalfDeviationsOfItsNoise) {
     slope += at_s * std::sin(std::numbers::pi * at_s / 0.065);
     squares += at_s * at_s;
   }
-  const double wave = 0.005 * squares / slope;
+  const double wave = 0.01 * squares / slope;
   now_.torque_Nm = -3.0;
   begin();
-  EXPECT_EQ(grow(0.040, 0.02, 0.1, wave), StopReason::kSlip);  // 4.5 at the most
+  EXPECT_EQ(grow(0.055, 0.02, 0.1, wave), StopReason::kSlip);  // 6.5 at the most
   SetUp();
   now_.torque_Nm = -3.0;
   begin();
-  EXPECT_EQ(grow(0.0445, 0.02, 0.1, wave), StopReason::kSlipRate);  // 4.95
-  EXPECT_NEAR(request_.cause().limit, 4.75, 0.1);
+  EXPECT_EQ(grow(0.065, 0.02, 0.1, wave), StopReason::kSlipRate);  // 7.5
+  EXPECT_NEAR(request_.cause().limit, 7.0, 0.2);
 }
 
-// 1.7 % of slip, the start's 1 among them, 65 Nm and 100 rad/s are 110.5 W. 0.21 s of the actuator
-// and 0.02 s to decide are still to come.
-TEST_F(Stops, SixtyJouleBeyondThePeakWithWhatIsToCome) {
-  for (const Duration last : {112 * kMillisecond, 114 * kMillisecond}) {
+// 1.7 % of slip, the start's 1 among them, 65 Nm and 100 rad/s are 110.5 W. Still to come are 0.02
+// s to decide, 0.06 s of a silence, 0.06 s of dead time, and what it takes to come back.
+TEST_F(Stops, SeventyJouleBeyondThePeakWithWhatIsToCome) {
+  RampPoint point = plan_.point;
+  point.torque_Nm = 65.0;
+  point.omega_p_rad_s = 100.0;
+  point.own_force_N = kFloor_N;
+  point.mu_least = 0.08;
+  const double to_come_J = energy_to_come_J(point, plan_.reaction, {0.017, 0.007, 0.0}, 0.08);
+  EXPECT_NEAR(to_come_J, 110.5 * 0.14, 4.0);
+  const auto last = static_cast<int>((70.0 - to_come_J) / 110.5 * 1e3) - 400;
+  for (const int last_ms : {last - 2, last + 2}) {
     SetUp();
     now_.torque_Nm = -65.0;
+    now_.mu_star = 0.08;
     begin_on_floor();
-    EXPECT_EQ(step_with(0.007), StopReason::kNone);
-    EXPECT_EQ(step_with(0.007), StopReason::kNone);
-    const StopReason reason = step_with(0.007, last);
-    if (last == 112 * kMillisecond) {
-      EXPECT_EQ(reason, StopReason::kNone);
-    }
+    EXPECT_EQ(step_with(0.007, 2 * kApart), StopReason::kNone);
+    EXPECT_EQ(step_with(0.007, 2 * kApart), StopReason::kNone);
+    const StopReason reason = step_with(0.007, last_ms * kMillisecond);
+    EXPECT_EQ(reason, last_ms < last ? StopReason::kNone : StopReason::kSlipEnergy);
   }
   expect(StopReason::kSlipEnergy, "slip energy beyond the peak, with what is to come",
-         110.5 * (0.314 + 0.23), 60.0, "J");
+         110.5 * 1e-3 * (402.0 + last) + to_come_J, 70.0, "J");
+}
+
+// However little was used: it slips where the force of before the request holds it no more. Below
+// 0.8 of the least that a belt may have it is not at its peak, whatever noise says.
+TEST_F(Stops, ABeltThatTheOwnForceDoesNotCatch) {
+  for (const double mu : {0.067, 0.070}) {
+    SetUp();
+    plan_.point.wedge_cosine = 1.0;  // 49 Nm at 0.05 m and 0.07: 7 kN hold it
+    now_.torque_Nm = -49.0;
+    now_.mu_star = mu;
+    floor_N_ = 6900.0;
+    begin_on_floor();
+    EXPECT_EQ(step_with(0.001), StopReason::kNone);
+    const StopReason reason = step_with(0.015);
+    EXPECT_EQ(reason, mu < 0.068 ? StopReason::kNone : StopReason::kSlipEnergy);
+  }
+  expect(StopReason::kSlipEnergy, "the force before the request would not catch the belt", 6900.0,
+         7000.0, "N");
 }
 
 // A quick actuator has less to come: the power itself comes first.
@@ -204,7 +237,7 @@ TEST_F(Stops, FourHundredWattBeyondThePeak) {
     config_.experiment.actuator_lag_s = 0.02;
     now_.torque_Nm = torque_Nm;
     begin_on_floor();
-    const StopReason reason = step_with(0.009, 70 * kMillisecond);
+    const StopReason reason = step_with(0.009, 20 * kMillisecond);
     if (torque_Nm == -210.0) {
       EXPECT_EQ(reason, StopReason::kNone);
     }
@@ -229,7 +262,7 @@ TEST_F(Stops, FastSlipBeyondThePeak) {
                         Case{0.0135, 99 * kMillisecond, StopReason::kNone},
                         Case{0.0135, 101 * kMillisecond, StopReason::kSlipEnergy}}) {
     SetUp();
-    plan_.primary_radius_m = 0.1;
+    plan_.point.primary_radius_m = 0.1;
     now_.omega_p_rad_s = 300.0;
     now_.omega_s_rad_s = 300.0 * kRatio;
     now_.torque_Nm = -3.0;
