@@ -17,7 +17,7 @@ constexpr std::size_t kBins = 8;
 constexpr double kSamplesPerUnit = 5.4;
 // Chosen, of the mean: no channel has less. A fifth less: the same; a fifth more: one of the five
 // (161) has no name, as before both noises were weighed.
-constexpr double kLeast = 0.1;
+constexpr double kLeastNoise = 0.1;
 
 }  // namespace
 
@@ -60,9 +60,9 @@ NoiseFactors noise_factors(std::vector<NoiseSample> samples) {
   }
   const double determinant = slip_slip * torque_torque - slip_torque * slip_torque;
   const double of_slip =
-      std::max((torque_torque * slip - slip_torque * torque) / determinant, kLeast);
+      std::max((torque_torque * slip - slip_torque * torque) / determinant, kLeastNoise);
   const double of_torque =
-      std::max((slip_slip * torque - slip_torque * slip) / determinant, kLeast);
+      std::max((slip_slip * torque - slip_torque * slip) / determinant, kLeastNoise);
   const double larger = std::max(of_slip, of_torque);
   return {of_slip / larger, of_torque / larger};
 }

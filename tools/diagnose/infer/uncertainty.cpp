@@ -85,6 +85,7 @@ LeftOpen left_open(const Engine& engine, const std::vector<Score>& unseen,
   LeftOpen out;
   if (unseen.empty() || engine.summaries().empty()) return out;
   std::vector<int> slots;
+  slots.reserve(unseen.size());
   for (const Score& score : unseen) slots.push_back(score.slot);
   auto [moved, sizes] = beside(engine, slots, lever);
   const auto k = static_cast<Index>(slots.size());
