@@ -69,7 +69,7 @@ bool FollowOn::stood_still(double mu, double traction_per_Nm_N,
                            double inertia_kg_m2) const noexcept {
   if (middle_.n < kWeightLeast || late_.n < kWeightLeast || !(force_ > 0.0)) return false;
   if (clamped_again()) return false;
-  if (carried(traction_per_Nm_N, inertia_kg_m2) < kStillCarried * mu) return false;
+  if (carried(traction_per_Nm_N, inertia_kg_m2) < kUnmoved * mu) return false;
   // Slip gained around the stop, less what the later pace, so many times over, would have gained.
   const double times =
       kSlower * (middle_.at_s() - before_.at_s()) / (late_.at_s() - middle_.at_s());

@@ -6,6 +6,7 @@
 
 #include "estimator/robust/thresholds.h"
 #include "estimator/signal/slow_noise.h"
+#include "estimator/statistics/interval.h"
 #include "estimator/statistics/square.h"
 
 namespace beltgrip::estimator {
@@ -357,7 +358,7 @@ void PeakFit::find_course() noexcept {
 // further down.
 bool PeakFit::belongs(std::size_t point) const noexcept {
   const std::size_t count = point_count_ - point - 1;
-  return count < kWantedPoints || mean_mu(point + 1) >= kStretchFrom * mu_top_;
+  return count < kWantedPoints || mean_mu(point + 1) >= kTopFrom * mu_top_;
 }
 
 void PeakFit::find_stretch() noexcept {
@@ -413,7 +414,7 @@ void PeakFit::find_reached(std::size_t length) noexcept {
       torque_variance += square(end.held_share) * record_->torque_line().variance_at(end.t_s);
     }
     // Windows share the slow error: it is not the largest of many.
-    torque_variance += square(kBoundDeviations / kReachedDeviations) *
+    torque_variance += square(kNormal99Upper / kReachedDeviations) *
                        record_->torque_slow_variance() * slow_variance_of_mean(time_s);
     const double deviation =
         std::sqrt(torque_variance / square(T) + force_variance(begin.t_s - 0.5 * begin.duration_s,

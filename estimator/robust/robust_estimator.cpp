@@ -233,7 +233,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     // Slip that grows while neither the force is lowered nor mu* climbs: a channel stands still.
     const bool still =
         pressure_.verdict() == ReadingVerdict::kFrozen ||
-        (out_.mu_star < kClimb * first_mu_ && out_.clamp_force_N > kLowered * first_force_N_);
+        (out_.mu_star < kClimb * first_mu_ && out_.clamp_force_N > kUnmoved * first_force_N_);
     if ((out_.stop == StopReason::kSlope && still) ||
         (out_.stop != StopReason::kNone &&
          (stands_still() || !is_possible(out_.mu_star, reading_reach_)))) {
@@ -382,7 +382,7 @@ class RobustEstimator final : public SlipCurveEstimator {
     const bool slips_on =
         out_.stop == StopReason::kSlip || out_.stop == StopReason::kSlipRate || at_the_top_;
     const bool seen = out_.stop == StopReason::kSlope ||
-                      (slips_on && first_mu_ < kRisenFrom * fit.mu) ||
+                      (slips_on && first_mu_ < kTopFrom * fit.mu) ||
                       (out_.stop != StopReason::kTorque && fit.inside >= kInsideWithoutStop &&
                        fit.passed && fit.fall > kEvident * std::sqrt(fit.fall_variance));
     peak_.samples = std::lround(fit.duration_s * sample_rate_hz_);
@@ -426,7 +426,7 @@ class RobustEstimator final : public SlipCurveEstimator {
         variator_, accuracies_, fit.reached * F / traction_, F, omega_s_rad_s_);
     const double surely =
         fit.reached *
-        (1.0 - std::hypot(kReachedDeviations * fit.reached_deviation, kBoundDeviations * sensors));
+        (1.0 - std::hypot(kReachedDeviations * fit.reached_deviation, kNormal99Upper * sensors));
     const double fit_variance =
         fit.variance + fit.mu * fit.mu *
                            (alike_variance(fit.t_s, fit.held_share) +

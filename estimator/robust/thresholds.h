@@ -53,10 +53,12 @@ inline constexpr double kSettle_s = 1.2;
 // A jump by more is looked at: of a speed and of the torque, relative. Chosen: no belt is as quick.
 inline constexpr double kGlitchSlip_share = 0.005;
 inline constexpr double kGlitchTorque = 0.2;
-// Slip that grows though mu* climbed by less, and the force fell by less, of the first: a channel
+// Slip that grows though mu* climbed by less, of the first, and the force has not moved: a channel
 // stands still. Chosen.
 inline constexpr double kClimb = 1.05;
-inline constexpr double kLowered = 0.99;
+// Of the first force, and of mu long after the stop: what is left of one that has not moved.
+// Chosen.
+inline constexpr double kUnmoved = 0.99;
 // Of the force: a step of the pressure's reading, at least; and one that no lag at the corner of a
 // ramp makes. Chosen.
 inline constexpr double kStepShare = 0.015;
@@ -89,9 +91,7 @@ inline constexpr double kRunAway_percent = 2.0;
 // and no friction. Chosen.
 inline constexpr double kSwing_percent = 0.3;
 inline constexpr double kSwingLeft = 0.4;
-// Of mu, still carried long after the stop; of the pace before it, the later one: a speed stood
-// still. Chosen.
-inline constexpr double kStillCarried = 0.99;
+// Of the pace before the stop, the later one: a speed stood still. Chosen.
 inline constexpr double kSlower = 2.0;
 
 // What to expect before the peak has been seen (peak_forecast).
@@ -116,7 +116,10 @@ inline constexpr double kPointSlip_percent = 0.04;
 inline constexpr double kPointShortest_s = 0.02;
 inline constexpr double kPointLongest_s = 1.0;
 // Of the top of mu*: from where the forms are fitted. Chosen: below it other physics shape a curve.
-inline constexpr double kStretchFrom = 0.9;
+// Where a backup stop ended it, a value needs a curve that was followed up from below. Chosen: one
+// that begins nearer may have slipped over its top before. Measured (worn_belt_test): a worn belt
+// that slips at once read 13 % too low without it, at 0.87 of its top.
+inline constexpr double kTopFrom = 0.9;
 // Of mu*: how well its course is to be known before it is followed. Chosen.
 inline constexpr double kCoursePrecision = 0.02;
 // Of the span of slip: the shortest scale of a form, and how far from the upper end a corner may
@@ -140,13 +143,6 @@ inline constexpr double kReachedDeviations = 3.3;
 inline constexpr double kInsideWithoutStop = 0.9;
 // Of mu: what the forms of the fit leave. Chosen.
 inline constexpr double kFormDeviation = 5e-4;
-// Where a backup stop ended it, a value needs a curve that was followed up from below this share of
-// its top. Chosen: one that begins nearer may have slipped over its top before. Measured
-// (worn_belt_test): a worn belt that slips at once read 13 % too low without it, at 0.87 of its
-// top.
-inline constexpr double kRisenFrom = 0.9;
-// One-sided 99 % of what a lower bound rests on, in deviations. Derived: a normal quantile.
-inline constexpr double kBoundDeviations = 2.33;
 // Deviations by which the fit's top is lowered for a bound. Chosen: more, for it leans on forms.
 inline constexpr double kFittedDeviations = 2.6;
 // Deviations beyond which points lie on no one curve: below a chord, of which there are many, and

@@ -6,5 +6,7 @@ namespace beltgrip::estimator {
 inline constexpr double kTail95 = 0.025;                // left out at either end
 inline constexpr double kUpper95 = 1.0 - kTail95;       // where the upper end lies
 inline constexpr double kNormal95 = 1.959963984540054;  // half width in standard deviations
+// What a lower bound rests on is one-sided, and surer.
+inline constexpr double kNormal99Upper = 2.33;
 
 }  // namespace beltgrip::estimator

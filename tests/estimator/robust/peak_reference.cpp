@@ -10,6 +10,7 @@
 
 #include "estimator/robust/curve_health.h"
 #include "estimator/robust/thresholds.h"
+#include "estimator/statistics/interval.h"
 #include "tests/estimator/robust/peak_reference_points.h"
 
 namespace beltgrip::test {
@@ -113,7 +114,7 @@ void Fit::find_stretch() {
   }
   std::size_t first = top;
   const auto beyond = [&] { return all_.size() - first; };
-  while (first > 0 && (beyond() < kWanted || course(first) >= number::kStretchFrom * mu_top_)) {
+  while (first > 0 && (beyond() < kWanted || course(first) >= number::kTopFrom * mu_top_)) {
     --first;
   }
   stretch_.assign(all_.begin() + static_cast<std::ptrdiff_t>(first), all_.end());
@@ -164,7 +165,7 @@ void Fit::find_reached() {
       }
       const double u = time_s / kSlowTime_s;
       const double slow = 2.0 / square(u) * (u - 1.0 + std::exp(-u));  // of a mean over time_s
-      T_variance += square(number::kBoundDeviations / number::kReachedDeviations) *
+      T_variance += square(number::kNormal99Upper / number::kReachedDeviations) *
                     record_.torque_slow_variance() * slow;
       const Line& line = record_.force_line();
       const double from_s = first.begin_s(), to_s = last.end_s();
