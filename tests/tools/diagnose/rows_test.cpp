@@ -166,7 +166,8 @@ TEST(Rows, DerivativesAreThoseOfEachSample) {
     Residuals at = residuals_of(campaign, run, state);
     prepare_derivatives(campaign, run, state, at);
     const auto rows = [&](int parameter, ResidualKind kind) {
-      return derivative_rows(campaign, run, state, at, parameter, kScale)[kind];
+      return derivative_rows(campaign, run, state, at, parameter,
+                             kScale)[static_cast<std::size_t>(kind)];
     };
     const auto expected = [&](auto of_sample) {
       std::vector<double> out;
