@@ -211,6 +211,45 @@ TEST_F(Stops, SeventyJouleBeyondThePeakWithWhatIsToCome) {
          110.5 * 1e-3 * (402.0 + last) + to_come_J, 70.0, "J");
 }
 
+// The same where no belt has its peak yet: the power over the actuator's 0.21 s and 0.02 s to
+// decide.
+TEST_F(Stops, SeventyJouleBelowAllPeaksByThePowerAlone) {
+  for (const int last_ms : {2, 5}) {
+    SetUp();
+    now_.torque_Nm = -65.0;
+    begin_on_floor();
+    EXPECT_EQ(step_with(0.007, 2 * kApart), StopReason::kNone);
+    EXPECT_EQ(step_with(0.007, 2 * kApart), StopReason::kNone);
+    const StopReason reason = step_with(0.007, last_ms * kMillisecond);
+    EXPECT_EQ(reason, last_ms == 2 ? StopReason::kNone : StopReason::kSlipEnergy);
+  }
+  expect(StopReason::kSlipEnergy, "slip energy beyond the peak, with what is to come",
+         110.5 * (0.405 + 0.23), 70.0, "J");
+}
+
+// Friction was largest at 1 % of slip: what lies beyond counts from there. An input may be silent
+// for longer than the receiver's time-out.
+TEST_F(Stops, WhatIsToComeBeginsWhereFrictionWasLargest) {
+  plan_.point.wedge_cosine = 0.05;
+  plan_.reaction.stale_s = 0.07;
+  now_.torque_Nm = -65.0;
+  now_.mu_star = 0.08;
+  begin_on_floor();
+  now_.mu_star = 0.09;
+  EXPECT_EQ(step_with(0.010), StopReason::kNone);
+  EXPECT_EQ(step_with(0.016), StopReason::kNone);
+  EXPECT_EQ(step_with(0.016), StopReason::kNone);
+  step_with(0.016);
+  RampPoint point = plan_.point;
+  point.torque_Nm = 65.0;
+  point.omega_p_rad_s = 100.0;
+  point.own_force_N = kFloor_N;
+  point.mu_least = 0.09;
+  const double to_come_J = energy_to_come_J(point, plan_.reaction, {0.026, 0.006, 0.0}, 0.10);
+  expect(StopReason::kSlipEnergy, "slip energy beyond the peak, with what is to come",
+         65.0 * 100.0 * 0.026 * 0.3 + to_come_J, 70.0, "J");
+}
+
 // However little was used: it slips where the force of before the request holds it no more. Below
 // 0.8 of the least that a belt may have it is not at its peak, whatever noise says.
 TEST_F(Stops, ABeltThatTheOwnForceDoesNotCatch) {
