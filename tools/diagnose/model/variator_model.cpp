@@ -234,9 +234,9 @@ class Passes {
       out_Nm[k] = constant_Nm + per_speed_Nms * omega_p[k] + per_N_Nm * force_N[k];
     });
     if (!run_.torque_is_engine) return;
-    for_rows(n_, [inertia_kg_m2 = c.primary_inertia_kg_m2,
-                  slope = run_.omega_p.slope.data(), slow_slope = run_.omega_p.slow_slope.data(),
-                  slope_p = c.slope_p.data(), out_Nm = c.loss_Nm.data()](Row k) BELTGRIP_INLINE {
+    for_rows(n_, [inertia_kg_m2 = c.primary_inertia_kg_m2, slope = run_.omega_p.slope.data(),
+                  slow_slope = run_.omega_p.slow_slope.data(), slope_p = c.slope_p.data(),
+                  out_Nm = c.loss_Nm.data()](Row k) BELTGRIP_INLINE {
       out_Nm[k] += inertia_kg_m2 * (slope[k] + slope_p[k] - slow_slope[k]);
     });
   }
