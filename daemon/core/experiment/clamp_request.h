@@ -9,7 +9,8 @@
 //                rise; or faster than kRequestSlipRate_1_s
 //   SlipEnergy   beyond the peak, as slip_damage has it: energy with what is still to come, power,
 //                or time at high slip speed
-//   Room         a peak that came now could not be crossed inside the promised limits any more
+//   Room         a peak that came now could not be crossed inside the promised limits any more, as
+//                planned or, near the end of the room, by what the belt has carried
 //   Lag          the force answers later than the crossing was planned for, or did not show in the
 //                rest of its fall that it does not
 //   ForceFloor   the request is at its floor, which no longer falls with the speed, or has risen;

@@ -74,7 +74,7 @@ struct Excursion {
   double time_s = 0.0;      // spent beyond the peak
   double area_s = 0.0;      // integral of the slip beyond the peak over that time
 };
-inline constexpr double kNotCaught = 1e9;
+inline constexpr double kNotCaught = 1e9;  // no figure but a mark: beyond every limit
 // What becomes of the slip when the belt passes its peak at this slip rate, friction falls by
 // `fall` behind it, the estimator needs detection_s after slip_detectable_share beyond the peak,
 // and reaction_s passes before the actuator is told. Not caught: all kNotCaught.

@@ -75,6 +75,25 @@ class Stops : public testing::Test {
     }
     return request_.backup_stop();
   }
+  // On the floor at 65 Nm and 0.7 % of slip for 0.4 s and then some.
+  StopReason rest_on_floor(double mu_star, int last_ms) {
+    SetUp();
+    now_.torque_Nm = -65.0;
+    now_.mu_star = mu_star;
+    begin_on_floor();
+    EXPECT_EQ(step_with(0.007, 2 * kApart), StopReason::kNone);
+    EXPECT_EQ(step_with(0.007, 2 * kApart), StopReason::kNone);
+    return step_with(0.007, last_ms * kMillisecond);
+  }
+  // Of that torque, with slip that does not grow.
+  double to_come_J(double mu, double slip_share, double beyond_share, double told_s) const {
+    RampPoint point = plan_.point;
+    point.torque_Nm = 65.0;
+    point.omega_p_rad_s = 100.0;
+    point.own_force_N = kFloor_N;
+    point.mu_least = mu;
+    return energy_to_come_J(point, plan_.reaction, {slip_share, beyond_share, 0.0}, told_s);
+  }
   Stop stop() const { return {request_.backup_stop(), request_.cause()}; }
   void expect(StopReason reason, const char* what, double figure, double limit, const char* unit,
               std::optional<Role> role = std::nullopt) const {
@@ -189,40 +208,20 @@ TEST_F(Stops, AHeldRateAndFourAndAHalfDeviationsOfItsNoise) {
 // 1.7 % of slip, the start's 1 among them, 65 Nm and 100 rad/s are 110.5 W. Still to come are 0.02
 // s to decide, 0.06 s of a silence, 0.06 s of dead time, and what it takes to come back.
 TEST_F(Stops, SeventyJouleBeyondThePeakWithWhatIsToCome) {
-  RampPoint point = plan_.point;
-  point.torque_Nm = 65.0;
-  point.omega_p_rad_s = 100.0;
-  point.own_force_N = kFloor_N;
-  point.mu_least = 0.08;
-  const double to_come_J = energy_to_come_J(point, plan_.reaction, {0.017, 0.007, 0.0}, 0.08);
-  EXPECT_NEAR(to_come_J, 110.5 * 0.14, 4.0);
-  const auto last = static_cast<int>((70.0 - to_come_J) / 110.5 * 1e3) - 400;
-  for (const int last_ms : {last - 2, last + 2}) {
-    SetUp();
-    now_.torque_Nm = -65.0;
-    now_.mu_star = 0.08;
-    begin_on_floor();
-    EXPECT_EQ(step_with(0.007, 2 * kApart), StopReason::kNone);
-    EXPECT_EQ(step_with(0.007, 2 * kApart), StopReason::kNone);
-    const StopReason reason = step_with(0.007, last_ms * kMillisecond);
-    EXPECT_EQ(reason, last_ms < last ? StopReason::kNone : StopReason::kSlipEnergy);
-  }
+  const double comes_J = to_come_J(0.08, 0.017, 0.007, 0.08);
+  EXPECT_NEAR(comes_J, 110.5 * 0.14, 4.0);
+  const auto last_ms = static_cast<int>((70.0 - comes_J) / 110.5 * 1e3) - 400;
+  EXPECT_EQ(rest_on_floor(0.08, last_ms - 2), StopReason::kNone);
+  EXPECT_EQ(rest_on_floor(0.08, last_ms + 2), StopReason::kSlipEnergy);
   expect(StopReason::kSlipEnergy, "slip energy beyond the peak, with what is to come",
-         110.5 * 1e-3 * (402.0 + last) + to_come_J, 70.0, "J");
+         110.5 * 1e-3 * (402.0 + last_ms) + comes_J, 70.0, "J");
 }
 
 // The same where no belt has its peak yet: the power over the actuator's 0.21 s and 0.02 s to
 // decide.
 TEST_F(Stops, SeventyJouleBelowAllPeaksByThePowerAlone) {
-  for (const int last_ms : {2, 5}) {
-    SetUp();
-    now_.torque_Nm = -65.0;
-    begin_on_floor();
-    EXPECT_EQ(step_with(0.007, 2 * kApart), StopReason::kNone);
-    EXPECT_EQ(step_with(0.007, 2 * kApart), StopReason::kNone);
-    const StopReason reason = step_with(0.007, last_ms * kMillisecond);
-    EXPECT_EQ(reason, last_ms == 2 ? StopReason::kNone : StopReason::kSlipEnergy);
-  }
+  EXPECT_EQ(rest_on_floor(0.05, 2), StopReason::kNone);
+  EXPECT_EQ(rest_on_floor(0.05, 5), StopReason::kSlipEnergy);
   expect(StopReason::kSlipEnergy, "slip energy beyond the peak, with what is to come",
          110.5 * (0.405 + 0.23), 70.0, "J");
 }
@@ -240,14 +239,8 @@ TEST_F(Stops, WhatIsToComeBeginsWhereFrictionWasLargest) {
   EXPECT_EQ(step_with(0.016), StopReason::kNone);
   EXPECT_EQ(step_with(0.016), StopReason::kNone);
   step_with(0.016);
-  RampPoint point = plan_.point;
-  point.torque_Nm = 65.0;
-  point.omega_p_rad_s = 100.0;
-  point.own_force_N = kFloor_N;
-  point.mu_least = 0.09;
-  const double to_come_J = energy_to_come_J(point, plan_.reaction, {0.026, 0.006, 0.0}, 0.10);
   expect(StopReason::kSlipEnergy, "slip energy beyond the peak, with what is to come",
-         65.0 * 100.0 * 0.026 * 0.3 + to_come_J, 70.0, "J");
+         65.0 * 100.0 * 0.026 * 0.3 + to_come_J(0.09, 0.026, 0.006, 0.10), 70.0, "J");
 }
 
 // However little was used: it slips where the force of before the request holds it no more. Below
