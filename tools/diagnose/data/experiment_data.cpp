@@ -19,8 +19,8 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kGrid_s = 0.1;
 constexpr double kKernelSigma_s = 0.07;
 constexpr double kSlowSigma_s = 0.25;
-constexpr double kTrim_s = 0.3;          // either end of a gapless stretch
-constexpr double kSlipMax_share = 0.06;  // beyond: damage, not friction to be explained
+constexpr double kTrim_s = 0.3;          // chosen: either end of a gapless stretch
+constexpr double kSlipMax_share = 0.06;  // chosen: beyond is damage, no friction
 // Derived, at a peak at 1.5 %: there the friction of a mean slip is a mean friction but for 0.2 %.
 constexpr double kSlipRateCalm_1_s = 0.012;
 constexpr double kRatioTolerance = 0.085;  // ln; around an end stop

@@ -42,7 +42,7 @@ struct Rest : Stretch {
   long step = 0;
 };
 
-// Beyond: the run-away, where ratios of derivatives tell nothing of statics.
+// Chosen. Beyond: the run-away, where ratios of derivatives tell nothing of statics.
 inline constexpr double kSlipRateMax_1_s = 0.03;
 
 // Where a stretch of valid samples ends because the belt runs away.

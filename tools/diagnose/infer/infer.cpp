@@ -232,7 +232,7 @@ bool is_beyond_scatter(const Scatter& scatter) {
 }
 
 Eigen::Array<bool, kRandomEffects, 1> is_unusual(const Scatter& scatter) {
-  constexpr double kUnusual = 3.0;  // times the usual
+  constexpr double kUnusual = 3.0;  // chosen: times the usual, more than rigs differ by
   return scatter.variance > kUnusual * kUnusual * default_scatter().variance;
 }
 
