@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "can_dbc/text/number_text.h"
 #include "tools/diagnose/infer/gain.h"
 
 namespace beltgrip::diagnose {
@@ -48,6 +49,11 @@ std::vector<Uncertainty> uncertainties(const Engine& engine, const Hypothesis& h
         {std::sqrt(variance), degrees / std::max(share * share, 1e-9), left_out.stability[i]});
   }
   return out;
+}
+
+std::string open_share(const LeftOpen::Share& share) {
+  return std::string(share.effect) + " (" + rounded_text(100.0 * std::sqrt(share.variance), 3) +
+         " %)";
 }
 
 bool is_seen(const Score& score, const Slot& slot) {

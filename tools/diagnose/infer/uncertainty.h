@@ -2,6 +2,7 @@
 // form and the equations' own accuracy leave open.
 #pragma once
 
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -33,6 +34,8 @@ struct LeftOpen {
   double variance = 0.0;
   std::vector<Share> by_effect;  // the largest first
 };
+// "spring_force (9.4 %)"
+std::string open_share(const LeftOpen::Share& share);
 // unseen: of slots that are not accepted. lever: change of the quantity per column of the fit of
 // the engine's state.
 LeftOpen left_open(const Engine& engine, const std::vector<Score>& unseen,

@@ -12,7 +12,6 @@
 #include "tools/diagnose/decide/learn.h"
 #include "tools/diagnose/decide/namer.h"
 #include "tools/diagnose/decide/plausibility.h"
-#include "tools/diagnose/decide/recipe.h"
 #include "tools/diagnose/decide/thresholds.h"
 #include "tools/diagnose/infer/engine.h"
 #include "tools/diagnose/infer/gain.h"
@@ -21,12 +20,12 @@
 #include "tools/diagnose/infer/residual_tests.h"
 #include "tools/diagnose/infer/uncertainty.h"
 #include "tools/diagnose/model/curve_family.h"
+#include "tools/diagnose/run/next_experiment.h"
 
 namespace beltgrip::diagnose {
 namespace {
 
 constexpr int kSamplesMin = 100;             // 10 s of usable data
-constexpr std::size_t kExperimentsMin = 3;   // from where on their scatter is known
 constexpr std::size_t kLearningRunsMin = 6;  // fewer leave no level out
 constexpr int kRoundsMax = 2;                // of learning and naming
 constexpr double kAbsorbed = 0.99;           // chosen, of a column: a constant by another name
@@ -309,7 +308,7 @@ class Run {
     judge(engine, naming, learning, named);
     count_learned(engine, learning);
     count_unexplained(engine, naming, learning.left);
-    propose(engine, naming, learning);
+    out().next_experiment = next_experiment(engine, naming, learning, out(), open_);
     answer_.extended = request_.model;
     store_learned();
     const ModelState& stored = !named ? naming.nominal.state : extended;
@@ -588,10 +587,6 @@ class Run {
     return out;
   }
 
-  static std::string open_share(const LeftOpen::Share& share) {
-    return std::string(share.effect) + " (" + text_of(100.0 * std::sqrt(share.variance)) + " %)";
-  }
-
   // Which effects are behind an interval of mu_max that is wide for what was not seen.
   void note_open() {
     constexpr std::size_t kNamed = 3;
@@ -829,50 +824,6 @@ class Run {
            smallest[id].empty() ? "no other thing here than a friction curve that runs otherwise"
            : absorbed[id] > kAbsorbed ? "absorbed by a fitted constant of the machine"
                                       : "the experiments hardly move what it depends on"});
-    }
-  }
-
-  void propose(const Engine& engine, const Naming& naming, const Learning& learning) {
-    const Campaign& campaign = engine.campaign();
-    const ModelState& state = naming.hypothesis.state;
-    const auto next = [&](std::string_view depends_on, const std::string& why) {
-      out().next_experiment = recipe(campaign, state, varied_by(depends_on), why);
-    };
-    for (const Finding& finding : out().findings) {
-      // No ramp tells what the torque behind the belt or a gauge does.
-      if (finding.aliases.empty() || finding.aliases.front().starts_with("learned ")) continue;
-      next(row_of(finding.effect)->depends_on,
-           "to tell " + finding.effect + " from " + finding.aliases.front());
-      return;
-    }
-    if (const auto& unexplained = out().unexplained) {
-      const Unexplained& left = *unexplained;
-      if (!learning.needs_levels.empty()) {
-        next(learning.needs_levels, "a further level of " + learning.needs_levels +
-                                        ", of which nothing is learned below " +
-                                        std::to_string(thresholds::kLevelsMin));
-        return;
-      }
-      if (left.kind == MisfitKind::kFunction && !left.depends_on.empty()) {
-        next(left.depends_on.front(), "a further level of " + left.depends_on.front());
-      } else {
-        next("", "repeat the reference: is it the same every time");
-      }
-      return;
-    }
-    if (campaign.runs.size() < kExperimentsMin) {
-      next("", "repeat the reference three times: how experiments scatter is not known");
-      return;
-    }
-    if (!open_.by_effect.empty()) {
-      const LeftOpen::Share& most = open_.by_effect.front();
-      next(row_of(std::string(most.effect))->depends_on,
-           "to see " + open_share(most) + ", which leaves most of mu_max open");
-      return;
-    }
-    if (!out().not_identifiable.empty()) {
-      const std::string& id = out().not_identifiable.front().effect;
-      next(row_of(id)->depends_on, "to see " + id);
     }
   }
 
