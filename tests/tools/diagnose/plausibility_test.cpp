@@ -1,10 +1,11 @@
-// Torques before and behind the belt: their powers are compared where the shafts turn steadily
-// alone.
+// What contradicts itself: torques before and behind the belt, whose powers are compared where the
+// shafts turn steadily alone; ratios of two machines.
 #include "tools/diagnose/decide/plausibility.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 namespace beltgrip::diagnose {
 namespace {
@@ -66,6 +67,37 @@ TEST(CheckTorques, ATorqueThatIsNotRecordedSaysNothing) {
   ExperimentData run = run_with(0.0, -60.0);
   run.torque_s.present = false;
   EXPECT_EQ(doubt_of(run), "");
+}
+
+// At one clamp force, the slip held at each of some levels for as long: the torque follows it.
+ExperimentData slip_held_at(const std::vector<double>& slips_share, double ratio, int first = 0) {
+  ExperimentData run = run_with(0.0, 20.0);
+  run.name = "held";
+  run.stop.assign(kSamples, kOverdriveStop);
+  run.pressure.value = Eigen::ArrayXd::Constant(kSamples, 6e5);
+  for (int k = 0; k < kSamples; ++k) {
+    const auto level = (static_cast<std::size_t>(k / 30 + first)) % slips_share.size();
+    run.omega_s.value[k] = 100.0 * ratio * (1.0 - slips_share[level]);
+    run.torque.value[k] = 90.0 * std::tanh(slips_share[level] / 0.02);
+    run.pressure.value[k] += 1e3 * ((k * 7 + first) % 11);  // noise: highest anywhere
+  }
+  return run;
+}
+
+TEST(CheckSameMachine, ARigThatHoldsTheSlipIsOneMachine) {
+  const std::vector<double> slips_share{0.001, 0.005, 0.02, 0.06, 0.09};
+  Implausible doubts;
+  check_same_machine({slip_held_at(slips_share, 2.25), slip_held_at(slips_share, 2.25, 3)}, {},
+                     doubts);
+  EXPECT_FALSE(doubts.impossible) << doubts.notes.front();
+}
+
+TEST(CheckSameMachine, TwoRatiosAreTwoMachines) {
+  const std::vector<double> slips_share{0.001, 0.005, 0.02};
+  Implausible doubts;
+  check_same_machine({slip_held_at(slips_share, 2.25), slip_held_at(slips_share, 2.4)}, {}, doubts);
+  ASSERT_TRUE(doubts.impossible);
+  EXPECT_NE(doubts.notes.front().find("cannot be of one machine"), std::string::npos);
 }
 
 // A channel that rests, with noise of 1 of 400, in steps; held: each value twice.

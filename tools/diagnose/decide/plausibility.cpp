@@ -117,34 +117,36 @@ std::string contradiction(const TorquePair& pair) {
   return {};
 }
 
-// Looked at where the clamp force is highest, and drive and overrun each for itself: a belt slips
-// one way or the other by a percent even there.
+// Looked at where the belt carries the least of what its clamp force lets it, and drive and overrun
+// each for itself: a belt slips one way or the other by a percent even there, and by ten where a rig
+// holds the slip and not the torque.
 void check_same_ratio(const std::vector<ExperimentData>& runs,
                       const estimator::VariatorParameters& variator, int stop, double direction,
                       Implausible& doubts) {
-  struct TopForce {
+  struct LeastLoad {
     double ratio = 0.0, force_kN = 0.0;
     const ExperimentData* run = nullptr;
   };
-  std::vector<TopForce> tops;
+  std::vector<LeastLoad> all;
   for (const ExperimentData& run : runs) {
-    double highest_Pa = -std::numeric_limits<double>::infinity();
-    TopForce here;
+    double least_Nm_kN = std::numeric_limits<double>::infinity();
+    LeastLoad here;
     for (int k = 0; k < run.size(); ++k) {
       if (!run.valid[static_cast<std::size_t>(k)] ||
-          run.stop[static_cast<std::size_t>(k)] != stop || run.torque.value[k] * direction < 0.0 ||
-          run.pressure.value[k] < highest_Pa) {
+          run.stop[static_cast<std::size_t>(k)] != stop || run.torque.value[k] * direction < 0.0) {
         continue;
       }
-      highest_Pa = run.pressure.value[k];
-      here = {run.omega_s.value[k] / run.omega_p.value[k],
-              1e-3 * estimator::secondary_clamp_force_N(variator, highest_Pa, run.omega_s.value[k]),
-              &run};
+      const double force_kN = 1e-3 * estimator::secondary_clamp_force_N(
+                                         variator, run.pressure.value[k], run.omega_s.value[k]);
+      const double load_Nm_kN = std::abs(run.torque.value[k]) / force_kN;
+      if (!(force_kN > 0.0) || load_Nm_kN >= least_Nm_kN) continue;
+      least_Nm_kN = load_Nm_kN;
+      here = {run.omega_s.value[k] / run.omega_p.value[k], force_kN, &run};
     }
-    if (here.run != nullptr) tops.push_back(here);
+    if (here.run != nullptr) all.push_back(here);
   }
-  for (const TopForce& a : tops) {
-    for (const TopForce& b : tops) {
+  for (const LeastLoad& a : all) {
+    for (const LeastLoad& b : all) {
       const double softness = kSoftestPerkN * std::max(0.0, a.force_kN - b.force_kN);
       if (b.ratio <= a.ratio * (kSameRatio + softness)) continue;
       doubts.notes.push_back(a.run->name + " and " + b.run->name + ": end-stop ratios " +
