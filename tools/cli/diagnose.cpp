@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <memory>
 #include <string>
 #include <vector>
@@ -117,6 +118,15 @@ void show_progress(double share, const std::string& what) {
   if (share >= 1.0) std::fprintf(stderr, "\n");
 }
 
+std::string today() {
+  const std::time_t now = std::time(nullptr);
+  std::tm day{};
+  gmtime_r(&now, &day);
+  std::array<char, 16> text{};
+  std::strftime(text.data(), text.size(), "%Y-%m-%d", &day);
+  return text.data();
+}
+
 void run_diagnose(const DiagnoseOptions& options) {
   end_in_good_order();
   const auto [config, stated] = load(options);
@@ -164,7 +174,9 @@ void run_diagnose(const DiagnoseOptions& options) {
     json->close();
   }
   if (report) {
-    report->write(diagnose::html_text(answer.diagnosis, answer.plots));
+    report->write(diagnose::html_text(
+        answer.diagnosis, answer.plots,
+        {"beltgrip " BELTGRIP_VERSION, today(), options.config, options.model}));
     report->close();
   }
   if (model_out) {

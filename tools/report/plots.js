@@ -49,7 +49,7 @@ const drawCurve = ([id, title, xLabel, yLabel, series]) => {
             pointBorderWidth: points.length === 1 ? 2 : 1,
             pointRadius: line ? 0 : points.length === 1 ? 7 : 3};
   });
-  return new Chart(document.getElementById(id), {
+  const chart = new Chart(document.getElementById(id), {
     type: 'scatter',
     data: {datasets},
     options: {
@@ -60,6 +60,58 @@ const drawCurve = ([id, title, xLabel, yLabel, series]) => {
                          labels: {boxWidth: 12, filter: (item) => item.text !== ''}}},
       scales: {x: {title: {display: true, text: xLabel}}, y: {title: {display: true, text: yLabel}}}
     }
+  });
+  zoomByDrag(chart);
+  return chart;
+};
+
+// The mouse draws the part to be seen; a double click shows everything again. A tap makes the plot
+// as wide as the page, another one small again.
+const zoomByDrag = (chart) => {
+  const {canvas} = chart;
+  const frame = canvas.parentElement.appendChild(document.createElement('div'));
+  frame.className = 'frame';
+  let from = null;
+  const at = (event) => {
+    const box = canvas.getBoundingClientRect(), area = chart.chartArea;
+    return [Math.min(area.right, Math.max(area.left, event.clientX - box.left)),
+            Math.min(area.bottom, Math.max(area.top, event.clientY - box.top))];
+  };
+  const spanned = (event) => {
+    const [x, y] = at(event);
+    return [Math.min(x, from[0]), Math.max(x, from[0]), Math.min(y, from[1]), Math.max(y, from[1])];
+  };
+  const show = (x, y) => {
+    Object.assign(chart.options.scales.x, {min: x[0], max: x[1]});
+    Object.assign(chart.options.scales.y, {min: y[0], max: y[1]});
+    chart.update();
+  };
+  canvas.addEventListener('pointerdown', (event) => {
+    if (event.pointerType !== 'mouse') return;
+    from = at(event);
+    canvas.setPointerCapture(event.pointerId);
+  });
+  canvas.addEventListener('pointermove', (event) => {
+    if (!from) return;
+    const [left, right, top, bottom] = spanned(event);
+    frame.style.cssText = `display:block;left:${left}px;top:${top}px;width:${right - left}px;` +
+                          `height:${bottom - top}px`;
+  });
+  canvas.addEventListener('pointerup', (event) => {
+    if (!from) return;
+    const [left, right, top, bottom] = spanned(event);
+    from = null;
+    frame.style.display = 'none';
+    const {x, y} = chart.scales, least = 8;  // pixels: less is a click
+    if (right - left < least || bottom - top < least) return;
+    show([x.getValueForPixel(left), x.getValueForPixel(right)],
+         [y.getValueForPixel(bottom), y.getValueForPixel(top)]);
+  });
+  canvas.addEventListener('dblclick', () => show([undefined, undefined], [undefined, undefined]));
+  canvas.addEventListener('click', () => {
+    if (!matchMedia('(pointer: coarse)').matches) return;
+    canvas.parentElement.classList.toggle('wide');
+    chart.resize();
   });
 };
 const charts = [];

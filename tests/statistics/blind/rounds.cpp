@@ -66,8 +66,9 @@ std::vector<PlannedRun> narrow_plan(Random& random) {
 
 // Two names of one equation: no experiment of ramps tells them apart.
 bool is_same_equation(const std::string& a, const std::string& b) {
-  constexpr std::array<std::array<const char*, 2>, 3> kPairs{{{"hydraulic_lag", "channel_skew"},
+  constexpr std::array<std::array<const char*, 2>, 4> kPairs{{{"hydraulic_lag", "channel_skew"},
                                                               {"torque_delay", "channel_skew"},
+                                                              {"torque_bias", "torque_loss"},
                                                               {"pressure_offset", "spring_force"}}};
   return a == b || std::any_of(kPairs.begin(), kPairs.end(), [&](const auto& pair) {
            return (a == pair[0] && b == pair[1]) || (a == pair[1] && b == pair[0]);
@@ -105,8 +106,7 @@ Trial draw_open_trial(std::uint64_t number) {
   Trial out;
   out.seed = number;
   out.machine = draw_machine(random);
-  out.plan =
-      random.uniform() < 0.5 ? paper_plan(kRuns) : draw_plan(random, out.machine.setting, kRuns);
+  out.plan = narrow_plan(random);
   const double size = random.log_uniform(1.0, 5.0);
   const std::vector<Plantable>& all = plantables();
   const auto which = static_cast<std::size_t>(random.below(static_cast<int>(all.size())));

@@ -38,8 +38,28 @@ TEST(FindingWords, NameAFileInPlaceOfAnIndex) {
   worn.fixed["at"] = 3;
   worn.from_file = "monday.csv";
   EXPECT_EQ(in_words(worn),
-            "less friction from one experiment on, a share of 0.05 +- 0.01, from monday.csv on "
-            "(wear)");
+            "less friction from one experiment on, by 5 +- 1 %, from monday.csv on (wear)");
+}
+
+TEST(FindingWords, SayTooLowInsteadOfTooHighByLessThanNothing) {
+  Finding low;
+  low.effect = "pressure_offset";
+  low.parameters["offset_Pa"] = {-20000.0, -35000.0, -5000.0};
+  EXPECT_EQ(in_words(low),
+            "a measured pressure that is too low by 0.2 +- 0.15 bar (pressure_offset)");
+  Finding high = low;
+  high.parameters["offset_Pa"] = {20000.0, 5000.0, 35000.0};
+  EXPECT_EQ(in_words(high),
+            "a measured pressure that is too high by 0.2 +- 0.15 bar (pressure_offset)");
+}
+
+TEST(FindingWords, TellSignalsInTheirUnits) {
+  EXPECT_EQ(told("primary_torque", 0.327), "0.33 Nm");
+  EXPECT_EQ(told("secondary_pressure", 123456.0, 3), "1.23 bar");
+  EXPECT_EQ(told("torque_gain", -0.031), "-3.1 %");
+  EXPECT_EQ(told_change("slip", 8.564e-4, 4.898e-4, 1.371e-4, 5.489e-4),
+            "0.08564 -> 0.04898 [0.01371, 0.05489] %");
+  EXPECT_EQ(told("what has none", 1.5), "1.5");
 }
 
 TEST(Headline, IsOneSentence) {
@@ -50,6 +70,15 @@ TEST(Headline, IsOneSentence) {
   EXPECT_EQ(headline(d),
             "A drag that grows with the clamp force, 0.503 +- 0.01 Nm/kN (torque_loss) explains "
             "what was wrong; with it mu_max is off by 0.07 % instead of 1.1 %.");
+  d.explained_share = 0.958;
+  EXPECT_EQ(headline(d),
+            "A drag that grows with the clamp force, 0.503 +- 0.01 Nm/kN (torque_loss) explains "
+            "96 % of what was wrong; with it mu_max is off by 0.07 % instead of 1.1 %.");
+  d.mu_max.reset();
+  d.held_out["primary_torque"] = {1.57, 0.33, 1.0, 1.5};
+  EXPECT_EQ(headline(d),
+            "A drag that grows with the clamp force, 0.503 +- 0.01 Nm/kN (torque_loss) explains "
+            "96 % of what was wrong; with it primary_torque is off by 0.33 Nm instead of 1.6 Nm.");
 }
 
 }  // namespace

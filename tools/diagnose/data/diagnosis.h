@@ -119,6 +119,8 @@ struct Diagnosis {
   std::map<std::string, SimulatedSignal> simulation;
   std::vector<Finding> findings;
   std::vector<LearnedFinding> learned;
+  // Share of the misfit beyond noise and scatter that goes with all of these in the model.
+  std::optional<double> explained_share;
   std::optional<Unexplained> unexplained;
   std::vector<NotIdentifiable> not_identifiable;
   std::map<std::string, BeforeAfter> held_out;

@@ -16,7 +16,7 @@ namespace {
 using Eigen::ArrayXd;
 using report::Series;
 
-constexpr std::size_t kPoints = 30;    // each of as many samples
+constexpr std::size_t kPoints = 30;    // about, each of as many samples
 constexpr double kInformative = 1e-3;  // of the best point: less says nothing of the effect
 
 // Where a finding acts: what one unit there changes, and how it is shown.
@@ -24,31 +24,38 @@ struct Point {
   std::string_view acts_on;
   const char* label;
   double shown;  // per unit
-  QuantityChange (*unit)(const Residuals& at);
+  QuantityChange (*unit)(const Residuals& at, const Eigen::VectorXd& nuisance);
 };
 
-QuantityChange of_torque(const Residuals& at) {
+QuantityChange of_torque(const Residuals& at, const Eigen::VectorXd& /*nuisance*/) {
   QuantityChange out;
   out.torque = ArrayXd::Constant(at.foot.size(), -1.0);
   out.balance = out.torque;
   return out;
 }
-QuantityChange of_secondary_torque(const Residuals& at) {
+QuantityChange of_secondary_torque(const Residuals& at, const Eigen::VectorXd& /*nuisance*/) {
   QuantityChange out;
   out.balance = -at.measured.ratio;
   return out;
 }
-QuantityChange of_force(const Residuals& at) {
+// With what the pulleys give way to it and what it takes of the torque.
+QuantityChange of_force(const Residuals& at, const Eigen::VectorXd& nuisance) {
+  constexpr double kPerN = 1e-3;  // of what is given per kN
   QuantityChange out;
   out.ln_capacity = 1.0 / at.measured.force_N.max(50.0);
+  out.slip_share = -kPerN * nuisance[kDeformationPerkN] * (1.0 - at.measured.slip_share) /
+                   (1.0 - at.measured.deformation);
+  out.torque = ArrayXd::Constant(at.foot.size(), -kPerN * nuisance[kLossPerkN_Nm]);
+  out.balance = out.torque;
+  if (at.measured.balance.size() > 0) out.balance -= at.clean_Nm * out.slip_share;
   return out;
 }
-QuantityChange of_friction(const Residuals& at) {
+QuantityChange of_friction(const Residuals& at, const Eigen::VectorXd& /*nuisance*/) {
   QuantityChange out;
   out.ln_capacity = ArrayXd::Ones(at.foot.size());
   return out;
 }
-QuantityChange of_ratio(const Residuals& at) {
+QuantityChange of_ratio(const Residuals& at, const Eigen::VectorXd& /*nuisance*/) {
   QuantityChange out;
   out.slip_share = 1.0 - at.measured.slip_share;
   if (at.measured.balance.size() > 0) out.balance = -at.clean_Nm;
@@ -121,16 +128,15 @@ const Variable* variable_of(const EffectRow& row) {
                                             : "torque");
 }
 
-// One sample of one residual: place, what a unit at the point changes, and the residual with the
-// finding and without.
+// One sample of one residual: place, what a unit at the point changes, what the finding changes,
+// and the residual that is left with it.
 struct Sample {
-  double x, column, with, without;
+  double x, column, by_finding, left;
 };
 
 std::vector<Sample> samples_of(const Campaign& campaign, const ModelState& extended, int slot,
                                const Point& point, const Variable& variable) {
-  ModelState without = extended;
-  without.effects[slot] = 0.0;
+  const double size = extended.effects[slot];
   std::vector<Sample> out;
   for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
     const ExperimentData& run = campaign.runs[e];
@@ -139,42 +145,52 @@ std::vector<Sample> samples_of(const Campaign& campaign, const ModelState& exten
     if (run.valid_count == 0 || x.size() == 0) continue;
     Residuals with = residuals_of(campaign, experiment, extended);
     prepare_derivatives(campaign, experiment, extended, with);
-    const Residuals off = residuals_of(campaign, experiment, without);
-    const ResidualColumns columns = propagate(campaign, with, point.unit(with));
+    const ResidualColumns columns = propagate(campaign, with, point.unit(with, extended.nuisance));
+    // Along the tangent of the friction curve, as the unit: about the peak, the residual without
+    // the finding says nothing of its size.
+    const ResidualColumns by = secant(campaign, experiment, extended, with, slot, 0.0);
     for (const ResidualKind kind : {kFrictionResidual, kBalanceResidual}) {
       const auto k = static_cast<std::size_t>(kind);
       for (Eigen::Index i = 0; i < columns[k].size(); ++i) {
         if (!run.valid[static_cast<std::size_t>(i)] || columns[k][i] == 0.0) continue;
-        out.push_back({x[i], columns[k][i], with.value[k][i], off.value[k][i]});
+        const double by_finding = by[k].size() > 0 ? size * by[k][i] : 0.0;
+        out.push_back({x[i], columns[k][i], by_finding, with.value[k][i]});
       }
     }
   }
   std::erase_if(out, [](const Sample& each) {
-    return !std::isfinite(each.x + each.column + each.with + each.without);
+    return !std::isfinite(each.x + each.column + each.by_finding + each.left);
   });
   return out;
 }
 
 // The sum over some neighbours by weighted least squares: what is asked for at the point.
 struct Asked {
-  double x = 0.0, without = 0.0, left = 0.0, information = 0.0;
+  double x = 0.0, by_finding = 0.0, left = 0.0, information = 0.0;
 };
 
 std::vector<Asked> asked_by(std::vector<Sample> samples) {
   std::stable_sort(samples.begin(), samples.end(),
                    [](const Sample& a, const Sample& b) { return a.x < b.x; });
   std::vector<Asked> out;
-  const std::size_t step = std::max<std::size_t>(1, samples.size() / kPoints);
-  for (std::size_t begin = 0; begin + step <= samples.size(); begin += step) {
+  if (samples.empty()) return out;
+  const std::size_t most = std::max<std::size_t>(1, samples.size() / kPoints);
+  const double widest = (samples.back().x - samples.front().x) / static_cast<double>(kPoints);
+  for (std::size_t begin = 0, end = 0; begin < samples.size(); begin = end) {
     Asked sum;
-    for (std::size_t i = begin; i < begin + step; ++i) {
-      const Sample& each = samples[i];
-      sum.x += each.x / static_cast<double>(step);
-      sum.without -= each.column * each.without;
-      sum.left -= each.column * each.with;
-      sum.information += each.column * each.column;
+    // As many as the others, but not over a gap.
+    for (end = begin;
+         end < samples.size() && end - begin < most && samples[end].x - samples[begin].x <= widest;
+         ++end) {
+      const Sample& each = samples[end];
+      const double weight = each.column * each.column;
+      sum.x += weight * each.x;
+      sum.by_finding += each.column * each.by_finding;
+      sum.left -= each.column * each.left;
+      sum.information += weight;
     }
-    sum.without /= sum.information;
+    sum.x /= sum.information;
+    sum.by_finding /= sum.information;
     sum.left /= sum.information;
     out.push_back(sum);
   }
@@ -214,25 +230,24 @@ std::vector<report::Chart> pictures_of(const Campaign& campaign, const ModelStat
     const std::vector<Asked> asked =
         asked_by(samples_of(campaign, extended, static_cast<int>(i), *point, *variable));
     if (asked.size() < 2) continue;
-    Series law{"as found", {}, {}, true, false}, low{"95 % from", {}, {}, true, true},
-        high{"95 % to", {}, {}, true, true}, before{"asked for by the data", {}, {}, false, false},
+    Series law{"as found", {}, {}, true, false}, low{"", {}, {}, true, false, true},
+        high{"95 %", {}, {}, true, false, true},
+        before{"asked for by the data", {}, {}, false, false},
         after{"left with the finding", {}, {}, false, false};
     const auto band = band_of(slot, findings);
     for (const Asked& each : asked) {
-      const double size = point->shown * (each.without - each.left);
+      const double size = point->shown * each.by_finding, left = point->shown * each.left;
       for (Series* series : {&law, &low, &high, &before, &after}) series->x.push_back(each.x);
       law.y.push_back(size);
       low.y.push_back(size * (band ? (*band)[0] : 1.0));
       high.y.push_back(size * (band ? (*band)[1] : 1.0));
-      before.y.push_back(point->shown * each.without);
-      after.y.push_back(point->shown * each.left);
+      before.y.push_back(size + left);
+      after.y.push_back(left);
     }
-    report::Chart chart{std::string(words_of(slot.row->id, slot.row->parameter)),
-                        variable->label,
-                        point->label,
-                        {law}};
-    if (band) chart.series.insert(chart.series.end(), {low, high});
-    chart.series.insert(chart.series.end(), {before, after});
+    report::Chart chart{
+        words_of(slot.row->id, slot.row->parameter), variable->label, point->label, {}};
+    if (band) chart.series = {low, high};
+    chart.series.insert(chart.series.end(), {law, before, after});
     out.push_back(std::move(chart));
   }
   return out;

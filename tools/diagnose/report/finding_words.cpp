@@ -4,55 +4,117 @@
 #include <cmath>
 #include <cstdio>
 #include <iterator>
+#include <utility>
 
 #include "estimator/physics/machine_effects.h"
 
 namespace beltgrip::diagnose {
 namespace {
 
+// How a person is told a size: words, those for one below zero (none: with its sign), unit, and
+// times the SI value.
 struct Words {
-  std::string_view effect, parameter, words;
+  std::string_view effect, parameter, words, opposite, unit;
+  double per_SI = 1.0;
 };
+constexpr double kPercent = 100.0, kBarPerPa = 1e-5;
 constexpr Words kWords[] = {
-    {"torque_bias", "bias_Nm", "a measured torque that is too high by"},
-    {"torque_gain", "gain", "a measured torque that is too high by the share"},
-    {"inertia_torque", "inertia_kg_m2", "an inertia before the belt beyond the configured one"},
-    {"torque_delay", "delay_s", "a torque that comes late"},
-    {"torque_loss", "constant_Nm", "a drag before the belt"},
-    {"torque_loss", "per_kN_Nm", "a drag that grows with the clamp force"},
-    {"torque_loss", "per_rad_s_Nm", "a drag that grows with the primary speed"},
-    {"centrifugal_force", "coefficient_N_s2", "a clamp force of the turning oil"},
-    {"pressure_offset", "offset_Pa", "a measured pressure that is too high by"},
-    {"pressure_gain", "gain", "a measured pressure that is too high by the share"},
-    {"spring_force", "force_N", "a spring that is stronger than configured"},
-    {"hydraulic_lag", "time_constant_s", "a pressure that acts with a lag"},
-    {"hydraulic_lag", "delay_s", "a pressure that acts late"},
-    {"clamp_hysteresis", "force_N", "friction in the clamp force's way, with play"},
-    {"pulley_deformation", "per_kN", "pulleys that give way to the clamp force"},
-    {"pulley_deformation", "per_kN2", "pulleys that give way to the clamp force's square"},
-    {"radius_tilt", "per_Nm", "a ratio that the torque tilts"},
-    {"end_stop_ratio", "low", "a ratio at the low end stop that is larger by the share"},
-    {"end_stop_ratio", "overdrive",
-     "a ratio at the overdrive end stop that is larger by the share"},
-    {"ratio_creep", "rate", "a ratio that leaves its end stop as the holding force falls"},
-    {"friction_temperature", "per_K", "friction that grows with the oil temperature"},
-    {"friction_speed", "per_ln_speed", "friction that grows with the speed"},
-    {"friction_load", "exponent", "friction that falls with the clamp force, exponent"},
-    {"friction_ratio", "relative", "more friction at the low end stop, a share of"},
-    {"friction_shape", "peak_slip_percent", "a peak of friction at another slip"},
-    {"friction_shape", "fall_per_percent", "friction that falls faster behind its peak"},
-    {"wear", "step", "less friction from one experiment on, a share of"},
-    {"wear", "per_experiment", "friction that falls with each experiment, a share of"},
-    {"warm_up_drift", "per_kJ", "friction that grows with the slip energy"},
-    {"warm_up_drift", "per_start", "friction that grows in the first minute, a share of"},
-    {"speed_scale", "primary", "a primary speed that is too high by the share"},
-    {"speed_scale", "secondary", "a secondary speed that is too high by the share"},
-    {"speed_ripple", "primary", "a ripple of the primary speed over its turn, a share of"},
-    {"speed_ripple", "secondary", "a ripple of the secondary speed over its turn, a share of"},
-    {"channel_skew", "delay_s", "a channel that comes late"},
-    {"secondary_loss", "constant_Nm", "a drag behind the belt"},
-    {"secondary_loss", "per_rad_s_Nm", "a drag behind the belt that grows with its speed"},
+    {"torque_bias", "bias_Nm", "a measured torque that is too high by",
+     "a measured torque that is too low by", "Nm"},
+    {"torque_gain", "gain", "a measured torque that is too high by",
+     "a measured torque that is too low by", "%", kPercent},
+    {"inertia_torque", "inertia_kg_m2", "an inertia before the belt beyond the configured one,",
+     "an inertia before the belt below the configured one, by", "kg m^2"},
+    {"torque_delay", "delay_s", "a torque that comes late by", "a torque that comes early by", "s"},
+    {"torque_loss", "constant_Nm", "a drag before the belt,", {}, "Nm"},
+    {"torque_loss", "per_kN_Nm", "a drag that grows with the clamp force,",
+     "a drag that falls with the clamp force, by", "Nm/kN"},
+    {"torque_loss", "per_rad_s_Nm", "a drag that grows with the primary speed,",
+     "a drag that falls with the primary speed, by", "Nm s/rad"},
+    {"centrifugal_force", "coefficient_N_s2", "a clamp force of the turning oil,", {}, "N s^2"},
+    {"pressure_offset", "offset_Pa", "a measured pressure that is too high by",
+     "a measured pressure that is too low by", "bar", kBarPerPa},
+    {"pressure_gain", "gain", "a measured pressure that is too high by",
+     "a measured pressure that is too low by", "%", kPercent},
+    {"spring_force", "force_N", "a spring that is stronger than configured by",
+     "a spring that is weaker than configured by", "N"},
+    {"hydraulic_lag", "time_constant_s", "a pressure that acts with a lag of", {}, "s"},
+    {"hydraulic_lag", "delay_s", "a pressure that acts late by", "a pressure that acts early by",
+     "s"},
+    {"clamp_hysteresis", "force_N", "friction in the clamp force's way, with play,", {}, "N"},
+    {"pulley_deformation", "per_kN", "pulleys that give way to the clamp force,", {}, "1/kN"},
+    {"pulley_deformation",
+     "per_kN2",
+     "pulleys that give way to the clamp force's square,",
+     {},
+     "1/kN^2"},
+    {"radius_tilt", "per_Nm", "a ratio that the torque tilts,", {}, "1/Nm"},
+    {"end_stop_ratio", "low", "a ratio at the low end stop that is larger by",
+     "a ratio at the low end stop that is smaller by", "%", kPercent},
+    {"end_stop_ratio", "overdrive", "a ratio at the overdrive end stop that is larger by",
+     "a ratio at the overdrive end stop that is smaller by", "%", kPercent},
+    {"ratio_creep", "rate", "a ratio that leaves its end stop as the holding force falls,", {}, {}},
+    {"friction_temperature", "per_K", "friction that grows with the oil temperature,",
+     "friction that falls with the oil temperature, by", "% per K", kPercent},
+    {"friction_speed", "per_ln_speed", "friction that grows with the logarithm of the speed,",
+     "friction that falls with the logarithm of the speed, by", "% per factor of 2.72", kPercent},
+    {"friction_load",
+     "exponent",
+     "friction that falls with the clamp force, exponent",
+     "friction that grows with the clamp force, exponent",
+     {}},
+    {"friction_ratio", "relative", "more friction at the low end stop, by",
+     "less friction at the low end stop, by", "%", kPercent},
+    {"friction_shape", "peak_slip_percent", "a peak of friction at another slip,", {}, "%"},
+    {"friction_shape", "fall_per_percent", "friction that falls faster behind its peak,",
+     "friction that falls more slowly behind its peak, by", "1/%"},
+    {"wear", "step", "less friction from one experiment on, by",
+     "more friction from one experiment on, by", "%", kPercent},
+    {"wear", "per_experiment", "friction that falls with each experiment, by",
+     "friction that grows with each experiment, by", "%", kPercent},
+    {"warm_up_drift", "per_kJ", "friction that grows with the slip energy,",
+     "friction that falls with the slip energy, by", "% per kJ", kPercent},
+    {"warm_up_drift", "per_start", "friction that grows in the first minute, by",
+     "friction that falls in the first minute, by", "%", kPercent},
+    {"speed_scale", "primary", "a primary speed that is too high by",
+     "a primary speed that is too low by", "%", kPercent},
+    {"speed_scale", "secondary", "a secondary speed that is too high by",
+     "a secondary speed that is too low by", "%", kPercent},
+    {"speed_ripple", "primary", "a ripple of the primary speed over its turn,", {}, "%", kPercent},
+    {"speed_ripple",
+     "secondary",
+     "a ripple of the secondary speed over its turn,",
+     {},
+     "%",
+     kPercent},
+    {"channel_skew", "delay_s", "a channel that comes late by", "a channel that comes early by",
+     "s"},
+    {"secondary_loss", "constant_Nm", "a drag behind the belt,", {}, "Nm"},
+    {"secondary_loss",
+     "per_rad_s_Nm",
+     "a drag behind the belt that grows with its speed,",
+     {},
+     "Nm s/rad"},
 };
+
+// What a signal, an error of it or a function on it is told in.
+struct Shown {
+  std::string_view ends_with;
+  Display display;
+};
+constexpr Shown kShown[] = {
+    {"torque_gain", {"%", kPercent}}, {"torque", {"Nm"}},         {"speed", {"rad/s"}},
+    {"pressure", {"bar", kBarPerPa}}, {"temperature", {"degC"}},  {"clamp_force", {"N"}},
+    {"friction", {"%", kPercent}},    {"ratio", {"%", kPercent}}, {"slip", {"%", kPercent}},
+    {"mu_max", {"%", kPercent}},
+};
+
+const Words* row_of(std::string_view effect, std::string_view parameter) {
+  const auto found = std::find_if(std::begin(kWords), std::end(kWords), [&](const Words& each) {
+    return each.effect == effect && each.parameter == parameter;
+  });
+  return found == std::end(kWords) ? nullptr : &*found;
+}
 
 std::string rounded(double value, int digits) {
   char buffer[32];
@@ -77,11 +139,36 @@ std::string size_of(const Interval& size) {
 
 }  // namespace
 
-std::string_view words_of(std::string_view effect, std::string_view parameter) {
-  const auto found = std::find_if(std::begin(kWords), std::end(kWords), [&](const Words& each) {
-    return each.effect == effect && each.parameter == parameter;
+std::string words_of(std::string_view effect, std::string_view parameter) {
+  const Words* const row = row_of(effect, parameter);
+  if (row == nullptr) return {};
+  std::string_view words = row->words;
+  for (const std::string_view end : {",", " by", " of", ", by", ", exponent"}) {
+    if (words.ends_with(end)) words.remove_suffix(end.size());
+  }
+  return std::string(words);
+}
+
+Display display_of(std::string_view what) {
+  const auto found = std::find_if(std::begin(kShown), std::end(kShown), [&](const Shown& each) {
+    return what.ends_with(each.ends_with);
   });
-  return found == std::end(kWords) ? std::string_view{} : found->words;
+  return found == std::end(kShown) ? Display{} : found->display;
+}
+
+std::string told(std::string_view what, double value, int digits) {
+  const Display shown = display_of(what);
+  return rounded(value * shown.per_SI, digits) +
+         (shown.unit.empty() ? "" : " " + std::string(shown.unit));
+}
+
+std::string told_change(std::string_view what, double before, double after, double low,
+                        double high) {
+  const Display shown = display_of(what);
+  constexpr int kDigits = 4;
+  const auto text = [&](double value) { return rounded(value * shown.per_SI, kDigits); };
+  return text(before) + " -> " + text(after) + " [" + text(low) + ", " + text(high) + "]" +
+         (shown.unit.empty() ? "" : " " + std::string(shown.unit));
 }
 
 std::string_view unit_of(std::string_view effect, std::string_view parameter) {
@@ -94,12 +181,14 @@ std::string_view unit_of(std::string_view effect, std::string_view parameter) {
 std::string in_words(const Finding& finding) {
   std::string out;
   for (const auto& [name, size] : finding.parameters) {
-    const std::string_view words = words_of(finding.effect, name);
-    const bool leads_on = words.ends_with(" by") || words.ends_with(" of") ||
-                          words.ends_with("share") || words.ends_with("exponent");
-    out += (out.empty() ? "" : ", ") + std::string(words) + (leads_on ? " " : ", ") + size_of(size);
-    const std::string unit(unit_of(finding.effect, name));
-    if (!unit.empty()) out += " " + unit;
+    const Words* const row = row_of(finding.effect, name);
+    if (row == nullptr) continue;
+    const bool is_opposite = size.value < 0.0 && !row->opposite.empty();
+    const double by = is_opposite ? -row->per_SI : row->per_SI;
+    Interval told{size.value * by, size.low * by, size.high * by};
+    if (told.low > told.high) std::swap(told.low, told.high);
+    out += (out.empty() ? "" : ", ") + std::string(is_opposite ? row->opposite : row->words) + " " +
+           size_of(told) + (row->unit.empty() ? "" : " " + std::string(row->unit));
   }
   if (!finding.from_file.empty()) out += ", from " + finding.from_file + " on";
   return out + " (" + finding.effect + (finding.role.empty() ? "" : ", " + finding.role) + ")";

@@ -72,28 +72,36 @@ void add_findings(report::HtmlPage& page, const Diagnosis& d,
   page.charts(pictures);
 }
 
-// In the unit of the function.
-const char* unit_at(const std::string& acts_on) {
-  if (acts_on == "torque") return "Nm";
-  return acts_on == "clamp_force" ? "N" : "share";
+void add_gain(std::vector<std::string>& row, const std::string& name, const BeforeAfter& gain) {
+  constexpr int kDigits = 4;
+  const Display shown = display_of(name);
+  row.push_back(told(name, gain.before, kDigits));
+  row.push_back(told(name, gain.after, kDigits));
+  row.push_back(range(shown.per_SI * gain.low, shown.per_SI * gain.high) + " " +
+                std::string(shown.unit));
 }
 
 // The function with its 95 % band over what it follows.
 report::Chart picture_of(const LearnedFinding& learned) {
   constexpr double kBand = 1.96;
-  report::Series mean{"learned", learned.knots, learned.values, true, false};
-  report::Series low{"95 % from", learned.knots, learned.values, true, true};
-  report::Series high{"95 % to", learned.knots, learned.values, true, true};
+  const Display of_x = display_of(learned.depends_on.front()), of_y = display_of(learned.acts_on);
+  report::Series mean{"learned", {}, {}, true, false};
+  report::Series low{"", {}, {}, true, false, true}, high{"95 %", {}, {}, true, false, true};
   const std::size_t n = learned.knots.size();
   for (std::size_t i = 0; i < n; ++i) {
     const double half = kBand * std::sqrt(std::max(0.0, learned.covariance[i * n + i]));
-    low.y[i] -= half;
-    high.y[i] += half;
+    for (report::Series* series : {&mean, &low, &high}) {
+      series->x.push_back(of_x.per_SI * learned.knots[i]);
+    }
+    mean.y.push_back(of_y.per_SI * learned.values[i]);
+    low.y.push_back(of_y.per_SI * (learned.values[i] - half));
+    high.y.push_back(of_y.per_SI * (learned.values[i] + half));
   }
-  return {learned.acts_on + " over " + text::joined(learned.depends_on),
-          text::joined(learned.depends_on),
-          learned.acts_on + ", " + unit_at(learned.acts_on),
-          {mean, low, high}};
+  const std::string follows = text::joined(learned.depends_on);
+  return {learned.acts_on + " over " + follows,
+          follows + ", " + std::string(of_x.unit),
+          learned.acts_on + ", " + std::string(of_y.unit),
+          {low, high, mean}};
 }
 
 void add_learned(report::HtmlPage& page, const Diagnosis& d) {
@@ -109,17 +117,12 @@ void add_learned(report::HtmlPage& page, const Diagnosis& d) {
     charts.push_back(picture_of(each));
     if (!each.at_left_out_values) continue;
     rows.push_back({each.name, each.metric});
-    for (const std::string& cell :
-         {rounded_text(each.at_left_out_values->before),
-          rounded_text(each.at_left_out_values->after),
-          range(each.at_left_out_values->low, each.at_left_out_values->high)}) {
-      rows.back().push_back(cell);
-    }
+    add_gain(rows.back(), each.metric, *each.at_left_out_values);
   }
   page.charts(charts);
   if (rows.empty()) return;
   page.paragraph("Errors at values of the variable that were left out of the fit, all of them:");
-  page.table({"learned", "signal, SI", "before", "after", "difference (95 %)"}, rows);
+  page.table({"learned", "signal", "before", "after", "difference (95 %)"}, rows);
 }
 
 // p-values; what chance does in one of a thousand campaigns counts as a failure.
@@ -163,22 +166,15 @@ void add_tests(report::HtmlPage& page, const Diagnosis& d) {
   page.table(head, rows);
 }
 
-void add_gain(std::vector<std::string>& row, const BeforeAfter& gain) {
-  for (const std::string& cell :
-       {rounded_text(gain.before), rounded_text(gain.after), range(gain.low, gain.high)}) {
-    row.push_back(cell);
-  }
-}
-
 void add_errors(report::HtmlPage& page, const Diagnosis& d) {
   if (d.baseline.empty()) return;
   page.heading("The model as given against the data");
   Rows rows;
   for (const auto& [name, signal] : d.baseline) {
-    rows.push_back({name, rounded_text(signal.rmse), rounded_text(signal.noise_floor),
+    rows.push_back({name, told(name, signal.rmse, 4), told(name, signal.noise_floor, 4),
                     rounded_text(100.0 * signal.unexplained_share) + " %"});
   }
-  page.table({"signal, SI", "error, rms", "noise", "beyond the noise"}, rows);
+  page.table({"signal", "error, rms", "noise", "beyond the noise"}, rows);
   add_tests(page, d);
   if (!d.held_out.empty()) {
     page.heading("Errors on experiments that were not used for the fit");
@@ -192,13 +188,14 @@ void add_errors(report::HtmlPage& page, const Diagnosis& d) {
     rows.clear();
     for (const auto& [name, gain] : d.held_out) {
       rows.push_back({name});
-      add_gain(rows.back(), gain);
+      add_gain(rows.back(), name, gain);
     }
     if (d.mu_max) {
       rows.push_back({"mu_max, relative"});
-      add_gain(rows.back(), {d.mu_max->before, d.mu_max->after, d.mu_max->low, d.mu_max->high});
+      add_gain(rows.back(), "mu_max",
+               {d.mu_max->before, d.mu_max->after, d.mu_max->low, d.mu_max->high});
     }
-    page.table({"signal, SI", "before", "after", "difference (95 %)"}, rows);
+    page.table({"signal", "before", "after", "difference (95 %)"}, rows);
   }
   if (d.simulation.empty()) return;
   page.heading("The simulation run forward");
@@ -207,14 +204,14 @@ void add_errors(report::HtmlPage& page, const Diagnosis& d) {
       "friction, where it ends and begins anew once the belt grips. Before and after: on "
       "experiments "
       "that were not used for the fit.");
-  std::vector<std::string> head{"signal, SI", "error as given, rms", "noise"};
+  std::vector<std::string> head{"signal", "error as given, rms", "noise"};
   if (d.simulation.begin()->second.left_out) {
     head.insert(head.end(), {"before", "after", "difference (95 %)"});
   }
   rows.clear();
   for (const auto& [name, signal] : d.simulation) {
-    rows.push_back({name, rounded_text(signal.rmse), rounded_text(signal.noise_floor)});
-    if (signal.left_out) add_gain(rows.back(), *signal.left_out);
+    rows.push_back({name, told(name, signal.rmse, 4), told(name, signal.noise_floor, 4)});
+    if (signal.left_out) add_gain(rows.back(), name, *signal.left_out);
     rows.back().resize(head.size());
   }
   page.table(head, rows);
@@ -252,10 +249,14 @@ void add_tables(report::HtmlPage& page, const Diagnosis& d) {
 
 }  // namespace
 
-std::string html_text(const Diagnosis& d, const Plots& plots) {
+std::string html_text(const Diagnosis& d, const Plots& plots, const PageFacts& facts) {
   report::HtmlPage page("BeltGrip: diagnosis");
   page.paragraph(headline(d));
   page.paragraph("Verdict: " + verdict_line(d) + ".");
+  page.paragraph(
+      "Made on " + facts.date + " by " + facts.program + ", configuration " + facts.configuration +
+      ", " + (facts.model.empty() ? "no model file: the usual machine" : "model " + facts.model) +
+      ".");
   if (d.verdict == Verdict::kNothingWrong) {
     page.paragraph(
         "Nothing stands out from noise and from the scatter between experiments. What these "
@@ -266,6 +267,7 @@ std::string html_text(const Diagnosis& d, const Plots& plots) {
     page.paragraph("Unexplained: " + sentence(*d.unexplained) + ".");
   }
   if (d.next_experiment) page.paragraph("Next experiment: " + d.next_experiment->text + ".");
+  page.paragraph("In a plot the mouse draws the part to be seen, a double click shows all of it.");
   add_findings(page, d, plots.findings);
   add_learned(page, d);
   add_errors(page, d);

@@ -264,11 +264,11 @@ std::string sentence(const Unexplained& left) {
 std::string sentence(const LearnedFinding& learned) {
   const auto [least, most] = std::minmax_element(learned.values.begin(), learned.values.end());
   std::string out = "a cause without a name on " + learned.acts_on + " that follows " +
-                    text::joined(learned.depends_on) + " (" + rounded_text(*least) + " to " +
-                    rounded_text(*most) + ", learned at " + std::to_string(learned.levels) +
-                    " levels";
+                    text::joined(learned.depends_on) + " (" + told(learned.acts_on, *least) +
+                    " to " + told(learned.acts_on, *most) + ", learned at " +
+                    std::to_string(learned.levels) + " levels";
   for (const auto& [role, range] : learned.box) {
-    out += " of " + role + " from " + rounded_text(range[0]) + " to " + rounded_text(range[1]);
+    out += " from " + told(role, range[0], 3) + " to " + told(role, range[1], 3);
   }
   out += ")";
   if (!learned.law.empty()) out += ", " + learned.law;
@@ -340,19 +340,26 @@ std::string verdict_line(const Diagnosis& d) {
 
 namespace {
 
+// Of what was wrong; whole percents.
+std::string share_text(const Diagnosis& d) {
+  if (!d.explained_share) return {};
+  const long percent = std::lround(100.0 * *d.explained_share);
+  return percent > 99 ? " more than 99 % of" : " " + std::to_string(percent) + " % of";
+}
+
 // By how much the error of mu_max falls, or of the signal that gains most.
 std::string gain_text(const Diagnosis& d) {
   if (d.mu_max && d.mu_max->after < d.mu_max->before) {
-    return "; with it mu_max is off by " + short_number(100.0 * d.mu_max->after) +
-           " % instead of " + short_number(100.0 * d.mu_max->before) + " %";
+    return "; with it mu_max is off by " + told("mu_max", d.mu_max->after) + " instead of " +
+           told("mu_max", d.mu_max->before);
   }
   const auto best =
       std::min_element(d.held_out.begin(), d.held_out.end(), [](const auto& a, const auto& b) {
         return a.second.after * b.second.before < b.second.after * a.second.before;
       });
   if (best == d.held_out.end() || !(best->second.after < best->second.before)) return {};
-  return "; with it " + best->first + " is off by " + short_number(best->second.after) +
-         " instead of " + short_number(best->second.before) + " (SI)";
+  return "; with it " + best->first + " is off by " + told(best->first, best->second.after) +
+         " instead of " + told(best->first, best->second.before);
 }
 
 }  // namespace
@@ -376,7 +383,7 @@ std::string headline(const Diagnosis& d) {
   }
   if (d.verdict == Verdict::kExplained) {
     return begun(found) + (d.findings.size() + d.learned.size() > 1 ? " explain" : " explains") +
-           " what was wrong" + gain_text(d) + ".";
+           share_text(d) + " what was wrong" + gain_text(d) + ".";
   }
   if (d.verdict == Verdict::kNothingWrong) {
     return "Nothing stands out from noise and scatter in " + std::to_string(d.experiments) +
@@ -388,8 +395,8 @@ std::string headline(const Diagnosis& d) {
 std::string plain_text(const Diagnosis& d) {
   std::string out = "verdict: " + verdict_line(d) + "\n" + headline(d) + "\n";
   for (const auto& [name, signal] : d.baseline) {
-    out += "  " + name + ": the simulation is off by " + rounded_text(signal.rmse) +
-           " rms, noise " + rounded_text(signal.noise_floor) + "\n";
+    out += "  " + name + ": the simulation is off by " + told(name, signal.rmse, 4) +
+           " rms, noise " + told(name, signal.noise_floor, 4) + "\n";
   }
   for (const Finding& finding : d.findings) {
     out += finding.effect + (finding.role.empty() ? "" : " (" + finding.role + ")") + ": " +
@@ -417,9 +424,9 @@ std::string plain_text(const Diagnosis& d) {
       out += "  these data cannot tell it from: " + text::joined(each.aliases) + "\n";
     if (const auto& change = each.at_left_out_values) {
       out += "  " + each.metric + " at values of " + text::joined(each.depends_on) +
-             " that were left out: off by " + rounded_text(change->before) + " -> " +
-             rounded_text(change->after) + " [" + rounded_text(change->low) + ", " +
-             rounded_text(change->high) + "]\n";
+             " that were left out: off by " +
+             told_change(each.metric, change->before, change->after, change->low, change->high) +
+             "\n";
     }
   }
   if (d.unexplained) out += "unexplained: " + sentence(*d.unexplained) + "\n";
@@ -427,18 +434,19 @@ std::string plain_text(const Diagnosis& d) {
     out += "on experiments not used for the fit (before -> after, 95 % of the difference):\n";
   }
   for (const auto& [name, gain] : d.held_out) {
-    out += "  " + name + ": " + rounded_text(gain.before) + " -> " + rounded_text(gain.after) +
-           " [" + rounded_text(gain.low) + ", " + rounded_text(gain.high) + "]\n";
+    out +=
+        "  " + name + ": " + told_change(name, gain.before, gain.after, gain.low, gain.high) + "\n";
   }
   for (const auto& [name, signal] : d.simulation) {
     if (!signal.left_out) continue;
-    out += "  " + name + ", simulated forward: " + rounded_text(signal.left_out->before) + " -> " +
-           rounded_text(signal.left_out->after) + " [" + rounded_text(signal.left_out->low) + ", " +
-           rounded_text(signal.left_out->high) + "]\n";
+    const BeforeAfter& gain = *signal.left_out;
+    out += "  " + name + ", simulated forward: " +
+           told_change(name, gain.before, gain.after, gain.low, gain.high) + "\n";
   }
   if (d.mu_max) {
-    out += "  mu_max, relative error: " + rounded_text(d.mu_max->before) + " -> " +
-           rounded_text(d.mu_max->after) + "\n";
+    out += "  mu_max, relative error: " +
+           told_change("mu_max", d.mu_max->before, d.mu_max->after, d.mu_max->low, d.mu_max->high) +
+           "\n";
   }
   if (!d.reruns.empty()) {
     out += "by the estimator, told the model before -> after (";

@@ -306,6 +306,9 @@ class Run {
     fill_findings(engine, named ? naming.accepted : std::vector<Accepted>(), naming, gain);
     fill_learned(engine, naming, learning, gain);
     judge(engine, naming, learning, named);
+    if (named && !(naming.accepted.empty() && learning.terms.empty())) {
+      out().explained_share = explained_share(engine, naming.nominal.state, extended);
+    }
     count_learned(engine, learning);
     count_unexplained(engine, naming, learning.left);
     out().next_experiment = next_experiment(engine, naming, learning, out(), open_);
@@ -645,6 +648,24 @@ class Run {
                             "), which counts as the machine's own and is no finding");
     }
     out().machine[name] = fitted;
+  }
+
+  // Nothing: the machine alone leaves no more than noise and scatter.
+  static std::optional<double> explained_share(const Engine& engine, const ModelState& nominal,
+                                               const ModelState& extended) {
+    const auto beyond_noise = [&](const ModelState& state) {
+      double out = 0.0;
+      for (const int run : engine.used()) {
+        for (const Eigen::VectorXd& rows :
+             white_residuals(engine.campaign(), run, state, engine.whitening(), engine.scatter())) {
+          out += rows.squaredNorm() - static_cast<double>(rows.size());
+        }
+      }
+      return out;
+    };
+    const double before = beyond_noise(nominal);
+    if (before <= 0.0) return std::nullopt;
+    return std::clamp(1.0 - beyond_noise(extended) / before, 0.0, 1.0);
   }
 
   void fill_baseline(const Engine& engine, const Naming& naming) {
