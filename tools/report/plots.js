@@ -435,7 +435,10 @@ window.addEventListener('beforeprint', () => {
   for (const {graphs} of stacks) {
     for (const graph of graphs) graph.resize(paperWidth, graph.graphDiv.parentElement.clientHeight);
   }
-  for (const chart of charts) chart.resize(paperWidth / 2, 250);
+  for (const chart of charts) {
+    if (chart.canvas.closest('.beside')) chart.resize(paperWidth / 2, 250);
+    else chart.resize(paperWidth / 3, 190);
+  }
 });
 window.addEventListener('afterprint', () => {
   for (const {graphs} of stacks) {
