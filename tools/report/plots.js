@@ -428,6 +428,19 @@ for (const spec of courses) {
   });
 }
 
+// Of a chart's title, legend and axes, pixels.
+const letters = (chart, size) => {
+  const {plugins, scales} = chart.options, font = {size};
+  plugins.title.font = {size, weight: 'bold'};
+  plugins.title.padding = size / 2;
+  Object.assign(plugins.legend.labels, {font, boxWidth: size, boxHeight: size, padding: size / 2});
+  for (const scale of [scales.x, scales.y]) {
+    scale.title.font = font;
+    scale.ticks.font = font;
+  }
+  chart.update();
+};
+
 // A page of paper is narrower than most windows.
 const paperWidth = 660;
 window.addEventListener('beforeprint', () => {
@@ -436,6 +449,7 @@ window.addEventListener('beforeprint', () => {
     for (const graph of graphs) graph.resize(paperWidth, graph.graphDiv.parentElement.clientHeight);
   }
   for (const chart of charts) {
+    letters(chart, 8);
     if (chart.canvas.closest('.beside')) chart.resize(paperWidth / 2, 250);
     else chart.resize(paperWidth / 3, 190);
   }
@@ -447,5 +461,8 @@ window.addEventListener('afterprint', () => {
       graph.resize();
     }
   }
-  for (const chart of charts) chart.resize();
+  for (const chart of charts) {
+    letters(chart, 12);
+    chart.resize();
+  }
 });
