@@ -1,0 +1,38 @@
+// The loop closed by machine, two cases of it; the figures are those of the program rounds.
+#include "tests/statistics/blind/rounds.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+namespace beltgrip::blind {
+namespace {
+
+TEST(RunOf, IsWhatTheScenarioSays) {
+  const PlannedRun run = run_of(
+      "# to see it\nname = \"next\"\n\n[variator]\nratio = 0.405\n\n[driveline]\n"
+      "primary_speed_rad_s = 130\nprimary_torque_Nm = 22\n\n[clamp]\nstart_force_N = 5000\n"
+      "ramp_N_per_s = 200\n\n[run]\nduration_s = 60\noil_degC = 85\n");
+  EXPECT_TRUE(run.low);
+  EXPECT_EQ(run.speed_rad_s, 130.0);
+  EXPECT_EQ(run.torque_Nm, 22.0);
+  EXPECT_EQ(run.temperature_C, 85.0);
+  EXPECT_EQ(run.ramp_N_s, 200.0);
+  EXPECT_EQ(run.duration_s, 60.0);
+  EXPECT_THROW(run_of("# nothing\n"), std::runtime_error);
+}
+
+// Friction that grows with the temperature beside two names that equal ramps cannot refute; a lag
+// that they do not show.
+TEST(Rounds, WhatIsOpenIsFoundByTheRecommendedExperiment) {
+  for (const std::uint64_t number : {5006U, 5002U}) {
+    SCOPED_TRACE(number);
+    const RoundsOfTrial played = play(number, 1);
+    EXPECT_NE(played.first.standing, Standing::kAlone);
+    ASSERT_EQ(played.followed.size(), 1U);
+    EXPECT_EQ(played.followed.front().standing, Standing::kAlone) << played.first.next_why;
+  }
+}
+
+}  // namespace
+}  // namespace beltgrip::blind
