@@ -109,8 +109,12 @@ class Proposal {
                             std::to_string(thresholds::kLevelsMin));
     }
     if (left.kind == MisfitKind::kFunction && !left.depends_on.empty()) {
-      return like_first(varied_by(left.depends_on.front()),
-                        "a further level of " + left.depends_on.front());
+      const std::string& follows = left.depends_on.front();
+      const Varied varied = varied_by(follows);
+      // Nobody sets the time, nor which experiment it is.
+      return like_first(varied, varied == Varied::kRepeat
+                                    ? "repeat the reference: does it follow " + follows + " again"
+                                    : "a further level of " + follows);
     }
     if (repeats_of_first(engine_.campaign()) <= kRepeatsAsked) {
       return like_first(Varied::kRepeat, "repeat the reference: is it the same every time");
