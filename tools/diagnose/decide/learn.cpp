@@ -112,6 +112,12 @@ bool acts_there(const EffectRow& row, std::string_view point, const Campaign& ca
   return point == "friction" ? is_friction : is_force;
 }
 
+// Which random effect a function at this point could be.
+std::string_view scatter_of(Injection injection) {
+  if (injection == Injection::kTorque) return "torque";
+  return injection == Injection::kRatio ? "ratio" : "friction";
+}
+
 struct Trial {
   Engine engine;
   Learned learned;
@@ -128,7 +134,9 @@ std::optional<Trial> tried(const Engine& engine, const Criticism& before, const 
   const LearnedFit& fit = out.learned.fit;
   if (fit.left_out_gain < thresholds::kLeftOutLevels || !is_possible(fit)) return {};
   out.after = criticise(out.engine, steps);
-  out.excess = excess_left(before, out.after);
+  out.excess = excess_left(before, out.after,
+                           lesser_scatter(before, scatter_of(cell.injection->injection),
+                                          cell.gain(), engine.used().size()));
   if (out.excess > 1.0 - thresholds::kHealed) return {};
   out.learned.aliases = aliases_of(engine.campaign(), before, cell);
   return out;
@@ -174,10 +182,26 @@ bool is_shadowed(const Campaign& campaign, const std::vector<int>& accepted,
   });
 }
 
-double excess_left(const Criticism& before, const Criticism& after) {
+std::vector<std::string> lesser_scatter(const Criticism& criticism, std::string_view point,
+                                        double gain, std::size_t experiments) {
+  std::vector<std::string> out;
+  for (const JudgedTest& each : criticism.tests) {
+    const bool is_scatter = each.name.starts_with("scatter_") ||
+                            (each.name.starts_with("unusual_") && each.name != "unusual_scatter");
+    if (each.passed() || !is_scatter || each.name.ends_with(point)) continue;
+    // Of normal variables whose deviation is so many times the usual one.
+    const double worth = static_cast<double>(experiments) *
+                         (each.value * each.value - 1.0 - 2.0 * std::log(each.value));
+    if (worth < gain) out.push_back(each.name);
+  }
+  return out;
+}
+
+double excess_left(const Criticism& before, const Criticism& after,
+                   const std::vector<std::string>& apart) {
   double most = 0.0;
   for (const JudgedTest& each : before.tests) {
-    if (each.passed()) continue;
+    if (each.passed() || std::find(apart.begin(), apart.end(), each.name) != apart.end()) continue;
     const JudgedTest& now = after.test(each.name);
     // What hardly failed is healed by chance, or not.
     const double failed_by = std::max(each.value - each.limit, thresholds::kTrifle * each.limit);

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tools/diagnose/decide/criticism.h"
@@ -42,7 +43,16 @@ const LawEvidence* named_law(const LearnedFit& fit, const std::vector<LawEvidenc
 bool is_shadowed(const Campaign& campaign, const std::vector<int>& accepted,
                  const Criticism& without, const Criticism& with);
 
-// Share of the failed tests' excess over their limits that is left, of the one that keeps most.
-double excess_left(const Criticism& before, const Criticism& after);
+// Share of the failed tests' excess over their limits that is left, of the one that keeps most;
+// those named in `apart` do not count.
+double excess_left(const Criticism& before, const Criticism& after,
+                   const std::vector<std::string>& apart = {});
+
+// Failed tests of how experiments scatter elsewhere than at `point` (friction, ratio, torque),
+// where that is the lesser cause: twice the log likelihood that so many experiments gain by their
+// scatter is less than the function's gain. They do not speak against the function, which cannot
+// heal them; they go on failing beside it.
+std::vector<std::string> lesser_scatter(const Criticism& criticism, std::string_view point,
+                                        double gain, std::size_t experiments);
 
 }  // namespace beltgrip::diagnose
