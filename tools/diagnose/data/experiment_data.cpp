@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "estimator/statistics/order.h"
+#include "tools/diagnose/data/unrounded.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -487,9 +488,18 @@ double age_s(const Channel& channel, const Channel& beside) {
   return 2 * repeats > channel.value.size() ? period_s : 0.0;
 }
 
+// What slip and torque are held against: an error of the pressure that lasts is one of friction,
+// and of what follows its rate. The other channels' steps are passed sooner than the clamp moves,
+// and their noise carries them over.
+Channel before_rounding(Role role, const Channel& channel) {
+  if (role != Role::kSecondaryPressure || channel.empty()) return channel;
+  if (!rests_on_steps(channel)) return channel;
+  return unrounded(channel, step_of(channel));
+}
+
 void put_on_grid(const SignalTable& table, double start_s, int n, ExperimentData& data) {
   const auto on_grid = [&](Role role) {
-    GridSignal out = to_grid(table[role], start_s, n, data.dt_s);
+    GridSignal out = to_grid(before_rounding(role, table[role]), start_s, n, data.dt_s);
     out.age_s =
         age_s(table[role],
               table[role == Role::kPrimarySpeed ? Role::kSecondarySpeed : Role::kPrimarySpeed]);

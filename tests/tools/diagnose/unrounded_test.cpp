@@ -1,0 +1,122 @@
+// A channel that moves in steps: what is left of its rounding.
+#include "tools/diagnose/data/unrounded.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+namespace beltgrip::diagnose {
+namespace {
+
+// The same noise every time; one sigma is 1.
+class Noise {
+ public:
+  double operator()() {
+    double sum = 0.0;
+    for (int i = 0; i < 12; ++i) {
+      state_ = state_ * 6364136223846793005ULL + 1442695040888963407ULL;
+      sum += static_cast<double>(state_ >> 11U) * 0x1p-53;
+    }
+    return sum - 6.0;
+  }
+
+ private:
+  std::uint64_t state_ = 1;
+};
+
+constexpr double kStep = 20.0;
+constexpr double kSample_s = 0.02;
+
+// Rms over the time, in steps, of what a mean over half a second is off by.
+struct Errors {
+  double as_read = 0.0, unrounded = 0.0;
+};
+
+// truth: in steps, over the time; noise: one sigma of it before the rounding, in steps.
+Errors errors_of(const std::function<double(double)>& truth, double noise) {
+  constexpr int kSamples = 3000, kMean = 25;
+  Channel channel;
+  Noise next;
+  for (int i = 0; i < kSamples; ++i) {
+    channel.t_s.push_back(kSample_s * i);
+    channel.value.push_back(kStep * std::round(truth(kSample_s * i) + noise * next()));
+  }
+  const Channel out = unrounded(channel, kStep);
+  EXPECT_EQ(out.t_s, channel.t_s);
+  Errors errors;
+  constexpr int kMeans = kSamples / kMean;
+  for (int first = 0; first < kSamples; first += kMean) {
+    double read = 0.0, back = 0.0;
+    for (int i = first; i < first + kMean; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const double value = truth(channel.t_s[k]);
+      read += (channel.value[k] / kStep - value) / kMean;
+      back += (out.value[k] / kStep - value) / kMean;
+    }
+    errors.as_read += read * read / kMeans;
+    errors.unrounded += back * back / kMeans;
+  }
+  return {std::sqrt(errors.as_read), std::sqrt(errors.unrounded)};
+}
+
+double ramp(double t_s) { return 30.3 - 0.3 * t_s; }
+
+TEST(Unrounded, ARampThatPassesItsStepsSlowlyHasNoSawTooth) {
+  const Errors errors = errors_of(ramp, 0.1);
+  EXPECT_GT(errors.as_read, 0.18);  // of 1 / sqrt(12)
+  EXPECT_LT(errors.unrounded, 0.04);
+}
+
+TEST(Unrounded, AMotionThatTurnsIsFoundBetweenItsSteps) {
+  const Errors errors = errors_of([](double t_s) { return 20.2 + 3.0 * std::sin(0.8 * t_s); }, 0.1);
+  EXPECT_GT(errors.as_read, 0.08);
+  EXPECT_LT(errors.unrounded, 0.5 * errors.as_read);
+}
+
+// A corner costs little: no jump is smeared over its neighbours.
+TEST(Unrounded, AJumpStaysWhereItIs) {
+  const Errors errors = errors_of([](double t_s) { return t_s < 30.0 ? 30.0 : 22.0; }, 0.1);
+  EXPECT_LT(errors.unrounded, 0.06);
+}
+
+// Noise as large as the step rounds nothing off that a mean would not take out: it stays.
+TEST(Unrounded, NoiseOverSeveralStepsIsLeftAsItIs) {
+  const Errors errors = errors_of(ramp, 0.8);
+  EXPECT_NEAR(errors.unrounded, errors.as_read, 0.1 * errors.as_read);
+}
+
+TEST(Unrounded, TheNoiseBeforeTheRoundingStays) {
+  Channel channel;
+  Noise next;
+  constexpr double kNoise = 0.35;
+  for (int i = 0; i < 3000; ++i) {
+    channel.t_s.push_back(kSample_s * i);
+    channel.value.push_back(std::round(ramp(kSample_s * i) + kNoise * next()));
+  }
+  const Channel out = unrounded(channel, 1.0);
+  double square = 0.0;
+  for (std::size_t i = 0; i < out.value.size(); ++i) {
+    square +=
+        std::pow(out.value[i] - ramp(out.t_s[i]), 2.0) / static_cast<double>(out.value.size());
+  }
+  EXPECT_NEAR(std::sqrt(square), kNoise, 0.15 * kNoise);
+}
+
+// Held on one value, nothing says where between its neighbours: it stays within its step.
+TEST(Unrounded, AHeldValueIsNowhereElse) {
+  Channel channel;
+  for (int i = 0; i < 500; ++i) {
+    channel.t_s.push_back(kSample_s * i);
+    channel.value.push_back(7.0 * kStep);
+  }
+  for (const double value : unrounded(channel, kStep).value) EXPECT_NEAR(value, 7.0 * kStep, 1.0);
+}
+
+TEST(Unrounded, TooFewSamplesAreLeftAlone) {
+  const Channel channel{{0.0, 0.01, 0.02}, {1.0, 1.0, 2.0}};
+  EXPECT_EQ(unrounded(channel, 1.0).value, channel.value);
+}
+
+}  // namespace
+}  // namespace beltgrip::diagnose
