@@ -63,6 +63,20 @@ TEST(CheckTorques, AtSteadySpeedItIs) {
   }
 }
 
+// 50 Nm before the belt; behind it 22.7 Nm at most arrive.
+TEST(CheckTorques, WhatADragLeavesOfASmallTorqueIsOfEitherSign) {
+  const auto doubt_at = [](double behind_Nm) {
+    ExperimentData run = run_with(0.0, behind_Nm);
+    run.torque_s.value.setConstant(behind_Nm);
+    run.torque_s.value[0] += 0.1;
+    return doubt_of(run);
+  };
+  EXPECT_EQ(doubt_at(-3.0), "");
+  EXPECT_EQ(doubt_at(3.0), "");
+  EXPECT_NE(doubt_at(-8.0).find("opposite sign"), std::string::npos);
+  EXPECT_NE(doubt_at(1.0).find("power at the secondary shaft"), std::string::npos);
+}
+
 TEST(CheckTorques, ATorqueThatIsNotRecordedSaysNothing) {
   ExperimentData run = run_with(0.0, -60.0);
   run.torque_s.present = false;

@@ -17,9 +17,12 @@ constexpr double kMuMost = 0.4;              // friction of any belt, and more
 constexpr double kMuLeast = 0.03;            // the same, and less
 constexpr double kPeakSlipMost_share = 0.1;  // slip at its peak, and more
 constexpr double kPressureMost_Pa = 200e5;   // three times what variators have
-constexpr double kTorqueTold_Nm = 10.0;      // less may be losses and zero errors alone
-constexpr double kPowerLeast = 0.3;          // out over in: no variator loses or gains as much
-constexpr double kCopyNoise = 0.3;           // rms of the difference over that of the noise
+// Less may be losses and zero errors alone, of one torque as of what is between two. A fifth less
+// or more: the same in 340 campaigns of other make, where they leave 6 and 7 Nm of 31 and 28 in
+// two.
+constexpr double kTorqueTold_Nm = 10.0;
+constexpr double kPowerLeast = 0.3;  // out over in: no variator loses or gains as much
+constexpr double kCopyNoise = 0.3;   // rms of the difference over that of the noise
 // Chosen, times the least change: one that is usually larger comes in many steps.
 constexpr double kFewSteps = 2.5;
 
@@ -67,9 +70,7 @@ struct TorquePair {
   double same = 0.0, opposite = 0.0;  // products of both, by their signs
   double power_in_W = 0.0, power_out_W = 0.0, omega_p_sum_rad_s = 0.0;
   double range_in_Nm = 0.0, range_out_Nm = 0.0;  // out: as it were at the primary shaft
-  bool told() const {
-    return std::max(power_in_W, power_out_W) > kTorqueTold_Nm * omega_p_sum_rad_s;
-  }
+  double lost_W() const { return kTorqueTold_Nm * omega_p_sum_rad_s; }  // at most, by losses
 };
 
 TorquePair torque_pair(const ExperimentData& run) {
@@ -95,13 +96,16 @@ TorquePair torque_pair(const ExperimentData& run) {
 
 // Why these two torques cannot be of one variator; empty: they can.
 std::string contradiction(const TorquePair& pair) {
-  if (!pair.told()) return {};
-  if (pair.opposite > pair.same) {
+  const double less_W = std::min(pair.power_in_W, pair.power_out_W);
+  const double more_W = std::max(pair.power_in_W, pair.power_out_W);
+  if (!(more_W > pair.lost_W())) return {};
+  // What losses leave of a small torque may be of either sign.
+  if (pair.opposite > pair.same && less_W > pair.lost_W()) {
     return "primary and secondary torque are of opposite sign: that of one is wrong";
   }
-  const double share = pair.power_out_W / std::max(pair.power_in_W, 1e-9);
-  if (!(share > kPowerLeast && share < 1.0 / kPowerLeast)) {
-    return "the power at the secondary shaft comes to " + text_of(share) +
+  if (!(less_W + pair.lost_W() > kPowerLeast * more_W)) {
+    return "the power at the secondary shaft comes to " +
+           text_of(pair.power_out_W / std::max(pair.power_in_W, 1e-9)) +
            " of that at the primary one: unit or scale of a torque?";
   }
   // A channel that does not move at all has stopped; with noise on it, it would.
