@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 namespace beltgrip::diagnose {
@@ -49,6 +50,18 @@ TEST(StandsBeside, AsksForTheFitOnlyWhereItDecides) {
   EXPECT_EQ(asked, 0);
   stands_beside({.is_too_small = true}, fit);
   EXPECT_EQ(asked, 1);
+}
+
+// By the noise that the names leave, then by that of the function.
+TEST(AreNoShadows, WhereTheDataAreMoreProbableWithNamesByEitherNoise) {
+  const auto are_none = [](Contest by_names_noise, Contest by_functions_noise) {
+    const std::array both{by_names_noise, by_functions_noise};
+    return are_no_shadows(both);
+  };
+  EXPECT_TRUE(are_none({-90.0, -100.0}, {-95.0, -100.0}));
+  EXPECT_FALSE(are_none({-90.0, -100.0}, {-100.0, -95.0}));
+  EXPECT_FALSE(are_none({-100.0, -95.0}, {-90.0, -100.0}));
+  EXPECT_FALSE(are_none({-100.0, -90.0}, {-100.0, -95.0}));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <span>
 
 namespace beltgrip::diagnose {
 
@@ -25,5 +26,16 @@ struct Beside {
 // ramp, what no machine has may be several constants of the machine at once, and says that nothing
 // holds. beside: a fit, asked for only where it decides.
 bool stands_beside(const Rival& rival, const std::function<Beside()>& beside);
+
+// Log likelihoods by one noise: of names, and of a function of a recorded variable that was learned
+// in their place.
+struct Contest {
+  double by_names = 0.0, by_function = 0.0;
+};
+
+// A function that may take any course explains no less than the cause whose shadows the names are.
+// Where by the noise that either leaves the data are more probable with the names all the same,
+// they are none. No margin: the function's freedom speaks against it as it is.
+bool are_no_shadows(std::span<const Contest> by_either_noise);
 
 }  // namespace beltgrip::diagnose

@@ -1,6 +1,7 @@
 #include "tools/diagnose/run/diagnose.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -12,6 +13,7 @@
 #include "tools/diagnose/decide/learn.h"
 #include "tools/diagnose/decide/namer.h"
 #include "tools/diagnose/decide/plausibility.h"
+#include "tools/diagnose/decide/rivals.h"
 #include "tools/diagnose/decide/thresholds.h"
 #include "tools/diagnose/infer/engine.h"
 #include "tools/diagnose/infer/gain.h"
@@ -190,7 +192,8 @@ class Run {
     alone.left = criticise(bare, steps_);
     const Criticism nothing = alone.left;
     learn_in_turn(bare, forgotten, alone);
-    const bool is_alone = !alone.terms.empty() && alone.left.passed();
+    const bool is_alone =
+        !alone.terms.empty() && alone.left.passed() && !explain_more_than(bare, engine);
     if (!is_alone) learn_in_turn(engine, naming, out);
     const bool are_shadows =
         is_alone || (!out.left.passed() &&
@@ -199,6 +202,16 @@ class Run {
     engine = std::move(bare);
     naming = std::move(forgotten);
     return alone;
+  }
+
+  // By names against a function in their place.
+  static bool explain_more_than(const Engine& function, const Engine& names) {
+    const auto by_noise_of = [&](const Engine& noise) {
+      return Contest{noise.refine_from(names.state(), names.accepted(), 0).log_likelihood,
+                     noise.refine_from(function.state(), function.accepted(), 0).log_likelihood};
+    };
+    const std::array both{by_noise_of(names), by_noise_of(function)};
+    return are_no_shadows(both);
   }
 
   void learn_in_turn(Engine& engine, Naming& naming, Learning& out) {
