@@ -36,8 +36,9 @@ constexpr double kTorqueLeast_Nm = 5.0;
 constexpr double kOddsWorth = 1.1, kWidthWorth = 0.1;
 // Chosen: settings of two experiments that are the same.
 constexpr double kSameLevel = 0.05, kSameOil_C = 3.0;
-constexpr int kPasses = 2;  // over the levels, from each end stop
-// Of the log evidence: what is less probable by more does not count in the choice.
+constexpr int kPasses = 2;  // chosen: over the levels, from each end stop; most end after one
+// Chosen, of the log evidence: what is less probable by more counts as by so much, so that what is
+// nearly excluded is still asked about. No verdict depends on it.
 constexpr double kEvidenceMost = 5.0;
 
 struct Setting {
