@@ -844,6 +844,15 @@ void forget_names(Engine& engine, Naming& naming) {
   naming.last_screen = engine.screen();
 }
 
+void forget_last(Engine& engine, Naming& naming, const std::function<bool()>& stop) {
+  const int last = engine.accepted().back();
+  naming.not_confirmed.push_back(last);
+  drop(engine, naming, last);
+  find_classes(engine, naming, stop);
+  find_intervals(engine, naming);
+  drop_doubtful(engine, naming, stop);
+}
+
 void name_anew(Engine& engine, Naming& naming, const std::function<bool()>& stop) {
   naming.unknown.reset();
   drop_superfluous(engine, naming.threshold);

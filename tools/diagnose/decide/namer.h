@@ -66,6 +66,9 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop);
 // makes superfluous goes, what it hid is found.
 void name_anew(Engine& engine, Naming& naming, const std::function<bool()>& stop);
 
+// Without the name that came last.
+void forget_last(Engine& engine, Naming& naming, const std::function<bool()>& stop);
+
 // The machine alone, as it was before anything was named: the engine's state and the naming.
 void forget_names(Engine& engine, Naming& naming);
 
