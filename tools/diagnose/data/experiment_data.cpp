@@ -529,6 +529,37 @@ void add_roundings(const SignalTable& table, ExperimentData& data) {
   data.rests_torque_s = rests_of(table[Role::kSecondaryTorque], data.torque_s.value);
 }
 
+// As much as follows the acceleration behind the belt is what speeding up the inertia there takes,
+// wherever before the sensor it stands: no swing. A swing of the reading moves no shaft.
+void take_out_inertia(const Channel& speed_s, Channel& unbalanced) {
+  constexpr double kAside_s = 0.05;  // chosen: of the noise of the speed, a hundredth is left
+  const double period_s = median_period_s(speed_s);
+  const auto aside = static_cast<std::size_t>(std::max(1.0, std::round(kAside_s / period_s)));
+  const std::size_t n = unbalanced.value.size();  // its samples are those of the speed but the ends
+  if (!(period_s > 0.0) || speed_s.value.size() != n + 2 || n < 4 * aside) return;
+  std::vector<double> sums{0.0};
+  for (const double each : speed_s.value) sums.push_back(sums.back() + each);
+  const double apart_s = static_cast<double>(aside + 1) * period_s;
+  std::vector<double> acceleration(n, 0.0);
+  double mean_a = 0.0, mean_v = 0.0;
+  for (std::size_t i = aside; i + aside < n; ++i) {
+    const std::size_t k = i + 1;  // in the speed
+    const double after = sums[k + 1 + aside] - sums[k + 1], before = sums[k] - sums[k - aside];
+    acceleration[i] = (after - before) / static_cast<double>(aside) / apart_s;
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    mean_a += acceleration[i] / static_cast<double>(n);
+    mean_v += unbalanced.value[i] / static_cast<double>(n);
+  }
+  double along = 0.0, power = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    along += (acceleration[i] - mean_a) * (unbalanced.value[i] - mean_v);
+    power += (acceleration[i] - mean_a) * (acceleration[i] - mean_a);
+  }
+  if (!(along > 0.0)) return;
+  for (std::size_t i = 0; i < n; ++i) unbalanced.value[i] -= along / power * acceleration[i];
+}
+
 // What moves a machine shows in the torques at both its shafts, and in the acceleration; what
 // swings in one of the readings alone does not. Nothing where they were not read together.
 Channel unbalanced_torque(const SignalTable& table, const estimator::VariatorParameters& variator,
@@ -557,6 +588,7 @@ Channel unbalanced_torque(const SignalTable& table, const estimator::VariatorPar
     out.t_s.push_back(in.t_s[i]);
     out.value.push_back(in.value[i] - inertia_Nm - ratio * behind.value[i]);
   }
+  take_out_inertia(speed_s, out);
   return out;
 }
 
