@@ -1,8 +1,12 @@
 // A channel that comes late: all that follows from it is put back to its time.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <string_view>
 
+#include "tests/tools/diagnose/recorded_runs.h"
+#include "tools/diagnose/decide/namer.h"
 #include "tools/diagnose/model/effects/effect.h"
 #include "tools/diagnose/model/model_file.h"
 #include "tools/diagnose/model/variator_model.h"
@@ -71,6 +75,44 @@ TEST(Timing, TheAccelerationOfALateSpeedIsLateToo) {
   EXPECT_LT(on_time_slip, 5e-4);
   EXPECT_GT(late_Nm, 1.5);
   EXPECT_LT(on_time_Nm, 0.4);  // the slow copies' own rounding of the sweep
+}
+
+bool is_named(const Naming& naming, const Engine& engine, std::string_view effect) {
+  return std::any_of(naming.accepted.begin(), naming.accepted.end(), [&](const Accepted& each) {
+    return engine.campaign().slots[static_cast<std::size_t>(each.slot)].row->id == effect;
+  });
+}
+
+blind::Trial equal_ramps() {
+  blind::Trial out;
+  out.seed = 5006;
+  blind::Random random(out.seed);
+  out.machine = blind::draw_machine(random);
+  out.plan = blind::paper_plan(10);
+  out.planted.push_back({"friction_temperature", {{"per_K", 0.008}}, {}});
+  return out;
+}
+
+// Ten ramps at one torque of a belt whose friction grows with the temperature; a delay of the
+// torque fitted what their forms leave about the peak.
+TEST(TorqueDelay, IsNoNameWhereTheTorqueIsHeld) {
+  Engine engine(campaign_of(equal_ramps()));
+  EXPECT_FALSE(engine.campaign().torque_moves);
+  const Naming naming = name_effects(engine, [] { return false; });
+  EXPECT_TRUE(is_named(naming, engine, "friction_temperature"));
+  EXPECT_FALSE(is_named(naming, engine, "torque_delay"));
+}
+
+TEST(TorqueDelay, IsOneWhereItIsMoved) {
+  blind::Trial trial;
+  trial.seed = 4;
+  blind::Random random(trial.seed);
+  trial.plan = blind::draw_plan(random, trial.machine.setting, 8);
+  trial.planted.push_back({"torque_delay", {{"delay_s", 0.12}}, {}});
+  Engine engine(campaign_of(trial));
+  EXPECT_TRUE(engine.campaign().torque_moves);
+  const Naming naming = name_effects(engine, [] { return false; });
+  EXPECT_TRUE(is_named(naming, engine, "torque_delay"));
 }
 
 }  // namespace

@@ -225,13 +225,14 @@ bool is_worth_a_name(const Engine& engine, int slot, double size, double ln_odds
 }
 
 // A size that no machine has is one where the data do not hold the fit; no tilt shows at one
-// torque.
+// torque, no delay of one that is held.
 bool credible(const Engine& engine, int slot, double size) {
   const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
   const EffectRow& row = *which.row;
   if (!is_beyond_holding(engine, slot, size) || !is_beyond_sensors(engine, slot, size))
     return false;
   if (row.id == "radius_tilt" && !engine.campaign().torque_varies) return false;
+  if (row.id == "torque_delay" && !engine.campaign().torque_moves) return false;
   const double whole = engine.campaign().switched_on[slot] + size;
   return std::abs(size) / row.typical < kBelievable && whole < row.high &&
          (whole > row.low || row.low == 0.0);
