@@ -103,6 +103,28 @@ TEST(TorqueDelay, IsNoNameWhereTheTorqueIsHeld) {
   EXPECT_FALSE(is_named(naming, engine, "torque_delay"));
 }
 
+// Of a pressure that is held there is its noise alone, which a lag takes off.
+TEST(PressureMoves, NotByItsNoise) {
+  const estimator::VariatorParameters variator;
+  const auto moves = [&](double ramp_Pa_s) {
+    SignalTable table;
+    for (int i = 0; i < 4000; ++i) {
+      const double t_s = 0.01 * i;
+      const auto add = [&](Role role, double value) {
+        table[role].t_s.push_back(t_s);
+        table[role].value.push_back(value);
+      };
+      add(Role::kPrimarySpeed, 100.0);
+      add(Role::kSecondarySpeed, 100.0 * variator.ratio_overdrive * 0.995);
+      add(Role::kSecondaryPressure, 6e5 - ramp_Pa_s * t_s + 5e3 * std::sin(17.0 * i));
+      add(Role::kPrimaryTorque, 50.0);
+    }
+    return make_campaign({prepare(table, variator)}, nominal_model(variator)).pressure_moves;
+  };
+  EXPECT_FALSE(moves(0.0));
+  EXPECT_TRUE(moves(4e3));
+}
+
 TEST(TorqueDelay, IsOneWhereItIsMoved) {
   blind::Trial trial;
   trial.seed = 4;

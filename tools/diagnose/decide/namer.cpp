@@ -225,7 +225,7 @@ bool is_worth_a_name(const Engine& engine, int slot, double size, double ln_odds
 }
 
 // A size that no machine has is one where the data do not hold the fit; no tilt shows at one
-// torque, no delay of one that is held.
+// torque, no delay of what is held.
 bool credible(const Engine& engine, int slot, double size) {
   const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
   const EffectRow& row = *which.row;
@@ -233,6 +233,9 @@ bool credible(const Engine& engine, int slot, double size) {
     return false;
   if (row.id == "radius_tilt" && !engine.campaign().torque_varies) return false;
   if (row.id == "torque_delay" && !engine.campaign().torque_moves) return false;
+  const bool follows_pressure = row.id == "hydraulic_lag" || row.id == "clamp_hysteresis" ||
+                                which.role == "secondary_pressure";
+  if (follows_pressure && !engine.campaign().pressure_moves) return false;
   const double whole = engine.campaign().switched_on[slot] + size;
   return std::abs(size) / row.typical < kBelievable && whole < row.high &&
          (whole > row.low || row.low == 0.0);

@@ -289,15 +289,16 @@ void append(const ModelState& state, std::vector<double>& to) {
   }
 }
 
-// Within one experiment, in nine tenths of its samples. A belt that begins to slip moves the torque by
-// less.
-bool torque_moves(const ExperimentData& run) {
-  // Of the middle. Measured, two generators of other make: 0.04 at most in ramps at one torque, 0.13
-  // and more in what moves it; a fifth less or more lies between.
+// Within one experiment, in nine tenths of its samples. A belt that begins to slip moves the torque
+// by less, and the noise of a pressure that is held is less.
+bool is_moved(const ExperimentData& run, const GridSignal& signal) {
+  // Of the middle. Measured, two generators of other make: 0.04 at most in torques of ramps at one
+  // torque and in pressures that are held, 0.13 and more in what is moved; a fifth less or more
+  // lies between.
   constexpr double kMoved = 0.1;
   std::vector<double> all;
   for (int k = 0; k < run.size(); ++k) {
-    if (run.valid[static_cast<std::size_t>(k)]) all.push_back(run.torque.slow[k]);
+    if (run.valid[static_cast<std::size_t>(k)]) all.push_back(signal.slow[k]);
   }
   if (all.empty()) return false;
   std::sort(all.begin(), all.end());
@@ -351,7 +352,10 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model,
   out.learned = daemon::learned_terms(model);
   out.accuracies = accuracies;
   out.torque_varies = torque_varies(out.runs.all());
-  out.torque_moves = std::any_of(out.runs.begin(), out.runs.end(), torque_moves);
+  for (const ExperimentData& run : out.runs) {
+    out.torque_moves |= is_moved(run, run.torque);
+    out.pressure_moves |= is_moved(run, run.pressure);
+  }
   if (const auto ripple = model.effects.find("speed_ripple"); ripple != model.effects.end()) {
     out.known_ripples = ripple->second.parameters;
   }

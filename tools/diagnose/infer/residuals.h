@@ -82,9 +82,9 @@ struct Campaign {
   // By more than a ramp itself moves it as the belt begins to slip. What follows the torque cannot
   // be told where it does not.
   bool torque_varies = false;
-  // Within an experiment, and not as the belt begins to slip: else its delay is the friction curve's
-  // way to its peak by another name.
-  bool torque_moves = false;
+  // Within an experiment, and not as the belt begins to slip or by noise: else a delay of it is the
+  // friction curve's way to its peak by another name, or takes the noise off.
+  bool torque_moves = false, pressure_moves = false;
   // Of the gain of one torque against the other, by the accuracies stated of them.
   double primary_share_of_gain = 0.0;
   bool has_balance = false;
