@@ -13,6 +13,7 @@
 
 #include "daemon/core/config/load/load_config.h"
 #include "daemon/core/config/options/config.h"
+#include "tools/cli/history_file.h"
 #include "tools/cli/log_table.h"
 #include "tools/cli/output_file.h"
 #include "tools/cli/replay_run.h"
@@ -118,14 +119,8 @@ void show_progress(double share, const std::string& what) {
   if (share >= 1.0) std::fprintf(stderr, "\n");
 }
 
-std::string today() {
-  const std::time_t now = std::time(nullptr);
-  std::tm day{};
-  gmtime_r(&now, &day);
-  std::array<char, 16> text{};
-  std::strftime(text.data(), text.size(), "%Y-%m-%d", &day);
-  return text.data();
-}
+// "2026-11-26", UTC.
+std::string today() { return utc(static_cast<double>(std::time(nullptr))).substr(0, 10); }
 
 void run_diagnose(const DiagnoseOptions& options) {
   end_in_good_order();

@@ -6,24 +6,10 @@
 #include <cmath>
 #include <functional>
 
+#include "tests/tools/diagnose/noise.h"
+
 namespace beltgrip::diagnose {
 namespace {
-
-// The same noise every time; one sigma is 1.
-class Noise {
- public:
-  double operator()() {
-    double sum = 0.0;
-    for (int i = 0; i < 12; ++i) {
-      state_ = state_ * 6364136223846793005ULL + 1442695040888963407ULL;
-      sum += static_cast<double>(state_ >> 11U) * 0x1p-53;
-    }
-    return sum - 6.0;
-  }
-
- private:
-  std::uint64_t state_ = 1;
-};
 
 constexpr double kStep = 20.0;
 constexpr double kSample_s = 0.02;
