@@ -98,11 +98,11 @@ constexpr Words kWords[] = {
 };
 
 // What a signal, an error of it or a function on it is told in.
-struct Shown {
+struct ToldUnit {
   std::string_view ends_with;
   Display display;
 };
-constexpr Shown kShown[] = {
+constexpr ToldUnit kToldUnits[] = {
     {"torque_gain", {"%", kPercent}}, {"torque", {"Nm"}},         {"speed", {"rad/s"}},
     {"pressure", {"bar", kBarPerPa}}, {"temperature", {"degC"}},  {"clamp_force", {"N"}},
     {"friction", {"%", kPercent}},    {"ratio", {"%", kPercent}}, {"slip", {"%", kPercent}},
@@ -150,10 +150,10 @@ std::string words_of(std::string_view effect, std::string_view parameter) {
 }
 
 Display display_of(std::string_view what) {
-  const auto found = std::find_if(std::begin(kShown), std::end(kShown), [&](const Shown& each) {
-    return what.ends_with(each.ends_with);
-  });
-  return found == std::end(kShown) ? Display{} : found->display;
+  const auto found =
+      std::find_if(std::begin(kToldUnits), std::end(kToldUnits),
+                   [&](const ToldUnit& each) { return what.ends_with(each.ends_with); });
+  return found == std::end(kToldUnits) ? Display{} : found->display;
 }
 
 std::string told(std::string_view what, double value, int digits) {
