@@ -56,7 +56,8 @@ TEST(PlannedRun, LeavesNothingUnderTheStateThatItWasMadeWith) {
   const Residuals same = residuals_of(planned, run, state);
   const Residuals other = residuals_of(planned, run, engine.state());
   EXPECT_GT(planned.runs[static_cast<std::size_t>(run)].valid_count, 100);
-  for (const ResidualKind kind : {kFrictionResidual, kBalanceResidual}) {
+  for (const auto kind :
+       {static_cast<std::size_t>(kFrictionResidual), static_cast<std::size_t>(kBalanceResidual)}) {
     EXPECT_LT(same.value[kind].abs().maxCoeff(), 0.01) << kind;
     EXPECT_GT(other.value[kind].abs().maxCoeff(), 3.0) << kind;  // sigmas
   }
