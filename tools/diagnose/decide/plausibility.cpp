@@ -122,8 +122,8 @@ std::string contradiction(const TorquePair& pair) {
 }
 
 // Looked at where the belt carries the least of what its clamp force lets it, and drive and overrun
-// each for itself: a belt slips one way or the other by a percent even there, and by ten where a rig
-// holds the slip and not the torque.
+// each for itself: a belt slips one way or the other by a percent even there, and by ten where a
+// rig holds the slip and not the torque.
 void check_same_ratio(const std::vector<ExperimentData>& runs,
                       const estimator::VariatorParameters& variator, int stop, double direction,
                       Implausible& doubts) {

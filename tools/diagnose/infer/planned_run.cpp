@@ -12,8 +12,8 @@ using Eigen::Index;
 
 constexpr double kPeriod_s = 0.1;        // of the grid on which everything is judged
 constexpr double kShallow_share = 0.01;  // chosen: slip to begin with; any will do
-// Chosen: each pass leaves some thousandths of what is off (the oil that turns with the speed); what
-// four leave is no hundredth of the noise, which a test holds.
+// Chosen: each pass leaves some thousandths of what is off (the oil that turns with the speed);
+// what four leave is no hundredth of the noise, which a test holds.
 constexpr int kPasses = 4;
 
 GridSignal held(double value, Index n) {
