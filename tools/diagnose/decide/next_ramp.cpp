@@ -335,6 +335,7 @@ Varied least_varied(const Campaign& campaign) {
   const std::vector<Conditions> made = made_so_far(campaign);
   const auto levels = [&](auto&& value, double apart) {
     std::vector<double> all;
+    all.reserve(made.size());
     for (const Conditions& each : made) all.push_back(value(each));
     std::sort(all.begin(), all.end());
     int count = all.empty() ? 0 : 1;
