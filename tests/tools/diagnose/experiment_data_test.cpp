@@ -1,5 +1,6 @@
 // What is taken from the samples before any model: slow copies and the rounding that stays.
 #include "tools/diagnose/data/experiment_data.h"
+#include "tools/diagnose/model/learned.h"
 
 #include <gtest/gtest.h>
 
@@ -131,6 +132,42 @@ TEST(Rounding, RestsWhereAReadingIsHeldAndNotWhereItPasses) {
   EXPECT_EQ(data.rests_pressure[1].end, data.size());
   EXPECT_NE(data.rests_pressure[0].step, data.rests_pressure[1].step);
   EXPECT_TRUE(prepare(held_pressure(6e5, 3.2e5, 1e3), {}).rests_pressure.empty());
+}
+
+// 50 Nm, but for what a belt that slips takes of it for a second at the end; or from 40 to 60 Nm.
+ExperimentData torque_that(bool is_moved) {
+  SignalTable table;
+  for (int i = 0; i < 4000; ++i) {
+    const double t_s = 0.01 * i;
+    const auto add = [&](Role role, double value) {
+      table[role].t_s.push_back(t_s);
+      table[role].value.push_back(value);
+    };
+    add(Role::kPrimarySpeed, 100.0);
+    add(Role::kSecondarySpeed, 222.0);
+    add(Role::kSecondaryPressure, 3e5);
+    add(Role::kPrimaryTorque, is_moved ? 40.0 + 0.5 * t_s : t_s > 38.0 && t_s < 39.0 ? 40.0 : 50.0);
+  }
+  return prepare(table, estimator::VariatorParameters{});
+}
+
+TEST(Course, OfATorqueThatGivesWayIsHeld) {
+  const ExperimentData held = torque_that(false);
+  EXPECT_FALSE(within(held, held.torque).moves());
+  EXPECT_NEAR(within(held, held.torque).middle, 50.0, 0.1);
+  const ExperimentData moved = torque_that(true);
+  EXPECT_TRUE(within(moved, moved.torque).moves());
+  EXPECT_NEAR(within(moved, moved.torque).low, 41.0, 0.5);
+  EXPECT_NEAR(within(moved, moved.torque).high, 59.0, 0.5);
+}
+
+// What gives way follows the friction, and is nothing that the friction follows.
+TEST(Course, OfAHeldTorqueIsOneValueToAFunction) {
+  const Eigen::ArrayXd held = recorded(torque_that(false), estimator::LearnedVariable::kTorque);
+  EXPECT_NEAR(held.minCoeff(), 50.0, 0.1);
+  EXPECT_EQ(held.minCoeff(), held.maxCoeff());
+  const Eigen::ArrayXd moved = recorded(torque_that(true), estimator::LearnedVariable::kTorque);
+  EXPECT_NEAR(moved.maxCoeff() - moved.minCoeff(), 20.0, 1.0);
 }
 
 // What a sensor says that cannot go beyond.

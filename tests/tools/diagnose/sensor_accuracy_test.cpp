@@ -2,6 +2,8 @@
 // known to. The recordings are the blind generator's.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/tools/diagnose/recorded_runs.h"
 #include "tools/diagnose/decide/namer.h"
 
@@ -53,7 +55,12 @@ TEST(SensorAccuracy, ExcusesNoGainFarBeyondIt) {
   EXPECT_NEAR(d.gain, 0.08, 0.005);
 }
 
-std::vector<std::string> names_of_offset(double offset_Pa, double stated_Pa) {
+struct Offset {
+  std::vector<std::string> names;
+  double as_machine_Pa = 0.0;
+};
+
+Offset offset(double offset_Pa, double stated_Pa) {
   blind::Trial trial;
   trial.seed = 7;
   blind::Random random(trial.seed);
@@ -63,18 +70,46 @@ std::vector<std::string> names_of_offset(double offset_Pa, double stated_Pa) {
   accuracies[static_cast<std::size_t>(Role::kSecondaryPressure)].bias = stated_Pa;
   Engine engine(campaign_of(trial, accuracies));
   const Naming naming = name_effects(engine, [] { return false; });
-  std::vector<std::string> out;
+  Offset out;
+  out.as_machine_Pa = naming.hypothesis.state.nuisance[kPressureBias_Pa];
   for (const Accepted& each : naming.accepted) {
-    out.emplace_back(engine.campaign().slots[static_cast<std::size_t>(each.slot)].row->id);
+    out.names.emplace_back(engine.campaign().slots[static_cast<std::size_t>(each.slot)].row->id);
   }
   return out;
 }
 
 TEST(SensorAccuracy, ThatWasStatedOfThePressureIsNoOffset) {
   constexpr double kOffset_Pa = 40e3;
-  EXPECT_EQ(names_of_offset(kOffset_Pa, 0.0).size(), 1U);
-  EXPECT_EQ(names_of_offset(kOffset_Pa, 0.1 * kOffset_Pa).size(), 1U);
-  EXPECT_TRUE(names_of_offset(kOffset_Pa, kOffset_Pa).empty());
+  EXPECT_EQ(offset(kOffset_Pa, 0.0).names.size(), 1U);
+  EXPECT_EQ(offset(kOffset_Pa, 0.1 * kOffset_Pa).names.size(), 1U);
+  EXPECT_TRUE(offset(kOffset_Pa, kOffset_Pa).names.empty());
+}
+
+TEST(SensorAccuracy, OfThePressureIsAConstantOfTheMachine) {
+  constexpr double kOffset_Pa = 40e3;
+  EXPECT_NEAR(offset(kOffset_Pa, kOffset_Pa).as_machine_Pa, kOffset_Pa, 0.3 * kOffset_Pa);
+  EXPECT_EQ(offset(kOffset_Pa, 0.0).as_machine_Pa, 0.0);
+}
+
+// What one usual scatter of the torque's zero comes to in the first experiment, in sigmas.
+double usual_zero(double stated_bias_Nm) {
+  blind::Trial trial;
+  trial.seed = 7;
+  blind::Random random(trial.seed);
+  trial.plan = blind::draw_plan(random, trial.machine.setting, 10);
+  Accuracies accuracies{};
+  accuracies[static_cast<std::size_t>(Role::kPrimaryTorque)].bias = stated_bias_Nm;
+  Engine engine(campaign_of(trial, accuracies));
+  engine.fit_machine();
+  engine.update_noise();
+  constexpr int kZero = 2;
+  return std::sqrt(engine.summaries().front().uu(kZero, kZero));
+}
+
+// A fifth of what was stated: hypot(0.1 Nm, 0.2 x 1 Nm) over 0.1 Nm.
+TEST(SensorAccuracy, OfATorqueLetsItsZeroScatter) {
+  const double usual = usual_zero(0.0);
+  EXPECT_NEAR(usual_zero(1.0), std::sqrt(5.0) * usual, 0.1 * usual);
 }
 
 }  // namespace

@@ -87,6 +87,15 @@ struct ExperimentData {
 ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator,
                        Reaches reached = {});
 
+// What a channel reads within an experiment, over its valid samples.
+struct Course {
+  double low = 0.0, middle = 0.0, high = 0.0;  // 5 %, 50 % and 95 %
+  // A belt that begins to slip moves a torque that is held by less, and so does the noise of a
+  // pressure.
+  bool moves() const;
+};
+Course within(const ExperimentData& run, const GridSignal& signal);
+
 // Both slow copies, from value.
 void add_slow(GridSignal& signal, double dt_s);
 

@@ -24,7 +24,6 @@ constexpr std::size_t kPerVariable = 3 * kActsOn.size();
 // one friction law and another.
 constexpr std::array<double, 5> kUnit{0.05, 2e-3, 2.0, 0.05, 200.0};  // share, share, Nm, share, N
 constexpr double kAnyConstant = 1e-3;  // precision: of a constant that is not known at all
-constexpr double kVaried = 0.05;       // of its middle; less may be the channel's own noise
 constexpr double kOwnShareMin = 0.01;
 constexpr double kLooked = 8.0;  // below this a group is no candidate
 constexpr std::array<double, 5> kMatters{5e-3, 2e-4, 0.2, 5e-3, 20.0};
@@ -38,30 +37,7 @@ bool sensible(const Campaign& campaign, const std::string& variable, std::size_t
          (variable == "oil_temperature" || variable == "primary_speed" || variable == "time");
 }
 
-// The variable scaled to [-1, 1] between its 1 % and 99 % points over all valid samples; false if
-// it does not vary.
-bool scaled_variable(const Campaign& campaign, const IndexVariable& variable,
-                     std::vector<ArrayXd>& out) {
-  std::vector<double> all;
-  out.clear();
-  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
-    const ExperimentData& run = campaign.runs[e];
-    out.push_back(run.valid_count > 0 ? variable.value(run, static_cast<int>(e)) : ArrayXd());
-    if (run.valid_count > 0 && out.back().size() == 0) return false;
-    for (int k = 0; k < run.size(); ++k) {
-      if (run.valid[static_cast<std::size_t>(k)]) all.push_back(out.back()[k]);
-    }
-  }
-  if (all.size() < 50) return false;
-  std::sort(all.begin(), all.end());
-  const double low = all[all.size() / 100], high = all[all.size() - 1 - all.size() / 100];
-  const double middle = all[all.size() / 2];
-  if (!(high - low > kVaried * std::abs(middle) + 1e-12)) return false;
-  for (ArrayXd& x : out) x = (2.0 * (x - low) / (high - low) - 1.0).max(-1.1).min(1.1);
-  return true;
-}
-
-// The index variables that vary, scaled: of each its values, run by run.
+// The index variables that vary, from -1 to 1: of each its values, run by run.
 struct VariedIndex {
   std::vector<const IndexVariable*> variables;
   std::vector<std::vector<ArrayXd>> values;
@@ -71,8 +47,10 @@ VariedIndex varied_index(const Campaign& campaign) {
   VariedIndex out;
   for (const IndexVariable& variable : index_variables()) {
     if (variable.name == std::string_view("torque") && !campaign.torque_varies) continue;
-    std::vector<ArrayXd> values;
-    if (!scaled_variable(campaign, variable, values)) continue;
+    std::optional<Abscissa> abscissa = abscissa_of(campaign, variable);
+    if (!abscissa) continue;
+    std::vector<ArrayXd> values = std::move(abscissa->x);
+    for (ArrayXd& x : values) x = 2.0 * x - 1.0;
     out.values.push_back(std::move(values));
     out.variables.push_back(&variable);
   }

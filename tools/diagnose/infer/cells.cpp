@@ -1,44 +1,12 @@
 #include "tools/diagnose/infer/cells.h"
 
 #include <algorithm>
-#include <map>
-#include <utility>
 
 #include "tools/diagnose/infer/cell_columns.h"
+#include "tools/diagnose/infer/conditions.h"
 
 namespace beltgrip::diagnose {
 namespace {
-
-// Where all experiments are the same ramp, time is the clamp force by another name: of the spread
-// of the pressure nothing is left between samples of one time.
-bool is_time_a_ramp(const Campaign& campaign) {
-  constexpr double kLeft = 0.05;  // chosen, of the variance
-  constexpr double kBin_s = 1.0;
-  struct Bin {
-    double count = 0.0, sum = 0.0, squares = 0.0;
-    void add(double value) {
-      count += 1.0;
-      sum += value;
-      squares += value * value;
-    }
-    double variation() const { return squares - sum * sum / std::max(count, 1.0); }
-  };
-  std::map<std::pair<int, int>, Bin> by_time;  // end stop, time
-  std::map<int, Bin> all;
-  for (const ExperimentData& run : campaign.runs) {
-    for (int k = 0; k < run.size(); ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      if (!run.valid[i]) continue;
-      const double bar = 1e-5 * run.pressure.value[k];
-      by_time[{run.stop[i], static_cast<int>(run.t_s[k] / kBin_s)}].add(bar);
-      all[run.stop[i]].add(bar);
-    }
-  }
-  double left = 0.0, whole = 0.0;
-  for (const auto& [key, bin] : by_time) left += bin.variation();
-  for (const auto& [key, bin] : all) whole += bin.variation();
-  return left < kLeft * whole;
-}
 
 // The curve's own abscissa is torque over capacity: in a ramp the clamp force is it by another
 // name.

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "tools/diagnose/data/experiment_data.h"
+#include "tools/diagnose/infer/residuals.h"
 
 namespace beltgrip::diagnose {
 
@@ -15,5 +15,9 @@ struct Conditions {
   std::optional<double> oil_C;
 };
 Conditions conditions_of(const ExperimentData& run);
+
+// Where all experiments are the same ramp, time is the clamp force by another name: of the spread
+// of the pressure nothing is left between samples of one time.
+bool is_time_a_ramp(const Campaign& campaign);
 
 }  // namespace beltgrip::diagnose

@@ -289,23 +289,6 @@ void append(const ModelState& state, std::vector<double>& to) {
   }
 }
 
-// Within one experiment, in nine tenths of its samples. A belt that begins to slip moves the torque
-// by less, and the noise of a pressure that is held is less.
-bool is_moved(const ExperimentData& run, const GridSignal& signal) {
-  // Of the middle. Measured, two generators of other make: 0.04 at most in torques of ramps at one
-  // torque and in pressures that are held, 0.13 and more in what is moved; a fifth less or more
-  // lies between.
-  constexpr double kMoved = 0.1;
-  std::vector<double> all;
-  for (int k = 0; k < run.size(); ++k) {
-    if (run.valid[static_cast<std::size_t>(k)]) all.push_back(signal.slow[k]);
-  }
-  if (all.empty()) return false;
-  std::sort(all.begin(), all.end());
-  const auto at = [&](std::size_t twentieths) { return all[(all.size() - 1) * twentieths / 20]; };
-  return at(19) - at(1) > kMoved * std::abs(at(10));
-}
-
 bool torque_varies(const std::vector<ExperimentData>& runs) {
   constexpr double kVaried = 0.25;  // of its middle
   std::vector<double> all;
@@ -339,6 +322,31 @@ double leaves(const Campaign& campaign, const ModelState& state) {
   return std::sqrt(most);
 }
 
+// What sensors may be off by, as stated, belongs to the machine as it is measured. Its share of the
+// gain of one torque against the other is the primary torque's.
+double allow_for_sensors(const Campaign& campaign, NuisanceTable& rows) {
+  const auto of = [&](Role role) { return campaign.accuracies[static_cast<std::size_t>(role)]; };
+  const bool is_engine = campaign.runs.size() > 0 && campaign.runs[0].torque_is_engine;
+  const auto primary = of(is_engine ? Role::kEngineTorque : Role::kPrimaryTorque);
+  const auto secondary = of(Role::kSecondaryTorque), pressure = of(Role::kSecondaryPressure);
+  const auto widen = [&](Nuisance row, double sigma) {
+    rows[row].tolerance = std::hypot(rows[row].tolerance, sigma);
+  };
+  // A constant error of a torque is a constant loss at its shaft by another name, one of a speed
+  // another ratio.
+  widen(kLossConstant_Nm, primary.bias);
+  widen(kSecondaryLoss_Nm, secondary.bias);
+  for (const Nuisance ratio : {kLnRatioOverdrive, kLnRatioLow}) {
+    widen(ratio, std::hypot(of(Role::kPrimarySpeed).gain, of(Role::kSecondarySpeed).gain));
+  }
+  widen(kPressureBias_Pa, pressure.bias);
+  widen(kSecondaryTorqueGain, primary.gain);
+  widen(kSecondaryTorqueGain, secondary.gain);
+  // Derived: of a sum of two independent errors each is expected to have its share of the variance.
+  const double both = rows[kSecondaryTorqueGain].tolerance;
+  return both > 0.0 ? primary.gain * primary.gain / (both * both) : 0.0;
+}
+
 }  // namespace
 
 Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model,
@@ -353,20 +361,13 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model,
   out.accuracies = accuracies;
   out.torque_varies = torque_varies(out.runs.all());
   for (const ExperimentData& run : out.runs) {
-    out.torque_moves |= is_moved(run, run.torque);
-    out.pressure_moves |= is_moved(run, run.pressure);
+    out.torque_moves |= within(run, run.torque).moves();
+    out.pressure_moves |= within(run, run.pressure).moves();
   }
   if (const auto ripple = model.effects.find("speed_ripple"); ripple != model.effects.end()) {
     out.known_ripples = ripple->second.parameters;
   }
-  const auto gain_of = [&](Role role) { return accuracies[static_cast<std::size_t>(role)].gain; };
-  const double primary =
-      gain_of(out.runs.size() > 0 && out.runs[0].torque_is_engine ? Role::kEngineTorque
-                                                                  : Role::kPrimaryTorque);
-  const double both = std::hypot(gain_of(Role::kSecondaryTorque), primary);
-  out.nuisances[kSecondaryTorqueGain].tolerance = both;
-  // Derived: of a sum of two independent errors each is expected to have its share of the variance.
-  if (both > 0.0) out.primary_share_of_gain = primary * primary / (both * both);
+  out.primary_share_of_gain = allow_for_sensors(out, out.nuisances);
   for (const ExperimentData& run : out.runs) {
     out.has_balance |= run.valid_count > 0 && run.torque_s.present;
     out.has_tracking |= run.valid_count > 0 && run.command.present;
@@ -394,8 +395,8 @@ Engine::Engine(Campaign campaign, int jobs) : jobs_(jobs), campaign_(std::move(c
     const bool is_secondary =
         i == kSecondaryInertia_kgm2 || i == kSecondaryLoss_Nm || i == kSecondaryLossPerSpeed_Nms;
     if (is_secondary && !campaign_.has_balance) continue;
-    const bool is_known = campaign_.nuisances[kSecondaryTorqueGain].tolerance == 0.0;
-    if (i == kSecondaryTorqueGain && (is_known || !campaign_.has_balance)) continue;
+    if (i == kSecondaryTorqueGain && !campaign_.has_balance) continue;
+    if (campaign_.nuisances[static_cast<std::size_t>(i)].tolerance == 0.0) continue;  // is known
     if ((i == kCommandGain || i == kCommandOffset_Pa) && !campaign_.has_tracking) continue;
     nuisances_.push_back(i);
   }
@@ -485,22 +486,25 @@ void Engine::fit_machine() {
   };
   // The same measure for every start: no weights, scatter between experiments counted.
   const Whitening plain = identity_whitening(campaign_);
+  // What the pressure is off by is asked once the machine is near: from afar it takes up what the
+  // constants have not found yet, and does not give it back.
+  std::vector<int> constants = nuisances_;
+  std::erase(constants, kPressureBias_Pa);
   const auto information_of = [&](const Optimum& at) {
-    const auto n = static_cast<Index>(nuisances_.size());
+    const auto n = static_cast<Index>(constants.size());
     MatrixXd out = MatrixXd::Identity(n, n);
     for (const Summary& each : at.summaries) out += each.aa.topLeftCorner(n, n);
     return out;
   };
-  const auto measure = [&](Attempt& attempt) {
-    const Optimum at =
-        minimise(coarse_.back(), nuisances_, attempt.last, plain, default_scatter(), 0, 0);
+  const auto measure = [&](Attempt& attempt, const std::vector<int>& parameters) {
+    Optimum at = minimise(coarse_.back(), parameters, attempt.last, plain, default_scatter(), 0, 0);
     attempt.objective = at.objective;
-    attempt.information = information_of(at);
+    return at;
   };
   const auto is_again = [&](const std::vector<Attempt*>& among, const Attempt& attempt) {
     return std::any_of(among.begin(), among.end(), [&](const Attempt* other) {
       const VectorXd apart =
-          prior(nuisances_, other->last).pull - prior(nuisances_, attempt.last).pull;
+          prior(constants, other->last).pull - prior(constants, attempt.last).pull;
       return apart.dot(other->information * apart) < kSamePlace * kSamePlace;
     });
   };
@@ -530,7 +534,7 @@ void Engine::fit_machine() {
     }
     std::vector<Attempt*> apart;
     for (Attempt* const attempt : going) {
-      const Optimum at = minimise(coarse_[look], nuisances_, attempt->last, attempt->whitening,
+      const Optimum at = minimise(coarse_[look], constants, attempt->last, attempt->whitening,
                                   default_scatter(), 8, 0);
       attempt->last = at.state;
       attempt->information = information_of(at);
@@ -541,7 +545,9 @@ void Engine::fit_machine() {
     }
     going = std::move(apart);
   }
-  for (Attempt* const attempt : going) measure(*attempt);
+  for (Attempt* const attempt : going) {
+    attempt->information = information_of(measure(*attempt, constants));
+  }
   // What lies behind here does not come first there.
   const double most =
       (*std::max_element(going.begin(), going.end(), [](const Attempt* a, const Attempt* b) {
@@ -559,7 +565,7 @@ void Engine::fit_machine() {
                           .state;
       reweigh(campaign_, attempt->last, attempt->whitening);
     }
-    measure(*attempt);
+    measure(*attempt, nuisances_);
   }
   const Attempt& best = **std::max_element(
       finalists.begin(), finalists.end(),
@@ -886,7 +892,8 @@ void Engine::move(const std::vector<int>& parameters, const VectorXd& step, doub
       value += by;
       // The data hold it far better than the usual values do: without a bound any drag would be the
       // machine's own, and what it explains would be no gain.
-      if (parameters[j] == kLossPerkN_Nm || parameters[j] == kSecondaryTorqueGain) {
+      constexpr std::array kBounded{kLossPerkN_Nm, kSecondaryTorqueGain, kPressureBias_Pa};
+      if (std::find(kBounded.begin(), kBounded.end(), parameters[j]) != kBounded.end()) {
         const NuisanceRow& row = campaign_.nuisances[static_cast<std::size_t>(parameters[j])];
         value = std::clamp(value, row.nominal - kReach * row.tolerance,
                            row.nominal + kReach * row.tolerance);

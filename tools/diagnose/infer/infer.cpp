@@ -28,6 +28,22 @@ constexpr double kScatterCap = 8.0;  // in usual scatters: beyond, it is an effe
 
 // One sigma between healthy experiments: what replicates on rigs scatter by.
 constexpr std::array<double, kRandomEffects> kDefaultScatter{4e-3, 1.5e-4, 0.1, 0.02, 0.1, 500.0};
+// Of the constant error that was stated of a torque: what is another from one experiment to the
+// next. Chosen: a torque that is known to a few Nm only is not the same to a tenth of one.
+constexpr double kMovesShare = 0.2;
+
+// What the zero of a torque scatters by, in usual scatters.
+double zero_scatter(const Campaign& campaign, Role role, int random) {
+  const double bias_Nm = campaign.accuracies[static_cast<std::size_t>(role)].bias;
+  return std::hypot(1.0, kMovesShare * bias_Nm / kDefaultScatter[static_cast<std::size_t>(random)]);
+}
+double torque_zero_scatter(const Campaign& campaign, const ExperimentData& data) {
+  return zero_scatter(campaign, data.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque,
+                      kTorqueZero);
+}
+double torque_out_zero_scatter(const Campaign& campaign) {
+  return zero_scatter(campaign, Role::kSecondaryTorque, kTorqueOutZero);
+}
 
 std::array<ResidualColumns, kRandomEffects> random_columns(const Campaign& campaign, int run,
                                                            const ModelState& state,
@@ -42,8 +58,8 @@ std::array<ResidualColumns, kRandomEffects> random_columns(const Campaign& campa
   slip_offset.slip_share =
       ArrayXd::Constant(n, std::hypot(1.0, data.rounding_slip_share / kDefaultScatter[1]));
   out[1] = propagate(campaign, at, slip_offset);
-  zero.torque = ArrayXd::Ones(n);
-  zero.balance = ArrayXd::Ones(n);
+  zero.torque = ArrayXd::Constant(n, torque_zero_scatter(campaign, data));
+  zero.balance = zero.torque;
   out[2] = propagate(campaign, at, zero);
   QuantityChange peak;
   peak.torque = ArrayXd::Zero(n);
@@ -55,7 +71,7 @@ std::array<ResidualColumns, kRandomEffects> random_columns(const Campaign& campa
     peak.torque[k] = at.slope[k] * at.foot[k] * (stop == kLowStop ? peak_low : peak_overdrive);
   }
   out[3] = propagate(campaign, at, peak);
-  zero_out.balance = ArrayXd::Ones(n);
+  zero_out.balance = ArrayXd::Constant(n, torque_out_zero_scatter(campaign));
   out[4] = propagate(campaign, at, zero_out);
   zero_track.tracking = ArrayXd::Ones(n);
   out[5] = propagate(campaign, at, zero_track);
@@ -116,11 +132,14 @@ std::array<std::vector<Whitening::Rest>, kResidualKinds> rests_of(const Campaign
       column(kLevel, kFrictionResidual) * per_force *
           (variator.secondary_piston_area_m2 * data.rounding_pressure_Pa));
   for (const ResidualKind kind : {kFrictionResidual, kBalanceResidual}) {
-    add(data.rests_torque, kind, column(kTorqueZero, kind) * data.rounding_torque_Nm);
+    add(data.rests_torque, kind,
+        column(kTorqueZero, kind) *
+            (data.rounding_torque_Nm / torque_zero_scatter(campaign, data)));
   }
   if (campaign.has_balance) {
     add(data.rests_torque_s, kBalanceResidual,
-        column(kTorqueOutZero, kBalanceResidual) * ratio * data.rounding_torque_s_Nm);
+        column(kTorqueOutZero, kBalanceResidual) * ratio *
+            (data.rounding_torque_s_Nm / torque_out_zero_scatter(campaign)));
   }
   return out;
 }

@@ -61,7 +61,9 @@ ArrayXd recorded(const ExperimentData& run, LearnedVariable variable) {
     case LearnedVariable::kTorque:
       break;
   }
-  return run.torque.slow;
+  // One that is held gives way where the belt slips, and follows the friction then.
+  const Course torque_Nm = within(run, run.torque);
+  return torque_Nm.moves() ? run.torque.slow : ArrayXd::Constant(run.size(), torque_Nm.middle);
 }
 
 ArrayXd regressor(const ExperimentData& run, LearnedVariable variable) {

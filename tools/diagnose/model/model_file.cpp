@@ -33,7 +33,7 @@ Named to_file(int index, double value) {
 }
 
 // No part of the machine that a model file describes.
-bool is_of_sensor(int index) { return index == kSecondaryTorqueGain; }
+bool is_of_sensor(int index) { return index == kSecondaryTorqueGain || index == kPressureBias_Pa; }
 
 }  // namespace
 

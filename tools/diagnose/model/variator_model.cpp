@@ -58,6 +58,7 @@ NuisanceTable default_nuisances() {
       {"secondary_loss_constant_Nm", 0.5, 0.6, 1e-2},
       {"secondary_loss_per_rad_s_Nm", 2e-3, 4e-3, 1e-4},
       {"secondary_torque_gain", 0.0, 0.0, 1e-4},
+      {"secondary_pressure_bias_Pa", 0.0, 0.0, 10.0},
       {"command_offset_Pa", 0.0, 1e5, 10.0},
       {"command_gain", 0.0, 0.1, 1e-4},
   }};
@@ -390,6 +391,7 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
     for (const estimator::LearnedTerm& each : effects.learned_too) apply_learned(c, each, stage);
   };
   const Passes pass(run, read, variator, nuisance);
+  c.pressure -= nuisance[kPressureBias_Pa];
   apply(Stage::kMeasurement);
   pass.force(c);
   apply(Stage::kForce);

@@ -49,6 +49,7 @@ enum Nuisance : int {
   kSecondaryLoss_Nm,
   kSecondaryLossPerSpeed_Nms,
   kSecondaryTorqueGain,  // T_measured = (1 + gain) T_true, as far as the sensors' accuracies go
+  kPressureBias_Pa,      // p_measured = p_true + bias, the same
   kCommandOffset_Pa,     // tracking residual only
   kCommandGain,
   kNuisanceCount

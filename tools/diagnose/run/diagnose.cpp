@@ -654,8 +654,8 @@ class Run {
     return std::sqrt(squares / weights);
   }
 
-  // What torque and pressure may have it off by, as far as somebody stated their accuracies, one
-  // sigma: nothing in these data says more of them.
+  // What the gains of torque and pressure may have it off by, as far as somebody stated them, one
+  // sigma: nothing in these data says more of them. Constant errors are constants of the fit.
   double mu_of_sensors(const Engine& engine) const {
     const Campaign& campaign = engine.campaign();
     const auto accuracy = [&](Role role) {
@@ -664,12 +664,11 @@ class Run {
     const bool is_engine = campaign.runs[0].torque_is_engine;
     const auto torque = accuracy(is_engine ? Role::kEngineTorque : Role::kPrimaryTorque);
     const auto pressure = accuracy(Role::kSecondaryPressure);
-    const double torque_Nm = typical(engine, &ExperimentData::torque);
-    const double pressure_Pa = typical(engine, &ExperimentData::pressure);
-    const double area_m2 = campaign.variator.secondary_piston_area_m2;
-    const double by_pressure = area_m2 * std::hypot(pressure.bias, pressure.gain * pressure_Pa) /
-                               (area_m2 * pressure_Pa + campaign.variator.secondary_spring_force_N);
-    return std::hypot(torque.bias / torque_Nm, torque.gain, by_pressure);
+    const double by_pressure_N =
+        campaign.variator.secondary_piston_area_m2 * typical(engine, &ExperimentData::pressure);
+    const double by_pressure =
+        by_pressure_N / (by_pressure_N + campaign.variator.secondary_spring_force_N);
+    return std::hypot(torque.gain, pressure.gain * by_pressure);
   }
 
   void tell_machine(const std::string& name, const Interval& fitted, double of_model,
