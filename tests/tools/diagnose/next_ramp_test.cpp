@@ -45,6 +45,18 @@ Ramp some_ramp() {
   return out;
 }
 
+// A torque that no clamp force of the menu carries.
+TEST(PlannedRun, SaysNothingWhereTheBeltDoesNotGrip) {
+  const Engine engine = fitted(equal_ramps());
+  ModelState state = engine.state();
+  state.effects[slot_of(engine, "torque_delay", "delay_s")] = 0.05;
+  Ramp ramp = some_ramp();
+  ramp.start_force_N = 1500.0;
+  ramp.torque_Nm = 400.0;
+  const Campaign planned = planned_next(engine.campaign(), ramp, state);
+  EXPECT_EQ(planned.runs[engine.campaign().runs.size()].valid_count, 0);
+}
+
 TEST(PlannedRun, LeavesNothingUnderTheStateThatItWasMadeWith) {
   const Engine engine = fitted(equal_ramps());
   ModelState state = engine.state();

@@ -156,6 +156,7 @@ Summary summary_of_planned(const Engine& engine, const Campaign& planned, const 
 // What the data of a ramp that one explanation predicts would leave with another, whose constants
 // and sizes are fitted anew to all.
 double misfit(const Engine& engine, const Campaign& planned, const Hypothesis& under) {
+  if (planned.runs[planned.runs.size() - 1].valid_count == 0) return 0.0;
   const std::vector<int> parameters = engine.with_nuisances(under.slots);
   const auto n = static_cast<Index>(parameters.size());
   const Summary summary = summary_of_planned(engine, planned, under.state, parameters);
@@ -237,7 +238,9 @@ std::optional<NextRamp> look_for(const Engine& engine, const std::vector<WantedS
     const Ramp ramp = ramp_of(engine.campaign(), engine.state(), setting);
     const Campaign planned = planned_next(engine.campaign(), ramp, engine.state());
     std::vector<Summary> all = summaries;
-    all.push_back(summary_of_planned(engine, planned, engine.state(), parameters));
+    if (planned.runs[planned.runs.size() - 1].valid_count > 0) {
+      all.push_back(summary_of_planned(engine, planned, engine.state(), parameters));
+    }
     std::vector<double> out = known(all);
     for (std::size_t i = 0; i < out.size(); ++i) out[i] = wanted[i].weight * (out[i] - before[i]);
     return out;

@@ -92,7 +92,8 @@ class Planner {
     // Where the belt would run away: there it turns.
     const auto count =
         static_cast<std::size_t>(std::find(grips_.begin(), grips_.end(), false) - grips_.begin());
-    force_N.resize(std::max<std::size_t>(count, 1));
+    if (count < force_N.size() && count < static_cast<std::size_t>(hold)) return nothing_of();
+    force_N.resize(count);
     const auto most = static_cast<std::size_t>(kRecipeLength_s / kPeriod_s);
     for (double at_N = force_N.back(); at_N < ramp_.start_force_N && force_N.size() < most;
          at_N += kRecipeRestore_N_s * kPeriod_s) {
@@ -105,6 +106,12 @@ class Planner {
   }
 
  private:
+  // A belt that does not grip at the start: no sample says anything.
+  ExperimentData nothing_of() {
+    grips_.assign(grips_.size(), false);
+    mark();
+    return std::move(run_);
+  }
   void prepare(const Campaign& made, const std::vector<double>& force_N) {
     const auto n = static_cast<Index>(force_N.size());
     const estimator::VariatorParameters& v = like_.variator;
