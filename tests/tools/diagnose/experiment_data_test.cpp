@@ -151,18 +151,18 @@ ExperimentData torque_that(bool is_moved) {
   return prepare(table, estimator::VariatorParameters{});
 }
 
-TEST(Course, OfATorqueThatGivesWayIsHeld) {
+TEST(Spread, OfATorqueThatGivesWayIsHeld) {
   const ExperimentData held = torque_that(false);
-  EXPECT_FALSE(within(held, held.torque).moves());
-  EXPECT_NEAR(within(held, held.torque).middle, 50.0, 0.1);
+  EXPECT_FALSE(spread_of(held, held.torque).moves());
+  EXPECT_NEAR(spread_of(held, held.torque).middle, 50.0, 0.1);
   const ExperimentData moved = torque_that(true);
-  EXPECT_TRUE(within(moved, moved.torque).moves());
-  EXPECT_NEAR(within(moved, moved.torque).low, 41.0, 0.5);
-  EXPECT_NEAR(within(moved, moved.torque).high, 59.0, 0.5);
+  EXPECT_TRUE(spread_of(moved, moved.torque).moves());
+  EXPECT_NEAR(spread_of(moved, moved.torque).low, 41.0, 0.5);
+  EXPECT_NEAR(spread_of(moved, moved.torque).high, 59.0, 0.5);
 }
 
 // What gives way follows the friction, and is nothing that the friction follows.
-TEST(Course, OfAHeldTorqueIsOneValueToAFunction) {
+TEST(Spread, OfAHeldTorqueIsOneValueToAFunction) {
   const Eigen::ArrayXd held = recorded(torque_that(false), estimator::LearnedVariable::kTorque);
   EXPECT_NEAR(held.minCoeff(), 50.0, 0.1);
   EXPECT_EQ(held.minCoeff(), held.maxCoeff());

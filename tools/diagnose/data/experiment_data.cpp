@@ -360,7 +360,7 @@ void mask_and_segment(const std::vector<bool>& masked, ExperimentData& data) {
 
 }  // namespace
 
-Course within(const ExperimentData& run, const GridSignal& signal) {
+Spread spread_of(const ExperimentData& run, const GridSignal& signal) {
   std::vector<double> all;
   for (int k = 0; k < run.size(); ++k) {
     if (run.valid[static_cast<std::size_t>(k)]) all.push_back(signal.slow[k]);
@@ -371,7 +371,7 @@ Course within(const ExperimentData& run, const GridSignal& signal) {
   return {at(1), at(10), at(19)};
 }
 
-bool Course::moves() const {
+bool Spread::moves() const {
   // Of the middle. Measured, two generators of other make: 0.04 at most in torques of ramps at one
   // torque and in pressures that are held, 0.13 and more in what is moved; a fifth less or more
   // lies between.

@@ -88,13 +88,13 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
                        Reaches reached = {});
 
 // What a channel reads within an experiment, over its valid samples.
-struct Course {
+struct Spread {
   double low = 0.0, middle = 0.0, high = 0.0;  // 5 %, 50 % and 95 %
   // A belt that begins to slip moves a torque that is held by less, and so does the noise of a
   // pressure.
   bool moves() const;
 };
-Course within(const ExperimentData& run, const GridSignal& signal);
+Spread spread_of(const ExperimentData& run, const GridSignal& signal);
 
 // Both slow copies, from value.
 void add_slow(GridSignal& signal, double dt_s);

@@ -361,8 +361,8 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model,
   out.accuracies = accuracies;
   out.torque_varies = torque_varies(out.runs.all());
   for (const ExperimentData& run : out.runs) {
-    out.torque_moves |= within(run, run.torque).moves();
-    out.pressure_moves |= within(run, run.pressure).moves();
+    out.torque_moves |= spread_of(run, run.torque).moves();
+    out.pressure_moves |= spread_of(run, run.pressure).moves();
   }
   if (const auto ripple = model.effects.find("speed_ripple"); ripple != model.effects.end()) {
     out.known_ripples = ripple->second.parameters;

@@ -30,12 +30,13 @@ constexpr double kScatterCap = 8.0;  // in usual scatters: beyond, it is an effe
 constexpr std::array<double, kRandomEffects> kDefaultScatter{4e-3, 1.5e-4, 0.1, 0.02, 0.1, 500.0};
 // Of the constant error that was stated of a torque: what is another from one experiment to the
 // next. Chosen: a torque that is known to a few Nm only is not the same to a tenth of one.
-constexpr double kMovesShare = 0.2;
+constexpr double kBiasMovesShare = 0.2;
 
 // What the zero of a torque scatters by, in usual scatters.
 double zero_scatter(const Campaign& campaign, Role role, int random) {
   const double bias_Nm = campaign.accuracies[static_cast<std::size_t>(role)].bias;
-  return std::hypot(1.0, kMovesShare * bias_Nm / kDefaultScatter[static_cast<std::size_t>(random)]);
+  return std::hypot(1.0,
+                    kBiasMovesShare * bias_Nm / kDefaultScatter[static_cast<std::size_t>(random)]);
 }
 double torque_zero_scatter(const Campaign& campaign, const ExperimentData& data) {
   return zero_scatter(campaign, data.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque,

@@ -62,7 +62,7 @@ ArrayXd recorded(const ExperimentData& run, LearnedVariable variable) {
       break;
   }
   // One that is held gives way where the belt slips, and follows the friction then.
-  const Course torque_Nm = within(run, run.torque);
+  const Spread torque_Nm = spread_of(run, run.torque);
   return torque_Nm.moves() ? run.torque.slow : ArrayXd::Constant(run.size(), torque_Nm.middle);
 }
 
