@@ -171,7 +171,8 @@ double half_step(const Campaign& campaign, const Slot& slot) {
 double late_of_passed_s(const Campaign& campaign) {
   // Of the rounding's sigma, in the course that was found from the samples. Measured, four
   // campaigns of other make with steps of 40 kPa: 3 to 10 % of the step over half a second, of 29 %
-  // before.
+  // before. A fifth less: one of the two healthy ones that it is for has its lag again; more: the
+  // same.
   constexpr double kLeft = 0.2;
   double left_Pa = 0.0, fastest_Pa_s = 0.0;
   for (const ExperimentData& run : campaign.runs) {
