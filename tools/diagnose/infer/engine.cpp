@@ -329,8 +329,9 @@ double allow_for_sensors(const Campaign& campaign, NuisanceTable& rows) {
   const bool is_engine = campaign.runs.size() > 0 && campaign.runs[0].torque_is_engine;
   const auto primary = of(is_engine ? Role::kEngineTorque : Role::kPrimaryTorque);
   const auto secondary = of(Role::kSecondaryTorque), pressure = of(Role::kSecondaryPressure);
-  const auto widen = [&](Nuisance row, double sigma) {
-    rows[row].tolerance = std::hypot(rows[row].tolerance, sigma);
+  const auto widen = [&](Nuisance which, double sigma) {
+    double& tolerance = rows[static_cast<std::size_t>(which)].tolerance;
+    tolerance = std::hypot(tolerance, sigma);
   };
   // A constant error of a torque is a constant loss at its shaft by another name, one of a speed
   // another ratio.
