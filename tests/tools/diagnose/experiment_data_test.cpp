@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "tests/tools/diagnose/noise.h"
+#include "tests/tools/diagnose/rig_table.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -76,23 +77,16 @@ TEST(SharpCopy, LosesItsNoiseOnStraightLinesAndIsNotRoundedWhereTheSignalTurns) 
 
 // Two shafts in overdrive; rounded to the step, with noise before the rounding.
 ExperimentData shafts(double step_rad_s, double noise_rad_s) {
-  SignalTable table;
   Noise noise;
   const auto rounded = [&](double value) {
     return std::round((value + noise_rad_s * noise()) / step_rad_s) * step_rad_s;
   };
-  for (int i = 0; i < 4000; ++i) {
-    const double t_s = 0.01 * i;
-    const auto add = [&](Role role, double value) {
-      table[role].t_s.push_back(t_s);
-      table[role].value.push_back(value);
-    };
-    add(Role::kPrimarySpeed, rounded(100.03 + 0.2 * std::sin(0.1 * t_s)));
-    add(Role::kSecondarySpeed, rounded(222.0 - 0.5 * std::sin(0.1 * t_s)));
-    add(Role::kSecondaryPressure, 3e5);
-    add(Role::kPrimaryTorque, 50.0);
-  }
-  return prepare(table, estimator::VariatorParameters{});
+  return prepare(rig_table(4000, 0.01,
+                           [&](double t_s) -> RigSample {
+                             return {rounded(100.03 + 0.2 * std::sin(0.1 * t_s)),
+                                     rounded(222.0 - 0.5 * std::sin(0.1 * t_s)), 3e5, 50.0};
+                           }),
+                 estimator::VariatorParameters{});
 }
 
 TEST(Rounding, StaysWhereNoNoiseCarriesTheSamplesFromStepToStep) {
@@ -104,22 +98,13 @@ TEST(Rounding, StaysWhereNoNoiseCarriesTheSamplesFromStepToStep) {
 
 // A pressure that is held, then falls, and is held again; in steps of step_Pa.
 SignalTable held_pressure(double from_Pa, double to_Pa, double step_Pa) {
-  SignalTable table;
   Noise noise;
-  for (int i = 0; i < 2000; ++i) {
-    const double t_s = 0.01 * i;
+  return rig_table(2000, 0.01, [&](double t_s) -> RigSample {
     const double share = std::clamp((t_s - 6.0) / 8.0, 0.0, 1.0);
-    const auto add = [&](Role role, double value) {
-      table[role].t_s.push_back(t_s);
-      table[role].value.push_back(value);
-    };
-    add(Role::kPrimarySpeed, 100.0 + 0.01 * noise());
-    add(Role::kSecondarySpeed, 222.0 + 0.01 * noise());
-    add(Role::kSecondaryPressure,
-        std::round((from_Pa + share * (to_Pa - from_Pa) + 6e3 * noise()) / step_Pa) * step_Pa);
-    add(Role::kPrimaryTorque, 50.0);
-  }
-  return table;
+    return {100.0 + 0.01 * noise(), 222.0 + 0.01 * noise(),
+            std::round((from_Pa + share * (to_Pa - from_Pa) + 6e3 * noise()) / step_Pa) * step_Pa,
+            50.0};
+  });
 }
 
 // On the steps it is held on, before the fall and after it; those on the way it passes.
@@ -136,19 +121,13 @@ TEST(Rounding, RestsWhereAReadingIsHeldAndNotWhereItPasses) {
 
 // 50 Nm, but for what a belt that slips takes of it for a second at the end; or from 40 to 60 Nm.
 ExperimentData torque_that(bool is_moved) {
-  SignalTable table;
-  for (int i = 0; i < 4000; ++i) {
-    const double t_s = 0.01 * i;
-    const auto add = [&](Role role, double value) {
-      table[role].t_s.push_back(t_s);
-      table[role].value.push_back(value);
-    };
-    add(Role::kPrimarySpeed, 100.0);
-    add(Role::kSecondarySpeed, 222.0);
-    add(Role::kSecondaryPressure, 3e5);
-    add(Role::kPrimaryTorque, is_moved ? 40.0 + 0.5 * t_s : t_s > 38.0 && t_s < 39.0 ? 40.0 : 50.0);
-  }
-  return prepare(table, estimator::VariatorParameters{});
+  return prepare(
+      rig_table(4000, 0.01,
+                [&](double t_s) -> RigSample {
+                  const bool gives_way = t_s > 38.0 && t_s < 39.0;
+                  return {100.0, 222.0, 3e5, is_moved ? 40.0 + 0.5 * t_s : gives_way ? 40.0 : 50.0};
+                }),
+      estimator::VariatorParameters{});
 }
 
 TEST(Spread, OfATorqueThatGivesWayIsHeld) {
@@ -201,23 +180,14 @@ TEST(Saturation, IsNotWhereAPressureIsHeldOnOneOfItsSteps) {
 // A ramp at whose end the belt runs away, and the pressure that catches it.
 SignalTable run_away(double doubles_in_s) {
   constexpr double kCaught_s = 14.2;
-  SignalTable table;
   Noise noise;
-  for (int i = 0; i < 2000; ++i) {
-    const double t_s = 0.01 * i;
-    const auto add = [&](Role role, double value) {
-      table[role].t_s.push_back(t_s);
-      table[role].value.push_back(value);
-    };
+  return rig_table(2000, 0.01, [&](double t_s) -> RigSample {
     const double caught_s = std::max(0.0, t_s - kCaught_s);
     const double grown = std::exp2((std::min(t_s, kCaught_s) - 14.0) / doubles_in_s);
     const double slip_share = (0.01 + 0.01 * grown) * std::exp(-5.0 * caught_s);
-    add(Role::kPrimarySpeed, 100.0 + 0.005 * noise());
-    add(Role::kSecondarySpeed, 225.0 * (1.0 - slip_share) + 0.005 * noise());
-    add(Role::kSecondaryPressure, 6e5 - 2e4 * t_s + std::min(5e5 * caught_s, 2e5) + 1e3 * noise());
-    add(Role::kPrimaryTorque, 50.0);
-  }
-  return table;
+    return {100.0 + 0.005 * noise(), 225.0 * (1.0 - slip_share) + 0.005 * noise(),
+            6e5 - 2e4 * t_s + std::min(5e5 * caught_s, 2e5) + 1e3 * noise(), 50.0};
+  });
 }
 
 TEST(RunAway, IsUsedUntilItIsFast) {

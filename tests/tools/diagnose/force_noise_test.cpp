@@ -7,6 +7,7 @@
 #include <string>
 
 #include "tests/tools/diagnose/recorded_runs.h"
+#include "tests/tools/diagnose/rig_table.h"
 #include "tools/diagnose/decide/namer.h"
 
 namespace beltgrip::diagnose {
@@ -15,20 +16,10 @@ namespace {
 constexpr double kPressure_Pa = 4e5;
 
 SignalTable steady(const estimator::VariatorParameters& variator) {
-  SignalTable table;
-  for (int i = 0; i < 4000; ++i) {
-    const double t_s = 0.005 * i;
-    const auto add = [&](Role role, double value) {
-      table[role].t_s.push_back(t_s);
-      table[role].value.push_back(value);
-    };
-    add(Role::kPrimarySpeed, 100.0);
-    add(Role::kSecondarySpeed, 100.0 * variator.ratio_overdrive * 0.99);
-    add(Role::kSecondaryPressure,
-        kPressure_Pa + 1e5 * std::sin(2.0 * std::numbers::pi * 0.05 * t_s));
-    add(Role::kPrimaryTorque, 50.0);
-  }
-  return table;
+  return rig_table(4000, 0.005, [&](double t_s) -> RigSample {
+    return {100.0, 100.0 * variator.ratio_overdrive * 0.99,
+            kPressure_Pa + 1e5 * std::sin(2.0 * std::numbers::pi * 0.05 * t_s), 50.0};
+  });
 }
 
 TEST(ForceNoise, IsTheSameShareOfTheCapacityInEveryHypothesis) {

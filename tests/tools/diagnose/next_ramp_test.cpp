@@ -57,6 +57,23 @@ TEST(PlannedRun, SaysNothingWhereTheBeltDoesNotGrip) {
   EXPECT_EQ(planned.runs[engine.campaign().runs.size()].valid_count, 0);
 }
 
+// Asked for its torque before any of its samples counts.
+TEST(PlannedRun, IsOfAMachineWhoseFrictionFollowsTheTorque) {
+  const Engine engine = fitted(equal_ramps());
+  ModelState state = engine.state();
+  estimator::LearnedTerm term;
+  term.point = estimator::LearnedPoint::kFriction;
+  term.variable = estimator::LearnedVariable::kTorque;
+  term.count = 2;
+  term.knot = {20.0, 80.0};
+  term.value = {0.0, 0.06};
+  state.learned = {term};
+  const Campaign planned = planned_next(engine.campaign(), some_ramp(), state);
+  const int run = static_cast<int>(engine.campaign().runs.size());
+  ASSERT_GT(planned.runs[static_cast<std::size_t>(run)].valid_count, 100);
+  EXPECT_LT(residuals_of(planned, run, state).value[kFrictionResidual].abs().maxCoeff(), 0.01);
+}
+
 TEST(PlannedRun, LeavesNothingUnderTheStateThatItWasMadeWith) {
   const Engine engine = fitted(equal_ramps());
   ModelState state = engine.state();

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "tests/tools/diagnose/recorded_runs.h"
+#include "tests/tools/diagnose/rig_table.h"
 #include "tools/diagnose/decide/namer.h"
 #include "tools/diagnose/model/effects/effect.h"
 #include "tools/diagnose/model/model_file.h"
@@ -107,18 +108,10 @@ TEST(TorqueDelay, IsNoNameWhereTheTorqueIsHeld) {
 TEST(PressureMoves, NotByItsNoise) {
   const estimator::VariatorParameters variator;
   const auto moves = [&](double ramp_Pa_s) {
-    SignalTable table;
-    for (int i = 0; i < 4000; ++i) {
-      const double t_s = 0.01 * i;
-      const auto add = [&](Role role, double value) {
-        table[role].t_s.push_back(t_s);
-        table[role].value.push_back(value);
-      };
-      add(Role::kPrimarySpeed, 100.0);
-      add(Role::kSecondarySpeed, 100.0 * variator.ratio_overdrive * 0.995);
-      add(Role::kSecondaryPressure, 6e5 - ramp_Pa_s * t_s + 5e3 * std::sin(17.0 * i));
-      add(Role::kPrimaryTorque, 50.0);
-    }
+    const SignalTable table = rig_table(4000, 0.01, [&](double t_s) -> RigSample {
+      return {100.0, 100.0 * variator.ratio_overdrive * 0.995,
+              6e5 - ramp_Pa_s * t_s + 5e3 * std::sin(1700.0 * t_s), 50.0};
+    });
     return make_campaign({prepare(table, variator)}, nominal_model(variator)).pressure_moves;
   };
   EXPECT_FALSE(moves(0.0));

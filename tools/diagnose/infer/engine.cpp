@@ -322,15 +322,14 @@ double leaves(const Campaign& campaign, const ModelState& state) {
   return std::sqrt(most);
 }
 
-// What sensors may be off by, as stated, belongs to the machine as it is measured. Its share of the
-// gain of one torque against the other is the primary torque's.
-double allow_for_sensors(const Campaign& campaign, NuisanceTable& rows) {
+// What sensors may be off by, as stated, belongs to the machine as it is measured.
+void allow_for_sensors(Campaign& campaign) {
   const auto of = [&](Role role) { return campaign.accuracies[static_cast<std::size_t>(role)]; };
   const bool is_engine = campaign.runs.size() > 0 && campaign.runs[0].torque_is_engine;
   const auto primary = of(is_engine ? Role::kEngineTorque : Role::kPrimaryTorque);
-  const auto secondary = of(Role::kSecondaryTorque), pressure = of(Role::kSecondaryPressure);
+  const auto secondary = of(Role::kSecondaryTorque);
   const auto widen = [&](Nuisance which, double sigma) {
-    double& tolerance = rows[static_cast<std::size_t>(which)].tolerance;
+    double& tolerance = campaign.nuisances[static_cast<std::size_t>(which)].tolerance;
     tolerance = std::hypot(tolerance, sigma);
   };
   // A constant error of a torque is a constant loss at its shaft by another name, one of a speed
@@ -340,12 +339,11 @@ double allow_for_sensors(const Campaign& campaign, NuisanceTable& rows) {
   for (const Nuisance ratio : {kLnRatioOverdrive, kLnRatioLow}) {
     widen(ratio, std::hypot(of(Role::kPrimarySpeed).gain, of(Role::kSecondarySpeed).gain));
   }
-  widen(kPressureBias_Pa, pressure.bias);
-  widen(kSecondaryTorqueGain, primary.gain);
-  widen(kSecondaryTorqueGain, secondary.gain);
+  widen(kPressureBias_Pa, of(Role::kSecondaryPressure).bias);
+  const double both = std::hypot(primary.gain, secondary.gain);
+  widen(kSecondaryTorqueGain, both);
   // Derived: of a sum of two independent errors each is expected to have its share of the variance.
-  const double both = rows[kSecondaryTorqueGain].tolerance;
-  return both > 0.0 ? primary.gain * primary.gain / (both * both) : 0.0;
+  if (both > 0.0) campaign.primary_share_of_gain = primary.gain * primary.gain / (both * both);
 }
 
 }  // namespace
@@ -368,7 +366,7 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model,
   if (const auto ripple = model.effects.find("speed_ripple"); ripple != model.effects.end()) {
     out.known_ripples = ripple->second.parameters;
   }
-  out.primary_share_of_gain = allow_for_sensors(out, out.nuisances);
+  allow_for_sensors(out);
   for (const ExperimentData& run : out.runs) {
     out.has_balance |= run.valid_count > 0 && run.torque_s.present;
     out.has_tracking |= run.valid_count > 0 && run.command.present;

@@ -61,6 +61,7 @@ ArrayXd recorded(const ExperimentData& run, LearnedVariable variable) {
     case LearnedVariable::kTorque:
       break;
   }
+  if (run.valid_count == 0) return run.torque.slow;
   // One that is held gives way where the belt slips, and follows the friction then.
   const Spread torque_Nm = spread_of(run, run.torque);
   return torque_Nm.moves() ? run.torque.slow : ArrayXd::Constant(run.size(), torque_Nm.middle);
