@@ -373,8 +373,10 @@ Spread spread_of(const ExperimentData& run, const GridSignal& signal) {
 
 bool Spread::moves() const {
   // Of the middle. Measured, two generators of other make: 0.04 at most in torques of ramps at one
-  // torque and in pressures that are held, 0.13 and more in what is moved; a fifth less or more
-  // lies between.
+  // torque and in pressures that are held, 0.13 and more in campaigns that move them. Single runs
+  // lie between: of 7,516 torques a fifth less makes 140 moved ones and a fifth more 170 held ones,
+  // in 222 of 734 campaigns. There a fifth less leaves all words as they are; more takes one name,
+  // a delay of the torque that is there.
   constexpr double kMoved = 0.1;
   return high - low > kMoved * std::abs(middle);
 }

@@ -27,8 +27,11 @@ Conditions conditions_of(const ExperimentData& run) {
 }
 
 bool is_time_a_ramp(const Campaign& campaign) {
-  constexpr double kLeft = 0.05;  // chosen, of the variance
-  constexpr double kBin_s = 1.0;
+  // Chosen, of the variance. Of 734 campaigns of other make 35 lie below, at 0.045 at most, the
+  // next at 0.082. A fifth less: one more function of the time, in a healthy machine (0.043); more:
+  // the same.
+  constexpr double kLeft = 0.05;
+  constexpr double kBin_s = 1.0;  // chosen; a fifth less or more: the same 35
   struct Bin {
     double count = 0.0, sum = 0.0, squares = 0.0;
     void add(double value) {
