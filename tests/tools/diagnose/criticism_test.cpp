@@ -38,7 +38,7 @@ Criticism failing(const std::vector<std::string>& names, std::vector<Cell> cells
   Criticism out;
   out.cells = std::move(cells);
   for (const char* name :
-       {"law_cell", "smooth_cell", "own_shape", "line", "channel_line", "torque_swing",
+       {"law_cell", "smooth_cell", "own_shape", "line", "slow_line", "channel_line", "torque_swing",
         "belt_passage", "whiteness", "scatter_friction", "scatter_ratio", "scatter_torque",
         "unusual_scatter", "unusual_ratio", "unusual_friction"}) {
     const bool fails = std::find(names.begin(), names.end(), name) != names.end();

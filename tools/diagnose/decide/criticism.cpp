@@ -6,6 +6,7 @@
 
 #include "tools/diagnose/decide/thresholds.h"
 #include "tools/diagnose/infer/residual_tests.h"
+#include "tools/diagnose/infer/slow_line.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -110,7 +111,9 @@ Criticism criticise(const Engine& engine, Steps steps) {
   Criticism out;
   out.cells = score_cells(engine);
   demote_order(out.cells);
+  const bool fine = steps == Steps::kFine;
   out.line = strongest_line(engine.campaign(), engine.state());
+  if (fine) out.slow_line = slow_line(engine);
   out.channel_line = channel_line(engine.campaign());
   out.swing = swing(engine.campaign());
   out.base = scatter_base(engine);
@@ -124,12 +127,12 @@ Criticism criticise(const Engine& engine, Steps steps) {
   const ScatterRatios ratio = scatter_ratios(engine, out.base.scatter);
   const ScatterRatios unusual = scatter_ratios(engine, default_scatter());
   using namespace thresholds;
-  const bool fine = steps == Steps::kFine;
   out.tests = {
       {"law_cell", law, kLawCell},
       {"smooth_cell", smooth, kSmoothCell},
       {"own_shape", out.own ? out.own->gain() : 0.0, kOwnShape},
       {"line", fine ? out.line.excess : 0.0, kLine},
+      {"slow_line", out.slow_line.excess, kSlowLine},
       {"channel_line", out.channel_line.excess, kChannelLine},
       {"torque_swing", fine ? out.swing.excess : 0.0, kSwing},
       {"belt_passage", belt_line(engine.campaign(), out.belt_Hz), kBeltLine},
@@ -202,16 +205,17 @@ Unexplained what_is_left(const Criticism& criticism, bool has_balance) {
     return out;
   }
   const Cell* best = criticism.cells.empty() ? nullptr : &criticism.cells.front();
-  // A function of something that sweeps leaves a weak line as well.
+  // A function of something that sweeps leaves a weak line as well, and a slow one.
+  const bool is_function = best != nullptr && (fails("law_cell") || fails("smooth_cell"));
   const bool is_line =
-      fails("line") && (best == nullptr || criticism.line.share > thresholds::kLineShare ||
-                        (!fails("law_cell") && !fails("smooth_cell")));
-  if (is_line) {
-    out.acts_on = criticism.line.acts_on;
+      fails("line") && (!is_function || criticism.line.share > thresholds::kLineShare);
+  if (is_line || (fails("slow_line") && !is_function)) {
+    const SpectralLine& line = is_line ? criticism.line : criticism.slow_line;
+    out.acts_on = line.acts_on;
     out.kind = MisfitKind::kLine;
-    out.frequency_Hz = criticism.line.frequency_Hz;
-    out.share = criticism.line.share;
-    if (best != nullptr && (fails("law_cell") || fails("smooth_cell"))) {
+    out.frequency_Hz = line.frequency_Hz;
+    out.share = line.share;
+    if (is_function) {
       out.depends_on = {best->abscissa.variable->name};
     }
     return out;

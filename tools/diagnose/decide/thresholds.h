@@ -24,6 +24,11 @@ inline constexpr double kLine = 5.5;
 // The line at the belt's passage, in sigmas. That of a ripple once per revolution: sums of
 // exponential variables have heavier tails than the normal.
 inline constexpr double kBeltLine = 6.5;
+// A line below those, in sigmas of what the frequencies about it have. Measured in campaigns of
+// other make whose readings are fine: 5.0 at most in 268 healthy ones, the next 4.2; 8.1 to 29 in
+// nine whose force or ratio swings at 0.3 to 0.7 Hz. A fifth less and one healthy one is at it; a
+// fifth more lies between.
+inline constexpr double kSlowLine = 6.5;
 // A line in a channel's own samples, power over the level about it.
 inline constexpr double kChannelLine = 10.0;
 // A hump in the spectrum of the torque that does not arrive behind the belt, sigmas: a shaft that

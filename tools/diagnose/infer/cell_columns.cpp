@@ -20,7 +20,8 @@ constexpr double kFarMore = 1.5;                // chosen, times the usual varia
 constexpr int kScatterSteps = 6;                // from the fitted scatter to the usual
 constexpr std::array kLessScatter{0.25, 0.06};  // chosen, of the variance
 
-// What a unit of the row changes at each sample.
+}  // namespace
+
 QuantityChange unit_change(const ModelState& state, const Residuals& at, const InjectionRow& row,
                            const ArrayXd& size) {
   QuantityChange out;
@@ -51,8 +52,6 @@ QuantityChange unit_change(const ModelState& state, const Residuals& at, const I
   }
   return out;
 }
-
-}  // namespace
 
 CellBase cell_base(const Engine& engine) {
   const Campaign& campaign = engine.campaign();

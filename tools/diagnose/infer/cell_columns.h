@@ -7,6 +7,10 @@
 
 namespace beltgrip::diagnose {
 
+// What a unit of the row changes at each sample, times a size there.
+QuantityChange unit_change(const ModelState& state, const Residuals& at, const InjectionRow& row,
+                           const Eigen::ArrayXd& size);
+
 // What no function changes: the columns of all experiments, and what the scatter between them may
 // be.
 struct CellBase {

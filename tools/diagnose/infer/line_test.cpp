@@ -105,10 +105,10 @@ std::vector<double> spectrum(const ArrayXd& values, double dt_s, double highest_
   return out;
 }
 
-// In units of the level about it, from kLowest_Hz on.
-std::vector<double> levelled(const std::vector<double>& power) {
+// In units of the level about it, from a frequency on.
+std::vector<double> levelled(const std::vector<double>& power, double from_Hz) {
   const int around = static_cast<int>(kAround_Hz / kStep_Hz);
-  const int first = static_cast<int>(std::lround((kLowest_Hz - kLevelFrom_Hz) / kStep_Hz));
+  const int first = static_cast<int>(std::lround((from_Hz - kLevelFrom_Hz) / kStep_Hz));
   std::vector<double> out;
   for (int i = first; i < static_cast<int>(power.size()); ++i) {
     std::vector<double> near;
@@ -155,15 +155,16 @@ std::vector<ArrayXd> drives_of(const ExperimentData& run) {
   return out;
 }
 
-// Where sums and differences of the frequencies that drive the machine lie. A bent curve, of which
-// the model knows the bend only so far, answers there too.
-std::vector<bool> driven(const ExperimentData& run, std::size_t bins, double highest_Hz) {
+}  // namespace
+
+std::vector<bool> driven(const ExperimentData& run, std::size_t bins, double lowest_Hz,
+                         double highest_Hz) {
   const std::vector<ArrayXd> drives = drives_of(run);
   std::vector<bool> out(bins, false);
   const auto look = [&](const ArrayXd& product) {
     const ArrayXd fast = fast_part(run, product, 1);
     if (fast.size() == 0) return;
-    const std::vector<double> own = levelled(spectrum(fast, run.dt_s, highest_Hz));
+    const std::vector<double> own = levelled(spectrum(fast, run.dt_s, highest_Hz), lowest_Hz);
     for (std::size_t i = 0; i < std::min(bins, own.size()); ++i) {
       out[i] = out[i] || own[i] > kDriven;
     }
@@ -178,8 +179,6 @@ std::vector<bool> driven(const ExperimentData& run, std::size_t bins, double hig
   }
   return out;
 }
-
-}  // namespace
 
 namespace {
 
@@ -232,9 +231,10 @@ SpectralLine strongest_line(const Campaign& campaign, const ModelState& state) {
       const ArrayXd fast = fast_part(run, at.value[kind], every);
       if (fast.size() == 0) continue;
       const double highest_Hz = std::min(kHighest_Hz, 0.45 / (run.dt_s * every));
-      std::vector<double> own =
-          levelled(spectrum(fast * answer_to(campaign, at, kLooks[l]), run.dt_s, highest_Hz));
-      if (is_driven[kind].empty()) is_driven[kind] = driven(run, own.size(), highest_Hz);
+      std::vector<double> own = levelled(
+          spectrum(fast * answer_to(campaign, at, kLooks[l]), run.dt_s, highest_Hz), kLowest_Hz);
+      if (is_driven[kind].empty())
+        is_driven[kind] = driven(run, own.size(), kLowest_Hz, highest_Hz);
       for (std::size_t i = 0; i < own.size(); ++i) {
         if (is_driven[kind][i]) own[i] = std::min(own[i], 1.0);  // as noise has it
       }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "tools/diagnose/infer/engine.h"
 
@@ -15,5 +16,10 @@ struct SpectralLine {
 };
 // The strongest one at the state; no frequency: too short.
 SpectralLine strongest_line(const Campaign& campaign, const ModelState& state);
+
+// Where sums and differences of the frequencies that drive the machine lie, in so many steps of
+// 0.025 Hz. A bent curve, of which the model knows the bend only so far, answers there too.
+std::vector<bool> driven(const ExperimentData& run, std::size_t bins, double lowest_Hz,
+                         double highest_Hz);
 
 }  // namespace beltgrip::diagnose
