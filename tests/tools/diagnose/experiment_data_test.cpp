@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "tests/tools/diagnose/noise.h"
@@ -119,6 +121,30 @@ TEST(Rounding, RestsWhereAReadingIsHeldAndNotWhereItPasses) {
   EXPECT_TRUE(prepare(held_pressure(6e5, 3.2e5, 1e3), {}).rests_pressure.empty());
 }
 
+// One that holds a value all along says nothing of the steps; another one does.
+TEST(Rounding, OfASensorIsToldByAllExperiments) {
+  const SignalTable held = held_pressure(5.2e5, 5.2e5, 4e4), falls = held_pressure(6e5, 3.2e5, 4e4);
+  EXPECT_TRUE(prepare(held, {}).rests_pressure.empty());
+  const ExperimentData data = prepare(held, {}, sensors_of(std::array{&held, &falls}));
+  ASSERT_EQ(data.rests_pressure.size(), 1U);
+  EXPECT_EQ(data.rests_pressure[0].begin, 0);
+  EXPECT_EQ(data.rests_pressure[0].end, data.size());
+  EXPECT_NEAR(data.rounding_pressure_Pa, 4e4 / std::sqrt(12.0), 100.0);
+}
+
+// It comes from a step above, stays for long and goes on to one below: no mere passage.
+TEST(Rounding, RestsWhereAReadingStaysOnItsWay) {
+  SignalTable table = held_pressure(6e5, 3.2e5, 4e4);
+  for (int i = 0; i < 60; ++i) {
+    table[Role::kSecondaryPressure].value[static_cast<std::size_t>(i)] = 6.4e5;
+  }
+  const ExperimentData data = prepare(table, {});
+  const bool at_first = std::any_of(
+      data.rests_pressure.begin(), data.rests_pressure.end(),
+      [](const Rest& rest) { return rest.begin <= 10 && rest.end >= 60 && rest.end < 75; });
+  EXPECT_TRUE(at_first);
+}
+
 // 50 Nm, but for what a belt that slips takes of it for a second at the end; or from 40 to 60 Nm.
 ExperimentData torque_that(bool is_moved) {
   return prepare(
@@ -162,9 +188,8 @@ TEST(Saturation, IsALevelThatNoExperimentGoesBeyond) {
   const SignalTable table = clipped_pressure(4e5, 5.2e5);
   const ExperimentData alone = prepare(table, {});
   EXPECT_TRUE(alone.saturated_pressure);
-  Reaches reached;
-  widen(reached, held_pressure(6.4e5, 2.8e5, 1e3));
-  const ExperimentData among_others = prepare(table, {}, reached);
+  const SignalTable beyond = held_pressure(6.4e5, 2.8e5, 1e3);
+  const ExperimentData among_others = prepare(table, {}, sensors_of(std::array{&table, &beyond}));
   EXPECT_FALSE(among_others.saturated_pressure);
   EXPECT_GT(among_others.valid_count, 180);  // of 200, less the ends
   EXPECT_LT(alone.valid_count, 100);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <functional>
 
@@ -28,7 +29,8 @@ Errors errors_of(const std::function<double(double)>& truth, double noise) {
     channel.t_s.push_back(kSample_s * i);
     channel.value.push_back(kStep * std::round(truth(kSample_s * i) + noise * next()));
   }
-  const Channel out = unrounded(channel, kStep);
+  const Channel* const alone = &channel;
+  const Channel out = unrounded(channel, kStep, noise_before_rounding({&alone, 1}, kStep));
   EXPECT_EQ(out.t_s, channel.t_s);
   Errors errors;
   constexpr int kMeans = kSamples / kMean;
@@ -80,13 +82,50 @@ TEST(Unrounded, TheNoiseBeforeTheRoundingStays) {
     channel.t_s.push_back(kSample_s * i);
     channel.value.push_back(std::round(ramp(kSample_s * i) + kNoise * next()));
   }
-  const Channel out = unrounded(channel, 1.0);
+  const Channel* const alone = &channel;
+  const Channel out = unrounded(channel, 1.0, noise_before_rounding({&alone, 1}, 1.0));
   double square = 0.0;
   for (std::size_t i = 0; i < out.value.size(); ++i) {
     square +=
         std::pow(out.value[i] - ramp(out.t_s[i]), 2.0) / static_cast<double>(out.value.size());
   }
   EXPECT_NEAR(std::sqrt(square), kNoise, 0.15 * kNoise);
+}
+
+// Noise takes a hold over to the next value by how near that is: told by the noise, which another
+// experiment shows, whose ramp crosses the values, and a hold itself does not.
+TEST(Unrounded, AHoldIsTowardsTheValueThatNoiseTakesItTo) {
+  constexpr double kHold = 17.38, kNoise = 0.1;
+  Noise next;
+  Channel crosses, holds;
+  for (int i = 0; i < 3000; ++i) {
+    const double t_s = kSample_s * i;
+    crosses.t_s.push_back(t_s);
+    crosses.value.push_back(kStep * std::round(ramp(t_s) + kNoise * next()));
+    holds.t_s.push_back(t_s);
+    holds.value.push_back(kStep * std::round(kHold + kNoise * next()));
+  }
+  const std::array<const Channel*, 2> both{&crosses, &holds};
+  const double noise = noise_before_rounding(both, kStep);
+  EXPECT_NEAR(noise, kNoise, 0.2 * kNoise);
+  double mean = 0.0;
+  for (const double value : unrounded(holds, kStep, noise).value) mean += value / 3000.0;
+  EXPECT_NEAR(mean / kStep, kHold, 0.03);
+}
+
+// What jumps and turns is not followed through its corners; that is no noise.
+TEST(NoiseBeforeRounding, IsNoneOfTheCorners) {
+  Noise next;
+  Channel channel;
+  for (int i = 0; i < 3000; ++i) {
+    const double t_s = kSample_s * i;
+    const double turns_s = std::fmod(t_s, 6.0);
+    channel.t_s.push_back(t_s);
+    channel.value.push_back(
+        kStep * std::round((turns_s < 5.0 ? 30.3 - 1.2 * turns_s : 24.3) + 0.1 * next()));
+  }
+  const Channel* const alone = &channel;
+  EXPECT_NEAR(noise_before_rounding({&alone, 1}, kStep), 0.1, 0.05);
 }
 
 // Held on one value, nothing says where between its neighbours: it stays within its step.
@@ -96,12 +135,13 @@ TEST(Unrounded, AHeldValueIsNowhereElse) {
     channel.t_s.push_back(kSample_s * i);
     channel.value.push_back(7.0 * kStep);
   }
-  for (const double value : unrounded(channel, kStep).value) EXPECT_NEAR(value, 7.0 * kStep, 1.0);
+  for (const double value : unrounded(channel, kStep, 0.1).value)
+    EXPECT_NEAR(value, 7.0 * kStep, 1.0);
 }
 
 TEST(Unrounded, TooFewSamplesAreLeftAlone) {
   const Channel channel{{0.0, 0.01, 0.02}, {1.0, 1.0, 2.0}};
-  EXPECT_EQ(unrounded(channel, 1.0).value, channel.value);
+  EXPECT_EQ(unrounded(channel, 1.0, 0.1).value, channel.value);
 }
 
 }  // namespace

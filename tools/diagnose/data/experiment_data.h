@@ -9,6 +9,7 @@
 
 #include "estimator/physics/parameters.h"
 #include "tools/diagnose/data/order_lines.h"
+#include "tools/diagnose/data/rounding.h"
 #include "tools/diagnose/data/signal_table.h"
 #include "tools/diagnose/data/spectral_lines.h"
 
@@ -37,7 +38,8 @@ struct Stretch {
   int begin = 0, end = 0;  // end: behind the last
 };
 
-// The same on one step of a reading; a motion that comes back rests there again, off by the same.
+// The same on one step of a reading. What comes back as it is read, as a torque, rests there again,
+// off by the same; of the pressure the course between its steps is found, each time anew.
 struct Rest : Stretch {
   long step = 0;
 };
@@ -74,6 +76,9 @@ struct ExperimentData {
   double rounding_slip_share =
       0.0;  // one sigma of what the rounding of the speeds leaves in the slip
   double rounding_pressure_Pa = 0.0, rounding_torque_Nm = 0.0, rounding_torque_s_Nm = 0.0;  // same
+  // Of the pressure's: what is left of it in the course that was found from the samples, where it
+  // passes its steps.
+  double left_of_rounding_Pa = 0.0;
   // Where a reading rests on one of its steps and goes back to where it came from, or begins or
   // ends there: off by the same all along, and nothing says by how much. One that it passes on its
   // way is off by nothing in the mean.
@@ -82,10 +87,12 @@ struct ExperimentData {
   int size() const { return static_cast<int>(t_s.size()); }
 };
 
-// Never throws: what cannot be used is masked, and said in notes. reached: by each channel in all
-// experiments with the same sensors; what one of them goes beyond is no bound in another.
+// Never throws: what cannot be used is masked, and said in notes. sensors: by all experiments with
+// the same ones, this among them; what one of them goes beyond is no bound in another.
 ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator,
-                       Reaches reached = {});
+                       const Sensors& sensors);
+// By this experiment alone.
+ExperimentData prepare(const SignalTable& table, const estimator::VariatorParameters& variator);
 
 // What a channel reads within an experiment, over its valid samples.
 struct Spread {

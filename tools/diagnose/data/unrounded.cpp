@@ -12,20 +12,34 @@ namespace beltgrip::diagnose {
 namespace {
 
 // All but the first in steps of the rounding. Chosen where nothing else is said: what is left of
-// ramps, waves, jumps and holds, with noise of 0.08 to 0.3 at 50 and 200 Hz, moves by less than a
-// tenth with each of them a fifth less or more; kBendsPerMedian a fifth less leaves 17 % more of
-// waves. (Measured with the noise begun at 0.1, where that a fifth less leaves 19 % more of holds.)
+// ramps, waves, corners and holds, with noise of 0.08 and 0.2 at 50 and 200 Hz, moves by less than
+// a sixth with each number here a fifth less or a quarter more, but with kNode_s less, which leaves
+// 21 % more of corners.
 constexpr double kNode_s = 0.1;  // as far apart as the samples of an experiment
 constexpr double kBendAtFirst = 0.01;
 constexpr double kBendLeast = 0.002;     // of a course that is straight but for its corners
-constexpr double kDegrees = 3.0;         // of Student's t: few bends are corners
-constexpr double kBendsPerMedian = 1.5;  // derived: half of those of 3 degrees are below 0.76
-constexpr double kNoiseAtFirst = 0.5;
-constexpr double kNoiseLeast = 0.05, kNoiseMost = 1.0;  // beyond, no sample tells it
-// Not settled: the noise of a clean ramp, 0.09, is told as 0.157 after so many passes, 0.135 after
-// twice and 0.107 after five times as many. More of them are another noise, not a better course.
+constexpr double kDegrees = 5.0;         // of Student's t: few bends are corners
+constexpr double kBendsPerMedian = 1.5;  // derived: half of those of 5 degrees are below 0.73
 constexpr int kPasses = 20, kPassesSmooth = 5;
 constexpr double kSettled = 1e-3;
+// Of a sample: where it says nothing of where the course is, that stays.
+constexpr double kToldLeast = 1e-3;
+constexpr double kJumpSteps = 3.0;  // from a sample to the next
+// Of the search for the noise: a step of it, as a factor, and a share of one that ends it.
+constexpr double kNoiseAtFirst = 0.2;
+constexpr double kNoiseLeast = 0.05, kNoiseMost = 1.0;  // beyond, no sample tells it
+constexpr double kNoiseStep = 1.2, kNoiseSettled = 0.05;
+constexpr double kStray = 0.02, kStrayDensity = 0.1;  // one sample in fifty, anywhere in ten steps
+// What bends by so many usual ones is a corner; of no use are so many nodes on either side.
+constexpr double kCornerBends = 3.0;
+constexpr std::size_t kCornerNodes = 2;
+// A hold lasts so many times as long as what it is entered and left by takes to pass a step.
+// Derived: where a wave turns it is on one step for up to 4.8 times as long.
+constexpr std::size_t kHeldTimes = 3, kHeldTimesAtTurn = 6;
+constexpr double kHeldSlope = 1e-3;  // from a node to the next
+// Of the middle of its step, information: less than that of a dozen samples which noise takes over
+// its edge, and more than that of the corners at its ends.
+constexpr double kHeldMiddle = 100.0;
 constexpr double kTails = 4.0;  // derived, in sigmas: less than a ten thousandth is beyond
 
 double density(double z) { return std::exp(-0.5 * z * z) / std::sqrt(2.0 * std::numbers::pi); }
@@ -83,9 +97,16 @@ struct Group {
 };
 
 std::vector<Group> groups_of(const Channel& channel, const Nodes& nodes, double step) {
+  // No course from node to node follows a jump.
+  std::vector<bool> jumps(nodes.count(), false);
+  for (std::size_t i = 1; i < channel.value.size(); ++i) {
+    if (std::abs(channel.value[i] - channel.value[i - 1]) < kJumpSteps * step) continue;
+    jumps[nodes.of(channel.t_s[i]).node] = jumps[nodes.of(channel.t_s[i - 1]).node] = true;
+  }
   std::vector<Group> out;
   for (std::size_t i = 0; i < channel.value.size(); ++i) {
     const Place place = nodes.of(channel.t_s[i]);
+    if (jumps[place.node]) continue;
     const double value = channel.value[i] / step;
     auto same = out.rbegin();
     while (same != out.rend() && same->place.node == place.node && same->value != value) ++same;
@@ -123,7 +144,32 @@ struct Banded {
     second[k - 1] += weight;
   }
 
+  void add_slope(std::size_t k, double weight) {
+    diagonal[k] += weight;
+    diagonal[k + 1] += weight;
+    beside[k] -= weight;
+  }
+
   std::vector<double> solve() && {
+    factor();
+    const std::size_t n = diagonal.size();
+    std::vector<double> out(n);
+    for (std::size_t i = n; i-- > 0;) {
+      out[i] = right[i] / diagonal[i];
+      if (i + 1 < n) out[i] -= beside[i] * out[i + 1];
+      if (i + 2 < n) out[i] -= second[i] * out[i + 2];
+    }
+    return out;
+  }
+  double ln_determinant() && {
+    factor();
+    double sum = 0.0;
+    for (const double each : diagonal) sum += std::log(each);
+    return sum;
+  }
+
+ private:
+  void factor() {
     const std::size_t n = diagonal.size();
     for (std::size_t i = 0; i + 1 < n; ++i) {
       const double by = beside[i] / diagonal[i];
@@ -138,13 +184,6 @@ struct Banded {
       beside[i] = by;
       second[i] = by_second;
     }
-    std::vector<double> out(n);
-    for (std::size_t i = n; i-- > 0;) {
-      out[i] = right[i] / diagonal[i];
-      if (i + 1 < n) out[i] -= beside[i] * out[i + 1];
-      if (i + 2 < n) out[i] -= second[i] * out[i + 2];
-    }
-    return out;
   }
 };
 
@@ -157,15 +196,23 @@ double bend_of(const std::vector<double>& m, std::size_t k) {
   return m[k - 1] - 2.0 * m[k] + m[k + 1];
 }
 
+// The course stays on one value, from node to node.
+struct Hold {
+  std::size_t begin, end;
+  double value;  // that is read there
+};
+
 struct Course {
   std::vector<double> m;  // at the nodes
-  double sigma = kNoiseAtFirst;
+  double sigma = 0.0;     // of the noise
   double usual_bend = kBendAtFirst;
+  std::vector<Hold> holds;
 };
 
 // As if rounding were noise, and bends were normal.
-Course smooth(const std::vector<Group>& groups, std::size_t nodes) {
+Course smooth(const std::vector<Group>& groups, std::size_t nodes, double sigma) {
   Course out;
+  out.sigma = sigma;
   Banded equations(nodes);
   for (const Group& group : groups) {
     const double weight = group.count / (out.sigma * out.sigma);
@@ -179,32 +226,55 @@ Course smooth(const std::vector<Group>& groups, std::size_t nodes) {
   return out;
 }
 
-// One step of Newton's towards what is most probable; the noise and the usual bend from what it
-// leaves. With normal bends there is one such course and no other.
-Course improved(const Course& from, const std::vector<Group>& groups, bool normal_bends) {
+// Information on the course.
+double told_by(const Group& group, const Within& noise, double sigma) {
+  return group.count * std::max((1.0 - noise.variance) / (sigma * sigma), kToldLeast);
+}
+
+// A few samples are of no noise: the course has gone round a corner there, or they are far off.
+double ln_likelihood(double value, double here, double sigma) {
+  const double off = value - here;
+  const double scale = 1.0 / (sigma * std::numbers::sqrt2);
+  const double share = 0.5 * (std::erfc((off - 0.5) * scale) - std::erfc((off + 0.5) * scale));
+  return std::log((1.0 - kStray) * share + kStray * kStrayDensity);
+}
+
+// Of a step towards what is most probable, at a course.
+Banded equations_at(const Course& from, const std::vector<Group>& groups, bool normal_bends) {
   const std::size_t nodes = from.m.size();
-  Banded equations(nodes);
-  double squares = 0.0, samples = 0.0;
+  Banded out(nodes);
   for (const Group& group : groups) {
     const double here = at(from.m, group.place);
     const Within noise = noise_of(group.value, here, from.sigma);
-    squares += group.count * (noise.mean * noise.mean + noise.variance);
-    samples += group.count;
-    const double told = group.count * (1.0 - noise.variance) / (from.sigma * from.sigma);
-    equations.add(group.place, told);
-    equations.pull(group.place, told * here + group.count * noise.mean / from.sigma);
+    const double told = told_by(group, noise, from.sigma);
+    out.add(group.place, told);
+    out.pull(group.place, told * here + group.count * noise.mean / from.sigma);
   }
   for (std::size_t k = 1; k + 1 < nodes; ++k) {
     const double bend = bend_of(from.m, k) / from.usual_bend;
     const double weight = normal_bends ? 1.0 : (kDegrees + 1.0) / (kDegrees + bend * bend);
-    equations.add_bend(k, weight / (from.usual_bend * from.usual_bend));
+    out.add_bend(k, weight / (from.usual_bend * from.usual_bend));
   }
+  for (const Hold& hold : from.holds) {
+    const double told = kHeldMiddle / static_cast<double>(hold.end - hold.begin);
+    for (std::size_t k = hold.begin; k < hold.end; ++k) {
+      const Place place{std::min(k, nodes - 2), k < nodes - 1 ? 0.0 : 1.0};
+      out.add(place, told);
+      out.pull(place, told * hold.value);
+      if (k + 1 < hold.end) out.add_slope(k, 1.0 / (kHeldSlope * kHeldSlope));
+    }
+  }
+  return out;
+}
+
+// One step of Newton's; the usual bend from what it leaves. With normal bends there is one such
+// course and no other.
+Course improved(const Course& from, const std::vector<Group>& groups, bool normal_bends) {
   Course out = from;
-  out.m = std::move(equations).solve();
-  out.sigma = std::clamp(from.sigma * std::sqrt(squares / samples), kNoiseLeast, kNoiseMost);
+  out.m = equations_at(from, groups, normal_bends).solve();
   if (normal_bends) return out;
   std::vector<double> bends;
-  for (std::size_t k = 1; k + 1 < nodes; ++k) bends.push_back(std::abs(bend_of(out.m, k)));
+  for (std::size_t k = 1; k + 1 < out.m.size(); ++k) bends.push_back(std::abs(bend_of(out.m, k)));
   out.usual_bend = std::max(kBendLeast, kBendsPerMedian * estimator::median(bends));
   return out;
 }
@@ -224,7 +294,7 @@ Rounded rounded(double off, double sigma) {
     mean += above - below;
     square += 2.0 * edge * (above + below);
   }
-  return {mean - off, square - mean * mean};
+  return {mean - off, std::max(square - mean * mean, 0.0)};
 }
 
 double moved(const std::vector<double>& from, const std::vector<double>& to) {
@@ -233,30 +303,132 @@ double moved(const std::vector<double>& from, const std::vector<double>& to) {
   return out;
 }
 
+// A channel on its way to its course.
+class Search {
+ public:
+  Search(const Channel& channel, double step, double sigma)
+      : nodes_(channel),
+        groups_(groups_of(channel, nodes_, step)),
+        course_(smooth(groups_, nodes_.count(), sigma)) {}
+  static bool is_possible(const Channel& channel) {
+    constexpr std::size_t kNodesLeast = 4;
+    return !channel.empty() && Nodes(channel).count() >= kNodesLeast;
+  }
+
+  // By how much the course has moved.
+  double pass(bool normal_bends) {
+    Course next = improved(course_, groups_, normal_bends);
+    const double by = moved(course_.m, next.m);
+    course_ = std::move(next);
+    return by;
+  }
+  void set_noise(double sigma) { course_.sigma = sigma; }
+  // Of the samples but those about corners, were the noise this, whatever the course (Laplace).
+  double log_likelihood(double sigma) const {
+    Course there = course_;
+    there.sigma = sigma;
+    double sum = -0.5 * equations_at(there, groups_, false).ln_determinant();
+    for (const Group& group : groups_) {
+      if (is_corner(group.place.node)) continue;
+      sum += group.count * ln_likelihood(group.value, at(course_.m, group.place), sigma);
+    }
+    return sum;
+  }
+  // Where the course stays on one step for much longer than it takes to pass those beside it, it
+  // has been held. Between two crossings the samples say nothing of it, and it would go there from
+  // what is before the hold to what is behind.
+  void hold_where_held() {
+    struct Dwell {
+      std::size_t begin, end;
+      long on;
+      std::size_t size() const { return end - begin; }
+    };
+    std::vector<Dwell> all;
+    const std::vector<double>& m = course_.m;
+    for (std::size_t k = 0; k < m.size(); ++k) {
+      const long on = std::lround(m[k]);
+      if (all.empty() || all.back().on != on) all.push_back({k, k, on});
+      all.back().end = k + 1;
+    }
+    course_.holds.clear();
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const std::size_t before = i > 0 ? all[i - 1].size() : 0;
+      const std::size_t after = i + 1 < all.size() ? all[i + 1].size() : 0;
+      const bool turns = before > 0 && after > 0 && all[i - 1].on == all[i + 1].on;
+      const std::size_t times = turns ? kHeldTimesAtTurn : kHeldTimes;
+      if (all[i].size() < times * std::max({before, after, std::size_t{1}})) continue;
+      course_.holds.push_back(
+          {all[i].begin + before, all[i].end - after, static_cast<double>(all[i].on)});
+    }
+  }
+  double course_at(double t_s) const { return at(course_.m, nodes_.of(t_s)); }
+
+ private:
+  // About a node: the course bends there as it does not elsewhere.
+  bool is_corner(std::size_t node) const {
+    const std::size_t last = std::min(course_.m.size() - 2, node + kCornerNodes + 1);
+    for (std::size_t k = node > kCornerNodes ? node - kCornerNodes : 1; k <= last; ++k) {
+      if (std::abs(bend_of(course_.m, k)) > kCornerBends * course_.usual_bend) return true;
+    }
+    return false;
+  }
+
+  Nodes nodes_;
+  std::vector<Group> groups_;
+  Course course_;
+};
+
+// Where a parabola through three values has its top, in steps from the middle one; at most one.
+double top_of(double before, double here, double after) {
+  if (before >= here || after >= here) return after > before ? 1.0 : -1.0;
+  return std::clamp(0.5 * (after - before) / (2.0 * here - before - after), -1.0, 1.0);
+}
+
 }  // namespace
 
-Channel unrounded(const Channel& channel, double step) {
-  constexpr std::size_t kNodesLeast = 4;
-  const Nodes nodes(channel);
-  if (nodes.count() < kNodesLeast) return channel;
-  const std::vector<Group> groups = groups_of(channel, nodes, step);
-  Course course = smooth(groups, nodes.count());
-  for (int pass = 0; pass < kPasses; ++pass) {
-    const bool normal_bends = pass < kPassesSmooth;
-    Course next = improved(course, groups, normal_bends);
-    const bool is_settled = !normal_bends && moved(course.m, next.m) < kSettled;
-    course = std::move(next);
-    if (is_settled) break;
+double noise_before_rounding(std::span<const Channel* const> channels, double step) {
+  std::vector<Search> all;
+  for (const Channel* channel : channels) {
+    if (Search::is_possible(*channel)) all.emplace_back(*channel, step, kNoiseAtFirst);
   }
+  double sigma = kNoiseAtFirst;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    for (Search& each : all) each.pass(pass < kPassesSmooth);
+    if (pass < kPassesSmooth) continue;
+    const auto likely = [&](double noise) {
+      double sum = 0.0;
+      for (const Search& each : all) sum += each.log_likelihood(noise);
+      return sum;
+    };
+    const double by = top_of(likely(sigma / kNoiseStep), likely(sigma), likely(sigma * kNoiseStep));
+    sigma = std::clamp(sigma * std::pow(kNoiseStep, by), kNoiseLeast, kNoiseMost);
+    for (Search& each : all) each.set_noise(sigma);
+    if (std::abs(by) < kNoiseSettled) break;
+  }
+  return sigma;
+}
+
+Channel unrounded(const Channel& channel, double step, double noise) {
+  if (!Search::is_possible(channel)) return channel;
+  Search search(channel, step, noise);
+  const auto settle = [&](int first) {
+    for (int pass = first; pass < kPasses; ++pass) {
+      const bool normal_bends = pass < kPassesSmooth;
+      if (search.pass(normal_bends) < kSettled && !normal_bends) break;
+    }
+  };
+  settle(0);
+  search.hold_where_held();
+  settle(kPassesSmooth);
   Channel out = channel;
   for (std::size_t i = 0; i < channel.value.size(); ++i) {
     const double value = channel.value[i] / step;
-    const double here = at(course.m, nodes.of(channel.t_s[i]));
+    const double here = search.course_at(channel.t_s[i]);
     const double nearest = value + std::round(here - value);
-    const Rounded all = rounded(here - nearest, course.sigma);
-    const double noise = value - here - all.mean_off;
-    const double larger = std::max(std::sqrt(all.variance), course.sigma);
-    out.value[i] = step * (here + noise * course.sigma / larger);
+    const Rounded all = rounded(here - nearest, noise);
+    const double left = value - here - all.mean_off;
+    const double larger = std::max(std::sqrt(all.variance), noise);
+    out.value[i] = step * (here + left * noise / larger);
   }
   return out;
 }

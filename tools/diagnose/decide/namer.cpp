@@ -169,15 +169,10 @@ double half_step(const Campaign& campaign, const Slot& slot) {
 // As much as a pressure that passes its steps is off by on the fastest ramp, in time: so late or
 // early it may seem in all that pass the same steps. 0: it moves in none beyond its noise.
 double late_of_passed_s(const Campaign& campaign) {
-  // Of the rounding's sigma, in the course that was found from the samples. Measured, four
-  // campaigns of other make with steps of 40 kPa: 3 to 10 % of the step over half a second, of 29 %
-  // before. A fifth less: one of the two healthy ones that it is for has its lag again; more: the
-  // same.
-  constexpr double kLeft = 0.2;
   double left_Pa = 0.0, fastest_Pa_s = 0.0;
   for (const ExperimentData& run : campaign.runs) {
     if (run.valid_count == 0) continue;
-    left_Pa = std::max(left_Pa, kLeft * run.rounding_pressure_Pa);
+    left_Pa = std::max(left_Pa, run.left_of_rounding_Pa);
     fastest_Pa_s = std::max(fastest_Pa_s, conditions_of(run).rate_Pa_s);
   }
   return fastest_Pa_s > 0.0 ? left_Pa / fastest_Pa_s : 0.0;

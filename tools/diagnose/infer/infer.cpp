@@ -47,15 +47,43 @@ double torque_out_zero_scatter(const Campaign& campaign) {
   return zero_scatter(campaign, Role::kSecondaryTorque, kTorqueOutZero);
 }
 
+// A pressure that rests on one step all along.
+bool rests_throughout(const ExperimentData& data) {
+  constexpr double kThroughout = 0.9;  // chosen, of the valid samples
+  double on_step = 0.0;
+  for (const Rest& rest : data.rests_pressure) {
+    if (rest.step != data.rests_pressure.front().step) continue;
+    on_step += static_cast<double>(
+        std::count(data.valid.begin() + rest.begin, data.valid.begin() + rest.end, true));
+  }
+  return on_step > kThroughout * data.valid_count;
+}
+
+// What the level of the friction scatters by, in usual scatters: a pressure that rests throughout
+// has it off by the same all along.
+double level_scatter(const Campaign& campaign, const ExperimentData& data) {
+  if (!rests_throughout(data)) return 1.0;
+  const estimator::VariatorParameters& variator = campaign.variator;
+  double sum_N = 0.0;
+  for (const auto& [begin, end] : data.stretches) {
+    sum_N +=
+        variator.secondary_piston_area_m2 * data.pressure.value.segment(begin, end - begin).sum() +
+        variator.secondary_spring_force_N * (end - begin);
+  }
+  const double mean_N = std::max(50.0, sum_N / std::max(data.valid_count, 1));
+  const double off = variator.secondary_piston_area_m2 * data.rounding_pressure_Pa / mean_N;
+  return std::hypot(1.0, off / kDefaultScatter[kLevel]);
+}
+
 std::array<ResidualColumns, kRandomEffects> random_columns(const Campaign& campaign, int run,
                                                            const ModelState& state,
                                                            const Residuals& at) {
   const auto n = at.foot.size();
   std::array<ResidualColumns, kRandomEffects> out;
   QuantityChange level, slip_offset, zero, zero_out, zero_track;
-  level.ln_capacity = ArrayXd::Ones(n);
-  out[0] = propagate(campaign, at, level);
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
+  level.ln_capacity = ArrayXd::Constant(n, level_scatter(campaign, data));
+  out[0] = propagate(campaign, at, level);
   // A speed that is held on one step of its rounding is off by the same all along.
   slip_offset.slip_share =
       ArrayXd::Constant(n, std::hypot(1.0, data.rounding_slip_share / kDefaultScatter[1]));
@@ -130,9 +158,12 @@ std::array<std::vector<Whitening::Rest>, kResidualKinds> rests_of(const Campaign
     }
     for (auto& [step, all] : by_step) out[static_cast<std::size_t>(kind)].push_back(std::move(all));
   };
-  add(data.rests_pressure, kFrictionResidual,
-      column(kLevel, kFrictionResidual) * per_force *
-          (variator.secondary_piston_area_m2 * data.rounding_pressure_Pa));
+  // The pressure's each for itself: where it has been between two steps was found for each.
+  if (!rests_throughout(data)) {
+    const ArrayXd by = column(kLevel, kFrictionResidual) * per_force *
+                       (variator.secondary_piston_area_m2 * data.rounding_pressure_Pa);
+    for (const Rest& rest : data.rests_pressure) add({rest}, kFrictionResidual, by);
+  }
   for (const ResidualKind kind : {kFrictionResidual, kBalanceResidual}) {
     add(data.rests_torque, kind,
         column(kTorqueZero, kind) *

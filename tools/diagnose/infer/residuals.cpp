@@ -554,7 +554,7 @@ NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& st
   }
   out.force_N = std::max({robust_sigma(force), 0.2,
                           campaign.variator.secondary_piston_area_m2 *
-                              rounding(&ExperimentData::rounding_pressure_Pa)});
+                              rounding(&ExperimentData::left_of_rounding_Pa)});
   out.tracking_Pa = std::max(robust_sigma(tracking), 20.0);
   return out;
 }

@@ -58,11 +58,13 @@ class Run {
     for (const SignalTable& table : request_.experiments) {
       steps_ = std::max(steps_, steps_of(table));
     }
-    for (const SignalTable& table : request_.experiments) widen(reached_, table);
-    for (const SignalTable& table : request_.held_out) widen(reached_, table);
+    std::vector<const SignalTable*> tables;
+    for (const SignalTable& table : request_.experiments) tables.push_back(&table);
+    for (const SignalTable& table : request_.held_out) tables.push_back(&table);
+    sensors_ = sensors_of(tables);
     runs.resize(request_.experiments.size());
     in_parallel(request_.jobs, runs.size(), [&](std::size_t i) {
-      runs[i] = prepare(request_.experiments[i], request_.model.variator, reached_);
+      runs[i] = prepare(request_.experiments[i], request_.model.variator, sensors_);
       // From here on the grid is all that counts; half of the memory that an hour takes.
       if (!request_.with_plots) request_.experiments[i] = {};
     });
@@ -295,7 +297,7 @@ class Run {
       std::vector<ExperimentData> runs;
       runs.reserve(request_.held_out.size());
       for (const SignalTable& table : request_.held_out) {
-        runs.push_back(prepare(table, request_.model.variator, reached_));
+        runs.push_back(prepare(table, request_.model.variator, sensors_));
       }
       held_out.runs = std::move(runs);
       held_out.slip_noise_share = estimate_slip_noise_shares(held_out, naming.nominal.state);
@@ -891,7 +893,7 @@ class Run {
   Steps steps_ = Steps::kFine;
   Eigen::VectorXd mu_height_;  // change of ln mu_max per column of the fit
   LeftOpen open_;              // of mu_max; empty where other errors are larger
-  Reaches reached_{};          // by what is fitted and what is held out
+  Sensors sensors_;            // by what is fitted and what is held out
 };
 
 }  // namespace
