@@ -14,7 +14,6 @@ namespace beltgrip::diagnose {
 namespace {
 
 using Eigen::ArrayXd;
-using Eigen::Index;
 
 // Five turns of a slow ramp; above the second line_test.h looks. The level is known from a little
 // beyond both.
