@@ -34,8 +34,9 @@ constexpr double kStray = 0.02, kStrayDensity = 0.1;  // one sample in fifty, an
 constexpr double kCornerBends = 3.0;
 constexpr std::size_t kCornerNodes = 2;
 // A hold lasts so many times as long as what it is entered and left by takes to pass a step.
-// Derived: where a wave turns it is on one step for up to 4.8 times as long.
-constexpr std::size_t kHeldTimes = 3, kHeldTimesAtTurn = 6;
+// Derived: where a wave turns it is on one step for up to 4.8 times as long; a ramp begins and ends
+// on one for once as long at most.
+constexpr double kHeldTimes = 3.0, kHeldTimesAtTurn = 6.0, kHeldTimesAtEnd = 1.5;
 constexpr double kHeldSlope = 1e-3;  // from a node to the next
 // Of the middle of its step, information: less than that of a dozen samples which noise takes over
 // its edge, and more than that of the corners at its ends.
@@ -354,9 +355,11 @@ class Search {
     for (std::size_t i = 0; i < all.size(); ++i) {
       const std::size_t before = i > 0 ? all[i - 1].size() : 0;
       const std::size_t after = i + 1 < all.size() ? all[i + 1].size() : 0;
-      const bool turns = before > 0 && after > 0 && all[i - 1].on == all[i + 1].on;
-      const std::size_t times = turns ? kHeldTimesAtTurn : kHeldTimes;
-      if (all[i].size() < times * std::max({before, after, std::size_t{1}})) continue;
+      const bool is_end = before == 0 || after == 0;
+      const bool turns = !is_end && all[i - 1].on == all[i + 1].on;
+      const double times = is_end ? kHeldTimesAtEnd : turns ? kHeldTimesAtTurn : kHeldTimes;
+      const auto passing = static_cast<double>(std::max({before, after, std::size_t{1}}));
+      if (static_cast<double>(all[i].size()) < times * passing) continue;
       course_.holds.push_back(
           {all[i].begin + before, all[i].end - after, static_cast<double>(all[i].on)});
     }

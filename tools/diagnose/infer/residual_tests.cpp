@@ -41,17 +41,17 @@ constexpr std::array<Side, 3> kSides{
         return run.stop[static_cast<std::size_t>(k)] == kLowStop ? -1.0 : 1.0;
       }}}};
 
-struct Injection {
+struct TestPoint {
   const char* acts_on;
   double unit;  // share, share, Nm
   ArrayXd QuantityChange::*into;
 };
-const std::array<Injection, 3> kInjections{{{"friction", 0.05, &QuantityChange::ln_capacity},
+const std::array<TestPoint, 3> kTestPoints{{{"friction", 0.05, &QuantityChange::ln_capacity},
                                             {"ratio", 2e-3, &QuantityChange::slip_share},
                                             {"torque", 2.0, &QuantityChange::torque}}};
 
 ResidualColumns step_columns(const Campaign& campaign, int run, const Residuals& at,
-                             const Side& what, const Injection& where) {
+                             const Side& what, const TestPoint& where) {
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   ArrayXd sides = ArrayXd::Zero(data.size());
   for (int k = 0; k < data.size(); ++k) {
@@ -122,7 +122,7 @@ std::vector<ResidualTest> test_residuals(const Engine& engine, const ModelState&
   const ExtraColumns extra = [&](int run, const Residuals& at) {
     std::vector<ResidualColumns> columns;
     for (const Side& what : kSides) {
-      for (const Injection& where : kInjections) {
+      for (const TestPoint& where : kTestPoints) {
         columns.push_back(step_columns(campaign, run, at, what, where));
       }
     }
@@ -139,7 +139,7 @@ std::vector<ResidualTest> test_residuals(const Engine& engine, const ModelState&
   const Fit none = fit_linear(summaries, base, prior, default_scatter(), kScatterIterations);
   int column = static_cast<int>(n);
   for (const Side& what : kSides) {
-    for (const Injection& where : kInjections) {
+    for (const TestPoint& where : kTestPoints) {
       std::vector<int> columns = base;
       columns.push_back(column++);
       double energy = 0.0;
