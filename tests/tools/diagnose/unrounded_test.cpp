@@ -113,6 +113,25 @@ TEST(Unrounded, AHoldIsTowardsTheValueThatNoiseTakesItTo) {
   EXPECT_NEAR(mean / kStep, kHold, 0.03);
 }
 
+// One that jumps from sample to sample says nothing, and takes nothing from the others.
+TEST(NoiseBeforeRounding, IsToldBesideAChannelThatJumpsAllTheTime) {
+  Noise next;
+  Channel crosses, jumps;
+  for (int i = 0; i < 3000; ++i) {
+    const double t_s = kSample_s * i;
+    crosses.t_s.push_back(t_s);
+    crosses.value.push_back(kStep * std::round(ramp(t_s) + 0.1 * next()));
+    jumps.t_s.push_back(t_s);
+    jumps.value.push_back(kStep * (i % 2 == 0 ? 10.0 : 20.0));
+  }
+  const std::array<const Channel*, 2> both{&crosses, &jumps};
+  EXPECT_NEAR(noise_before_rounding(both, kStep), 0.1, 0.02);
+  for (const double value : unrounded(jumps, kStep, 0.1).value) {
+    ASSERT_GE(value, 9.0 * kStep);
+    ASSERT_LE(value, 21.0 * kStep);
+  }
+}
+
 // What jumps and turns is not followed through its corners; that is no noise.
 TEST(NoiseBeforeRounding, IsNoneOfTheCorners) {
   Noise next;

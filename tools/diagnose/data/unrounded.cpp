@@ -23,7 +23,7 @@ constexpr double kBendsPerMedian = 1.5;  // derived: half of those of 5 degrees 
 constexpr int kPasses = 20, kPassesSmooth = 5;
 constexpr double kSettled = 1e-3;
 // Of a sample: where it says nothing of where the course is, that stays.
-constexpr double kToldLeast = 1e-3;
+constexpr double kToldLeast = 1e-3, kStays = 1e-6;
 constexpr double kJumpSteps = 3.0;  // from a sample to the next
 // Of the search for the noise: a step of it, as a factor, and a share of one that ends it.
 constexpr double kNoiseAtFirst = 0.2;
@@ -145,6 +145,11 @@ struct Banded {
     second[k - 1] += weight;
   }
 
+  // Where no sample says anything, as where a channel jumps all the time.
+  void stay(std::size_t k, double at) {
+    diagonal[k] += kStays;
+    right[k] += kStays * at;
+  }
   void add_slope(std::size_t k, double weight) {
     diagonal[k] += weight;
     diagonal[k + 1] += weight;
@@ -210,11 +215,12 @@ struct Course {
   std::vector<Hold> holds;
 };
 
-// As if rounding were noise, and bends were normal.
-Course smooth(const std::vector<Group>& groups, std::size_t nodes, double sigma) {
+// As if rounding were noise, and bends were normal. middle: of the channel.
+Course smooth(const std::vector<Group>& groups, std::size_t nodes, double sigma, double middle) {
   Course out;
   out.sigma = sigma;
   Banded equations(nodes);
+  for (std::size_t k = 0; k < nodes; ++k) equations.stay(k, middle);
   for (const Group& group : groups) {
     const double weight = group.count / (out.sigma * out.sigma);
     equations.add(group.place, weight);
@@ -244,6 +250,7 @@ double ln_likelihood(double value, double here, double sigma) {
 Banded equations_at(const Course& from, const std::vector<Group>& groups, bool normal_bends) {
   const std::size_t nodes = from.m.size();
   Banded out(nodes);
+  for (std::size_t k = 0; k < nodes; ++k) out.stay(k, from.m[k]);
   for (const Group& group : groups) {
     const double here = at(from.m, group.place);
     const Within noise = noise_of(group.value, here, from.sigma);
@@ -298,6 +305,11 @@ Rounded rounded(double off, double sigma) {
   return {mean - off, std::max(square - mean * mean, 0.0)};
 }
 
+double middle_of(const Channel& channel) {
+  std::vector<double> values = channel.value;
+  return estimator::median(values);
+}
+
 double moved(const std::vector<double>& from, const std::vector<double>& to) {
   double out = 0.0;
   for (std::size_t k = 0; k < to.size(); ++k) out = std::max(out, std::abs(to[k] - from[k]));
@@ -310,7 +322,7 @@ class Search {
   Search(const Channel& channel, double step, double sigma)
       : nodes_(channel),
         groups_(groups_of(channel, nodes_, step)),
-        course_(smooth(groups_, nodes_.count(), sigma)) {}
+        course_(smooth(groups_, nodes_.count(), sigma, middle_of(channel) / step)) {}
   static bool is_possible(const Channel& channel) {
     constexpr std::size_t kNodesLeast = 4;
     return !channel.empty() && Nodes(channel).count() >= kNodesLeast;
