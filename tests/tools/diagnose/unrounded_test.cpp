@@ -147,6 +147,19 @@ TEST(NoiseBeforeRounding, IsNoneOfTheCorners) {
   EXPECT_NEAR(noise_before_rounding({&alone, 1}, kStep), 0.1, 0.05);
 }
 
+// The values of a channel with an offset are no multiples of its step.
+TEST(Unrounded, AHeldValueIsNowhereElseWhereTheStepsBeginElsewhere) {
+  constexpr double kOffset = 0.4;
+  Channel channel;
+  for (int i = 0; i < 500; ++i) {
+    channel.t_s.push_back(kSample_s * i);
+    channel.value.push_back((7.0 + kOffset) * kStep);
+  }
+  for (const double value : unrounded(channel, kStep, 0.1).value) {
+    EXPECT_NEAR(value, (7.0 + kOffset) * kStep, 0.05 * kStep);
+  }
+}
+
 // Held on one value, nothing says where between its neighbours: it stays within its step.
 TEST(Unrounded, AHeldValueIsNowhereElse) {
   Channel channel;

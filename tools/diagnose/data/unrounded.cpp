@@ -322,7 +322,8 @@ class Search {
   Search(const Channel& channel, double step, double sigma)
       : nodes_(channel),
         groups_(groups_of(channel, nodes_, step)),
-        course_(smooth(groups_, nodes_.count(), sigma, middle_of(channel) / step)) {}
+        course_(smooth(groups_, nodes_.count(), sigma, middle_of(channel) / step)),
+        phase_(std::remainder(channel.value.front() / step, 1.0)) {}
   static bool is_possible(const Channel& channel) {
     constexpr std::size_t kNodesLeast = 4;
     return !channel.empty() && Nodes(channel).count() >= kNodesLeast;
@@ -359,7 +360,7 @@ class Search {
     std::vector<Dwell> all;
     const std::vector<double>& m = course_.m;
     for (std::size_t k = 0; k < m.size(); ++k) {
-      const long on = std::lround(m[k]);
+      const long on = std::lround(m[k] - phase_);
       if (all.empty() || all.back().on != on) all.push_back({k, k, on});
       all.back().end = k + 1;
     }
@@ -373,7 +374,7 @@ class Search {
       const auto passing = static_cast<double>(std::max({before, after, std::size_t{1}}));
       if (static_cast<double>(all[i].size()) < times * passing) continue;
       course_.holds.push_back(
-          {all[i].begin + before, all[i].end - after, static_cast<double>(all[i].on)});
+          {all[i].begin + before, all[i].end - after, static_cast<double>(all[i].on) + phase_});
     }
   }
   double course_at(double t_s) const { return at(course_.m, nodes_.of(t_s)); }
@@ -391,6 +392,7 @@ class Search {
   Nodes nodes_;
   std::vector<Group> groups_;
   Course course_;
+  double phase_;  // of the values that are read, as those of a channel with an offset
 };
 
 // Where a parabola through three values has its top, in steps from the middle one; at most one.
