@@ -36,6 +36,8 @@ constexpr std::size_t kCornerNodes = 2;
 // A hold lasts so many times as long as what it is entered and left by takes to pass a step.
 // Derived: where a wave turns it is on one step for up to 4.8 times as long; a ramp begins and ends
 // on one for once as long at most.
+// kHeldTimesAtEnd a fifth less: one of eleven healthy campaigns of other make alarms; a fifth more,
+// and kStays either way: the same.
 constexpr double kHeldTimes = 3.0, kHeldTimesAtTurn = 6.0, kHeldTimesAtEnd = 1.5;
 constexpr double kHeldSlope = 1e-3;  // from a node to the next
 // Of the middle of its step, information: less than that of a dozen samples which noise takes over
