@@ -59,6 +59,7 @@ class Run {
       steps_ = std::max(steps_, steps_of(table));
     }
     std::vector<const SignalTable*> tables;
+    tables.reserve(request_.experiments.size() + request_.held_out.size());
     for (const SignalTable& table : request_.experiments) tables.push_back(&table);
     for (const SignalTable& table : request_.held_out) tables.push_back(&table);
     sensors_ = sensors_of(tables);
