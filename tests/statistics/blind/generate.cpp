@@ -1,5 +1,6 @@
 // Writes one recording of the generator as CSV files, a configuration and the truth.
 //   generate DIRECTORY trial NUMBER                     that trial of the blind test
+//   generate DIRECTORY open NUMBER                      that trial of `rounds`
 //   generate DIRECTORY SEED [equal] [EFFECT.PARAMETER SIZE]...  SIZE in units of the usual size;
 //                                                       equal: the same ramp twelve times
 #include <charconv>
@@ -11,13 +12,14 @@
 
 #include "tests/statistics/blind/blind_trial.h"
 #include "tests/statistics/blind/generator.h"
+#include "tests/statistics/blind/rounds.h"
 
 int main(int argc, char** argv) {
   using namespace beltgrip::blind;
   if (argc < 3) {
     std::fprintf(
         stderr,
-        "usage: generate DIRECTORY trial NUMBER | SEED [equal] [EFFECT.PARAMETER SIZE]...\n");
+        "usage: generate DIRECTORY trial|open NUMBER | SEED [equal] [EFFECT.PARAMETER SIZE]...\n");
     return 64;
   }
   const std::filesystem::path directory = argv[1];
@@ -30,6 +32,8 @@ int main(int argc, char** argv) {
   };
   if (std::strcmp(argv[2], "trial") == 0 && argc == 4) {
     trial = draw_envelope(static_cast<std::uint64_t>(number(argv[3]))).trial;
+  } else if (std::strcmp(argv[2], "open") == 0 && argc == 4) {
+    trial = draw_open_trial(static_cast<std::uint64_t>(number(argv[3])));
   } else {
     trial.seed = static_cast<std::uint64_t>(number(argv[2]));
     Random random(trial.seed);

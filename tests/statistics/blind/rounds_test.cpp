@@ -33,5 +33,17 @@ TEST(Rounds, WhatIsOpenIsFoundByTheRecommendedExperiment) {
   }
 }
 
+// An offset of the pressure and a loss that grows with speed, each at one speed; a speed that is
+// off in equal ramps. A force of the turning oil and a gain of the torque of a fifth fit better
+// there by how they weigh the noise.
+TEST(Diagnosed, NoiseNamesNothing) {
+  for (const std::uint64_t number : {8141U, 8074U}) {
+    const Round first = diagnosed(draw_open_trial(number));
+    EXPECT_TRUE(first.standing == Standing::kInClass || first.standing == Standing::kAlone)
+        << number << ": " << first.answer;
+  }
+  EXPECT_EQ(diagnosed(draw_open_trial(7013)).answer, "");
+}
+
 }  // namespace
 }  // namespace beltgrip::blind

@@ -8,13 +8,13 @@
 #include <set>
 
 #include "estimator/statistics/distributions.h"
+#include "tools/diagnose/decide/by_course.h"
 #include "tools/diagnose/decide/rivals.h"
 #include "tools/diagnose/decide/unknown.h"
 #include "tools/diagnose/infer/conditions.h"
 #include "tools/diagnose/infer/gain.h"
 #include "tools/diagnose/infer/parallel.h"
 #include "tools/diagnose/infer/scatter_base.h"
-#include "tools/diagnose/infer/slow_gain.h"
 #include "tools/diagnose/infer/uncertainty.h"
 
 namespace beltgrip::diagnose {
@@ -66,10 +66,6 @@ constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
 constexpr double kSmallLnOdds = 12.0;
 // Where something else is so much more probable that cannot be, for its size, neither is it.
 constexpr double kUnlikely = 0.01;
-// Of the gain: what does not lie in the course of the residuals. Measured, campaigns of other make:
-// 0.79 and 0.81 in the two healthy ones that were named (404, 111), 0.35 at most in ten names of
-// others but one (148, wrong, 1.8). A fifth less or more: the same.
-constexpr double kOfNoise = 0.5;
 constexpr double kDisagreement = 0.05;   // p of a size that experiments do not agree on
 constexpr double kLeftOutMin = 0.0;      // of the log predictive density
 constexpr double kLeftOutPlain = 200.0;  // the same: beyond doubt, however few experiments show it
@@ -381,8 +377,15 @@ bool stands_beside(const Engine& engine, const Hypothesis& rival, int of_rival, 
   });
 }
 
+// A gain takes the noise of its channel along.
+bool is_gain(const Engine& engine, int slot) {
+  const EffectRow& row = *engine.campaign().slots[static_cast<std::size_t>(slot)].row;
+  return row.stage == Stage::kMeasurement && row.unit.empty() && is_slow(engine, slot);
+}
+
 struct Promotion {
   Hypothesis hypothesis;
+  double by_course;  // its log evidence, without what lies in no course of the residuals
   int slot, instead_of;
 };
 
@@ -443,32 +446,37 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
       if (!rival || rival->is_given_up()) continue;
       const Hypothesis& other = *rival;
       if (parts_experiments(without.fit.scatter, other.fit.scatter)) continue;
-      const double bar = promoted ? promoted->hypothesis.log_evidence
-                                  : whole.log_evidence + std::log(kPromotedOdds);
+      const bool in_curve = is_in_curve(naming, ranked[i].second);
+      double by_course =
+          other.log_evidence + ahead_by_noise(engine, out.slot, whole, ranked[i].second, other);
+      // What the curve could do as well is no name, and leaves none in its place either way.
+      if (in_curve) by_course = std::max(by_course, other.log_evidence);
+      const double bar =
+          promoted ? promoted->by_course : whole.log_evidence + std::log(kPromotedOdds);
       const double ln_odds = other.log_evidence - without.log_evidence;
-      if (other.log_evidence > bar && credible(engine, other) &&
+      if (by_course > bar && credible(engine, other) &&
           is_worth_a_name(engine, ranked[i].second, other.state.effects[ranked[i].second],
                           ln_odds)) {
-        promoted = Promotion{other, ranked[i].second, out.slot};
+        promoted = Promotion{other, by_course, ranked[i].second, out.slot};
       }
-      if (is_in_curve(naming, ranked[i].second)) continue;  // never a name
       out.is_of_sensors |=
           !is_beyond_sensors(engine, ranked[i].second, other.state.effects[ranked[i].second]) &&
-          other.log_evidence > whole.log_evidence - std::log(kClassOdds);
-      if (other.log_evidence > whole.log_evidence &&
+          by_course > whole.log_evidence - std::log(kClassOdds);
+      if (by_course > whole.log_evidence &&
           stands_beside(engine, other, ranked[i].second, ln_odds, out.slot)) {
         continue;
       }
-      evidence[id_of(engine, ranked[i].second)].push_back(other.log_evidence);
+      evidence[id_of(engine, ranked[i].second)].push_back(by_course);
       if (id_of(engine, ranked[i].second) != id_of(engine, out.slot) &&
-          other.log_evidence > whole.log_evidence - std::log(kClassOdds)) {
+          by_course > whole.log_evidence - std::log(kClassOdds)) {
         out.aliases.push_back(ranked[i].second);
-        if (credible(engine, other)) out.in_its_place.push_back(other);
+        if (credible(engine, other) && !in_curve) out.in_its_place.push_back(other);
       }
     }
     std::vector<double> all{without.log_evidence};
     for (const auto& [id, values] : evidence) all.push_back(ln_sum(values));
     out.ln_odds = whole.log_evidence - without.log_evidence;
+    out.is_of_noise = is_gain(engine, out.slot) && is_of_noise(engine, without, whole);
     out.probability = std::exp(ln_sum(evidence[id_of(engine, out.slot)]) - ln_sum(all));
     naming.accepted.push_back(out);
   }
@@ -527,7 +535,7 @@ void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& 
     const auto doubtful =
         std::find_if(naming.accepted.begin(), naming.accepted.end(), [&](const Accepted& each) {
           const double size = naming.hypothesis.state.effects[each.slot];
-          return each.ln_odds < std::log(kThereOdds) || each.is_of_sensors ||
+          return each.ln_odds < std::log(kThereOdds) || each.is_of_sensors || each.is_of_noise ||
                  !credible(engine, each.slot, size) ||
                  !is_worth_a_name(engine, each.slot, size, each.ln_odds) ||
                  each.probability < kUnlikely ||
@@ -541,19 +549,17 @@ void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& 
   }
 }
 
-// A constant of the machine by another name that fits better mostly by how it weighs the noise:
-// null, none does.
+// A gain, or a constant of the machine by another name, that fits better mostly by how it weighs
+// the noise: null, none does.
 std::optional<int> gains_by_noise(Engine& engine, const Naming& naming) {
   const std::vector<int>& set = engine.accepted();
   const Hypothesis whole = engine.refine(set, 3);
   for (const int slot : set) {
-    if (!engine.is_constant(slot)) continue;
+    if (!is_gain(engine, slot) && !engine.is_constant(slot)) continue;
     std::vector<int> others = set;
     std::erase(others, slot);
     const Hypothesis without = without_slot(engine, naming, others);
-    if (mends_machine(without, whole)) continue;
-    const double gain = 2.0 * (whole.log_likelihood - without.log_likelihood);
-    if (gain_of_noise(engine, without, whole) > kOfNoise * gain) return slot;
+    if (is_of_noise(engine, without, whole)) return slot;
   }
   return std::nullopt;
 }

@@ -56,10 +56,12 @@ Gains gains_of(const Engine& engine, int run, Residuals& at, const InjectionRow&
     scatter.diagonal() += (1.0 / engine.scatter().variance).matrix();
     const Eigen::MatrixXd own = sums.aa - sums.ua.transpose() * solved_llt(scatter, sums.ua);
     for (int i = 0; i < count; ++i) {
-      const Eigen::Vector2d score = own.block<2, 1>(2 * i, 2 * count);
-      Eigen::Matrix2d information = own.block<2, 2>(2 * i, 2 * i);
+      const Eigen::Index at_sine = Eigen::Index{2} * i;
+      const Eigen::Vector2d score = own.col(Eigen::Index{2} * count).segment<2>(at_sine);
+      Eigen::Matrix2d information = own.block<2, 2>(at_sine, at_sine);
       information.diagonal().array() += 1.0;  // of a usual size, and where nothing tells
-      out.of[static_cast<std::size_t>(first + i)] = score.dot(information.inverse() * score);
+      out.of[static_cast<std::size_t>(first) + static_cast<std::size_t>(i)] =
+          score.dot(information.inverse() * score);
     }
   }
   return out;
