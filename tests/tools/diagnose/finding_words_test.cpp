@@ -81,5 +81,18 @@ TEST(Headline, IsOneSentence) {
             "96 % of what was wrong; with it primary_torque is off by 0.33 Nm instead of 1.6 Nm.");
 }
 
+TEST(Headline, SaysWhatMayStandInThePlaceOfAFinding) {
+  Diagnosis d;
+  d.verdict = Verdict::kExplained;
+  d.findings = {drag()};
+  const std::string drag_text =
+      "A drag that grows with the clamp force, 0.503 +- 0.01 Nm/kN (torque_loss)";
+  d.findings[0].aliases = {"friction_load"};
+  EXPECT_EQ(headline(d), drag_text + ", or friction_load in its place, explains what was wrong.");
+  d.findings[0].aliases = {"a", "b", "c", "d"};
+  EXPECT_EQ(headline(d),
+            drag_text + ", or a or b or c or others in its place, explains what was wrong.");
+}
+
 }  // namespace
 }  // namespace beltgrip::diagnose

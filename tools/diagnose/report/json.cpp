@@ -362,6 +362,17 @@ std::string gain_text(const Diagnosis& d) {
          " instead of " + told(best->first, best->second.before);
 }
 
+// What may stand in the place of a finding; the first of many.
+std::string class_text(const Finding& finding) {
+  constexpr std::size_t kMost = 3;
+  std::string out;
+  for (std::size_t i = 0; i < std::min(finding.aliases.size(), kMost); ++i) {
+    out += (i == 0 ? ", or " : " or ") + finding.aliases[i];
+  }
+  if (out.empty()) return out;
+  return out + (finding.aliases.size() > kMost ? " or others" : "") + " in its place,";
+}
+
 }  // namespace
 
 std::string headline(const Diagnosis& d) {
@@ -372,7 +383,7 @@ std::string headline(const Diagnosis& d) {
     return text;
   };
   for (const Finding& finding : d.findings) {
-    found += (found.empty() ? "" : " and ") + in_words(finding);
+    found += (found.empty() ? "" : " and ") + in_words(finding) + class_text(finding);
   }
   for (const LearnedFinding& each : d.learned) {
     found += (found.empty() ? "" : " and ") + sentence(each);
