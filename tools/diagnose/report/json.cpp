@@ -362,8 +362,8 @@ std::string gain_text(const Diagnosis& d) {
          " instead of " + told(best->first, best->second.before);
 }
 
-// What may stand in the place of a finding. Chosen: the first three, so that the sentence is read to
-// its end; all stand beside the finding below it. Another number changes the sentence alone.
+// What may stand in the place of a finding. Chosen: the first three, so that the sentence is read
+// to its end; all stand beside the finding below it. Another number changes the sentence alone.
 std::string class_text(const Finding& finding) {
   constexpr std::size_t kMost = 3;
   std::string out;
