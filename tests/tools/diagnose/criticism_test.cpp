@@ -4,8 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
+#include "tests/tools/diagnose/recorded_runs.h"
 #include "tools/diagnose/decide/learn.h"
+#include "tools/diagnose/decide/namer.h"
 #include "tools/diagnose/infer/index_variables.h"
 
 namespace beltgrip::diagnose {
@@ -139,6 +142,35 @@ TEST(Acceleration, IsNoneWhereAShaftIsHeld) {
   EXPECT_TRUE((variable("acceleration")->value(run, 0) == 0.0).all());
   moves(run.omega_s, 300.0, 0.08);
   EXPECT_TRUE((variable("acceleration")->value(run, 0) == run.omega_p.slow_slope).all());
+}
+
+// The more experiments tell it, the less it may be. By tables of F: 14.33 is exceeded in one of a
+// thousand by 9 over 7 degrees of freedom.
+TEST(ScatterLimit, FollowsFromHowWellItIsTold) {
+  EXPECT_NEAR(scatter_limit(2.5, 9), 3.75, 1e-12);
+  EXPECT_LT(scatter_limit(2.5, 40), scatter_limit(2.5, 6));
+  EXPECT_NEAR(replicate_limit(10, 7.0), std::sqrt(14.33), 0.01);
+  EXPECT_LT(replicate_limit(10, 12.0), replicate_limit(10, 7.0));
+}
+
+// A belt whose friction differs by 0.8 % from one experiment to the next, as healthy ones may, and
+// one of 2.5 %; the same draws.
+TEST(Scatter, OfTheFrictionThatBeltsHaveIsNoFinding) {
+  const auto passes = [](double scatter) {
+    blind::Trial trial;
+    trial.seed = 5006;
+    blind::Random random(trial.seed);
+    trial.machine = blind::draw_machine(random);
+    trial.machine.scatter_friction = scatter;
+    trial.plan = blind::draw_plan(random, trial.machine.setting, 8);
+    Engine engine(campaign_of(trial));
+    name_effects(engine, [] { return false; });
+    const Criticism criticism = criticise(engine, Steps::kFine);
+    return criticism.test("scatter_friction").passed() &&
+           criticism.test("unusual_friction").passed();
+  };
+  EXPECT_TRUE(passes(0.008));
+  EXPECT_FALSE(passes(0.025));
 }
 
 // A belt that seats anew by more than belts do. Ten times what is usual: a hundredth is usual.

@@ -104,6 +104,21 @@ TEST(TorqueDelay, IsNoNameWhereTheTorqueIsHeld) {
   EXPECT_FALSE(is_named(naming, engine, "torque_delay"));
 }
 
+// Slip alone moves them there.
+TEST(SpeedsMove, NotInRampsAtOneSpeed) { EXPECT_FALSE(campaign_of(equal_ramps()).speeds_move); }
+
+TEST(ChannelSkew, OfASpeedIsOneWhereTheyMove) {
+  blind::Trial trial;
+  trial.seed = 4;
+  blind::Random random(trial.seed);
+  trial.plan = blind::draw_plan(random, trial.machine.setting, 8);
+  trial.planted.push_back({"channel_skew", {{"delay_s", 0.05}}, "secondary_speed"});
+  Engine engine(campaign_of(trial));
+  EXPECT_TRUE(engine.campaign().speeds_move);
+  const Naming naming = name_effects(engine, [] { return false; });
+  EXPECT_TRUE(is_named(naming, engine, "channel_skew"));
+}
+
 // Of a pressure that is held there is its noise alone, which a lag takes off.
 TEST(PressureMoves, NotByItsNoise) {
   const estimator::VariatorParameters variator;

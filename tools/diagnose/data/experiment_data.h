@@ -103,6 +103,10 @@ struct Spread {
 };
 Spread spread_of(const ExperimentData& run, const GridSignal& signal);
 
+// Who moves the speed moves both shafts. One that is held gives way a little where the belt begins
+// to slip, and the other one by the slip. False without valid samples.
+bool shafts_move(const ExperimentData& run);
+
 // Both slow copies, from value.
 void add_slow(GridSignal& signal, double dt_s);
 

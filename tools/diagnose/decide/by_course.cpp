@@ -10,8 +10,7 @@ namespace {
 
 // Of the gain: what does not lie in the course of the residuals. Measured, campaigns of other make:
 // 0.79 and 0.81 in the two healthy ones that were named (404, 111), 0.35 at most in ten names of
-// others but one (148, wrong, 1.8). A fifth less or more: the same. Of gains of a channel it takes
-// one wrong name of another outsider's (512), and one in the place of a right one (135).
+// others but one (148, wrong, 1.8). A fifth less or more: the same.
 constexpr double kOfNoise = 0.5;
 // Of the log evidence. Chosen: the most that was found to be noise in a comparison of two names
 // that both stood is 50; what is ahead by twice that is ahead. A fifth less or more: the same in

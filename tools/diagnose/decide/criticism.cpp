@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "estimator/statistics/distributions.h"
 #include "tools/diagnose/decide/thresholds.h"
 #include "tools/diagnose/infer/residual_tests.h"
 #include "tools/diagnose/infer/slow_line.h"
@@ -84,6 +85,21 @@ double decades(double p) { return -std::log10(std::max(p, 1e-300)); }
 
 }  // namespace
 
+double scatter_limit(double usual_most, std::size_t experiments) {
+  const double degrees = std::max(static_cast<double>(experiments) - 1.0, 1.0);
+  return usual_most * (1.0 + thresholds::kScatterSigmas / std::sqrt(2.0 * degrees));
+}
+
+double replicate_limit(std::size_t experiments, double degrees) {
+  const double own = std::max(static_cast<double>(experiments) - 1.0, 1.0);
+  double low = 1.0, high = 1e3;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (estimator::f_p(middle, own, degrees) > thresholds::kScatterChance ? low : high) = middle;
+  }
+  return std::sqrt(low);
+}
+
 const Cell* own_shape(const Campaign& campaign, const std::vector<int>& accepted,
                       const std::vector<Cell>& cells) {
   const Cell* out = nullptr;
@@ -126,6 +142,14 @@ Criticism criticise(const Engine& engine, Steps steps) {
   if (const Cell* own = own_shape(engine.campaign(), engine.accepted(), out.cells)) out.own = *own;
   const ScatterRatios ratio = scatter_ratios(engine, out.base.scatter);
   const ScatterRatios unusual = scatter_ratios(engine, default_scatter());
+  const auto unusual_limit = [&](double usual_most) {
+    return scatter_limit(usual_most, engine.summaries().size());
+  };
+  const auto limit = [&](double of_many, double usual_most) {
+    return out.base.from_replicates
+               ? std::max(of_many, replicate_limit(engine.summaries().size(), out.base.degrees))
+               : unusual_limit(usual_most);
+  };
   using namespace thresholds;
   out.tests = {
       {"law_cell", law, kLawCell},
@@ -137,12 +161,12 @@ Criticism criticise(const Engine& engine, Steps steps) {
       {"torque_swing", fine ? out.swing.excess : 0.0, kSwing},
       {"belt_passage", belt_line(engine.campaign(), out.belt_Hz), kBeltLine},
       {"whiteness", fine ? decades(least_whiteness(engine)) : 0.0, decades(kWhiteness)},
-      {"scatter_friction", ratio.friction, kScatterFriction},
-      {"scatter_ratio", ratio.ratio, out.base.from_replicates ? kScatterRatio : kUnusualRatio},
-      {"scatter_torque", ratio.torque, kScatterTorque},
+      {"scatter_friction", ratio.friction, limit(kScatterFriction, kUsualMostFriction)},
+      {"scatter_ratio", ratio.ratio, limit(kScatterRatio, kUsualMostRatio)},
+      {"scatter_torque", ratio.torque, limit(kScatterTorque, kUsualMostTorque)},
       {"unusual_scatter", std::max(unusual.friction, unusual.torque), kUnusualScatter},
-      {"unusual_ratio", unusual.ratio, kUnusualRatio},
-      {"unusual_friction", unusual.friction, kUnusualFriction},
+      {"unusual_ratio", unusual.ratio, unusual_limit(kUsualMostRatio)},
+      {"unusual_friction", unusual.friction, unusual_limit(kUsualMostFriction)},
   };
   return out;
 }

@@ -31,6 +31,12 @@ struct Criticism {
   const JudgedTest& test(const std::string& name) const;
 };
 
+// What so many experiments may scatter by, over the usual, where healthy machines differ by as much
+// as usual_most.
+double scatter_limit(double usual_most, std::size_t experiments);
+// What they may scatter by over a base that so many degrees of freedom tell: both are estimates.
+double replicate_limit(std::size_t experiments, double degrees);
+
 // At the engine's state. Where channels move in steps, these leave lines and slow courses of their
 // own: those tests are left out.
 Criticism criticise(const Engine& engine, Steps steps);

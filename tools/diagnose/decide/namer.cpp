@@ -249,6 +249,8 @@ bool credible(const Engine& engine, int slot, double size) {
   if (row.id == "torque_delay" && !engine.campaign().torque_moves) return false;
   const bool follows_pressure = row.id == "clamp_hysteresis" || shifts_pressure(which);
   if (follows_pressure && !engine.campaign().pressure_moves) return false;
+  const bool shifts_speed = row.id == "channel_skew" && !shifts_pressure(which);
+  if (shifts_speed && !engine.campaign().speeds_move) return false;
   const double whole = engine.campaign().switched_on[slot] + size;
   return std::abs(size) / row.typical < kBelievable && whole < row.high &&
          (whole > row.low || row.low == 0.0);
@@ -377,12 +379,6 @@ bool stands_beside(const Engine& engine, const Hypothesis& rival, int of_rival, 
   });
 }
 
-// A gain takes the noise of its channel along.
-bool is_gain(const Engine& engine, int slot) {
-  const EffectRow& row = *engine.campaign().slots[static_cast<std::size_t>(slot)].row;
-  return row.stage == Stage::kMeasurement && row.unit.empty() && is_slow(engine, slot);
-}
-
 struct Promotion {
   Hypothesis hypothesis;
   double by_course;  // its log evidence, without what lies in no course of the residuals
@@ -476,7 +472,6 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
     std::vector<double> all{without.log_evidence};
     for (const auto& [id, values] : evidence) all.push_back(ln_sum(values));
     out.ln_odds = whole.log_evidence - without.log_evidence;
-    out.is_of_noise = is_gain(engine, out.slot) && is_of_noise(engine, without, whole);
     out.probability = std::exp(ln_sum(evidence[id_of(engine, out.slot)]) - ln_sum(all));
     naming.accepted.push_back(out);
   }
@@ -535,7 +530,7 @@ void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& 
     const auto doubtful =
         std::find_if(naming.accepted.begin(), naming.accepted.end(), [&](const Accepted& each) {
           const double size = naming.hypothesis.state.effects[each.slot];
-          return each.ln_odds < std::log(kThereOdds) || each.is_of_sensors || each.is_of_noise ||
+          return each.ln_odds < std::log(kThereOdds) || each.is_of_sensors ||
                  !credible(engine, each.slot, size) ||
                  !is_worth_a_name(engine, each.slot, size, each.ln_odds) ||
                  each.probability < kUnlikely ||
@@ -549,13 +544,13 @@ void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& 
   }
 }
 
-// A gain, or a constant of the machine by another name, that fits better mostly by how it weighs
-// the noise: null, none does.
-std::optional<int> gains_by_noise(Engine& engine, const Naming& naming) {
+// A constant of the machine by another name that fits better mostly by how it weighs the noise:
+// null, none does.
+std::optional<int> constant_by_noise(Engine& engine, const Naming& naming) {
   const std::vector<int>& set = engine.accepted();
   const Hypothesis whole = engine.refine(set, 3);
   for (const int slot : set) {
-    if (!is_gain(engine, slot) && !engine.is_constant(slot)) continue;
+    if (!engine.is_constant(slot)) continue;
     std::vector<int> others = set;
     std::erase(others, slot);
     const Hypothesis without = without_slot(engine, naming, others);
@@ -570,7 +565,7 @@ std::optional<int> gains_by_noise(Engine& engine, const Naming& naming) {
 void drop_unconfirmed(Engine& engine, Naming& naming) {
   if (engine.summaries().size() < 3) return;
   for (;;) {
-    if (const std::optional<int> slot = gains_by_noise(engine, naming)) {
+    if (const std::optional<int> slot = constant_by_noise(engine, naming)) {
       naming.not_confirmed.push_back(*slot);
       drop(engine, naming, *slot);
       continue;

@@ -23,7 +23,6 @@ struct Accepted {
   std::vector<int> aliases;              // slots of other effects that fit as well
   std::vector<Hypothesis> in_its_place;  // with each of these instead
   bool is_of_sensors = false;            // one of them is an error that was stated of a sensor
-  bool is_of_noise = false;    // most of its gain lies in how it weighs the noise, not in a course
   double left_out_gain = 0.0;  // of the log predictive density of experiments left out of the fit
 };
 

@@ -43,20 +43,24 @@ inline constexpr double kWhiteness = 1e-9;
 // Of residuals that wander within experiments, rms, by as much as healthy ones differ from each
 // other: less is what sensors do.
 inline constexpr double kWander = 1.0;
-// Scatter between experiments over its base, standard deviations.
+// Scatter between experiments over that of replicates, standard deviations, where many tell it.
 inline constexpr double kScatterFriction = 2.2;
 inline constexpr double kScatterRatio = 3.3;
 inline constexpr double kScatterTorque = 2.2;
+// Chance that a healthy machine's is above the limit where few replicates tell the base, and few
+// experiments the scatter. Chosen: a thousandth of each test.
+inline constexpr double kScatterChance = 1e-3;
 // The same over what rigs usually scatter by, however much replicates do.
 inline constexpr double kUnusualScatter = 4.0;
-// Of the ratio. Derived: belts seat anew by up to 0.05 % of it from one experiment to the next, 3.3
-// times the usual, and a dozen experiments tell that to 22 %; two of these above. A fifth less: two
-// healthy campaigns of other make alarm (4.3 and 4.5); a fifth more: not run.
-inline constexpr double kUnusualRatio = 4.8;
-// Of the friction alone, which scatters less from rig to rig than seats and torque zeros do. Above
-// 95 of 96 healthy campaigns of other make (1.9, whatever scatters); the other's pressure moves in
-// steps of 20 kPa.
-inline constexpr double kUnusualFriction = 2.5;
+// What healthy machines differ by, in usual scatters; how well so many experiments tell it comes on
+// top (scatter_limit). Of the friction, 1 %: healthy machines of five generators of other make draw
+// 0.3 to 1 %, and less is of no consequence. Of the ratio: belts seat anew by up to 0.05 %. Of the
+// torque's zero: as before at a dozen experiments, 2.2.
+inline constexpr double kUsualMostFriction = 2.5;
+inline constexpr double kUsualMostRatio = 3.3;
+inline constexpr double kUsualMostTorque = 1.55;
+// Derived: sigmas of the estimate of a standard deviation that the limits leave.
+inline constexpr double kScatterSigmas = 2.0;
 
 // A function is learned where its variable was set at so many levels: the two outer ones lie
 // outside what the others cover, and three inner ones can be left out in turn.

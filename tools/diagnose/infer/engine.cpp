@@ -129,6 +129,7 @@ class Descent {
       scales_[static_cast<Index>(j)] = engine.scale(parameters[j]);
       columns_[j] = static_cast<int>(j);
     }
+    whitening_.random.clear();
   }
 
   void begin(const ModelState& start, const Scatter& scatter) {
@@ -260,7 +261,7 @@ class Descent {
   const Engine& engine_;
   const Campaign& campaign_;
   const std::vector<int>& parameters_;
-  const Whitening& whitening_;
+  Whitening whitening_;
   int scatter_iterations_;
   VectorXd scales_;
   std::vector<int> columns_;
@@ -362,6 +363,7 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model,
   for (const ExperimentData& run : out.runs) {
     out.torque_moves |= spread_of(run, run.torque).moves();
     out.pressure_moves |= spread_of(run, run.pressure).moves();
+    out.speeds_move |= shafts_move(run);
   }
   if (const auto ripple = model.effects.find("speed_ripple"); ripple != model.effects.end()) {
     out.known_ripples = ripple->second.parameters;

@@ -19,24 +19,9 @@ constexpr std::size_t kSamplesMin = 50;
 
 using estimator::LearnedVariable;
 
-// By how much a shaft's speed goes up and down in an experiment, of its mean.
-double sway(const ExperimentData& run, const ArrayXd& speed) {
-  double least = speed.maxCoeff(), most = speed.minCoeff(), sum = 0.0;
-  for (int k = 0; k < run.size(); ++k) {
-    if (!run.valid[static_cast<std::size_t>(k)]) continue;
-    least = std::min(least, speed[k]);
-    most = std::max(most, speed[k]);
-    sum += speed[k];
-  }
-  return (most - least) * run.valid_count / sum;
-}
-
-// Who moves the speed moves both shafts. One that is held gives way a little where the belt begins
-// to slip, and the other one by the slip: an acceleration that the friction makes.
+// That of a shaft that is held is what the friction makes.
 ArrayXd acceleration(const ExperimentData& run, int) {
-  constexpr double kHeld = 0.01;  // measured: 0.002 in rigs of other make
-  const bool is_held = std::min(sway(run, run.omega_p.slow), sway(run, run.omega_s.slow)) < kHeld;
-  return is_held ? ArrayXd::Zero(run.size()) : ArrayXd(run.omega_p.slow_slope);
+  return shafts_move(run) ? ArrayXd(run.omega_p.slow_slope) : ArrayXd::Zero(run.size());
 }
 
 template <LearnedVariable which>

@@ -40,7 +40,7 @@ struct Whitening {
   std::vector<std::array<std::vector<Rest>, kResidualKinds>> rest;  // per experiment; may be empty
   double cross = 0.0;  // correlation of the whitened friction and balance residuals
   std::vector<std::array<Eigen::ArrayXd, kResidualKinds>> weight;  // per experiment
-  // Columns of the random effects per experiment, whitened; the same for all hypotheses. Empty:
+  // Columns of the random effects per experiment, whitened, at the state they were made of. Empty:
   // from the state at hand.
   std::vector<std::vector<WhiteBlock>> random;
   std::vector<std::vector<Eigen::MatrixXd>> random_products;  // of these columns with each other

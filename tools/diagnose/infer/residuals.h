@@ -85,6 +85,8 @@ struct Campaign {
   // Within an experiment, and not as the belt begins to slip or by noise: else a delay of it is the
   // friction curve's way to its peak by another name, or takes the noise off.
   bool torque_moves = false, pressure_moves = false;
+  // The same of the speeds, which slip moves as well.
+  bool speeds_move = false;
   // Of the gain of one torque against the other, by the accuracies stated of them.
   double primary_share_of_gain = 0.0;
   bool has_balance = false;

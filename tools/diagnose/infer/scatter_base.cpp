@@ -71,6 +71,7 @@ ScatterBase scatter_base(const Engine& engine) {
   }
   ScatterBase out;
   out.from_replicates = degrees > 0.0;
+  out.degrees = degrees + kScatterPriorRuns;
   out.scatter.variance =
       (squares + kScatterPriorRuns * default_scatter().variance) / (degrees + kScatterPriorRuns);
   return out;

@@ -14,6 +14,7 @@ std::vector<int> replicate_groups(const Campaign& campaign);
 struct ScatterBase {
   Scatter scatter;               // to be expected
   bool from_replicates = false;  // else what rigs usually scatter by
+  double degrees = 0.0;          // of freedom that tell it, the usual scatter's among them
 };
 ScatterBase scatter_base(const Engine& engine);
 

@@ -280,6 +280,7 @@ class Run {
     fill_not_identifiable(engine, naming);
     if (implausible_.impossible) {
       nothing_identifiable("the data cannot be of one belt as configured");
+      if (out().machine.contains("mu_max")) no_mu_max("no belt has such friction");
       out().verdict = Verdict::kUnexplained;
       out().unexplained = implausible_.impossible;
       return;
