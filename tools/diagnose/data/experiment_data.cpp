@@ -319,7 +319,7 @@ Spread spread_of(const ExperimentData& run, const GridSignal& signal) {
 
 bool shafts_move(const ExperimentData& run) {
   // Of the mean. Measured: 0.002 in rigs of other make. Of 2,026 experiments of two generators of
-  // other make 150 lie within a fifth of it, and three campaigns have none above; a fifth less or
+  // other make 150 lie within a fifth of it, three times the most of a campaign; a fifth less or
   // more leaves all verdicts and names of 24 of these campaigns as they are.
   constexpr double kHeld = 0.01;
   if (run.valid_count == 0) return false;
