@@ -23,9 +23,9 @@ TEST(RunOf, IsWhatTheScenarioSays) {
   EXPECT_THROW(run_of("# nothing\n"), std::runtime_error);
 }
 
-// A scale of a speed and a spring that equal ramps do not show.
+// A loss behind the belt with two names in its place, and a scale of a speed that is not seen.
 TEST(Rounds, WhatIsOpenIsFoundByTheRecommendedExperiment) {
-  for (const std::uint64_t number : {5018U, 5033U}) {
+  for (const std::uint64_t number : {5024U, 5031U}) {
     SCOPED_TRACE(number);
     const RoundsOfTrial played = play(number, 1);
     EXPECT_NE(played.first.standing, Standing::kAlone);
@@ -38,12 +38,23 @@ TEST(Rounds, WhatIsOpenIsFoundByTheRecommendedExperiment) {
 // off in equal ramps. A force of the turning oil and a gain of the torque of a fifth fit better
 // there by how they weigh the noise.
 TEST(Diagnosed, NoiseNamesNothing) {
-  for (const std::uint64_t number : {8141U, 8074U}) {
+  for (const std::uint64_t number : {8141U, 8074U, 7013U}) {
     const Round first = diagnosed(draw_open_trial(number));
     EXPECT_TRUE(first.standing == Standing::kInClass || first.standing == Standing::kAlone)
         << number << ": " << first.answer;
   }
-  EXPECT_EQ(diagnosed(draw_open_trial(7013)).answer, "");
+}
+
+// A loss of 8 Nm, one that grows with the speed, wear, and pulleys that give way to the square of
+// the force, each at one torque. By what the noise of the balance and that of the clamp force count
+// for in each hypothesis, and no less: else a gain of the torque, a force of the turning oil and a
+// speed's scale stand in their place.
+TEST(Diagnosed, NoNoiseIsDividedAway) {
+  EXPECT_EQ(diagnosed(draw_open_trial(8296)).answer, "torque_loss");
+  EXPECT_EQ(diagnosed(draw_open_trial(5007)).answer, "pulley_deformation");
+  for (const std::uint64_t number : {8240U, 8144U}) {
+    EXPECT_NE(diagnosed(draw_open_trial(number)).standing, Standing::kWrong) << number;
+  }
 }
 
 // A torque that comes late by a quarter of a second, in ramps at one speed: what slip does of a

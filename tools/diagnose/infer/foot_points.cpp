@@ -21,7 +21,7 @@ constexpr double kSpreadLeast = 1e-10;  // squared shares: less is nothing on th
 
 void FootBatch::find_one(std::size_t i) {
   const double slip = slip_[i], capacity_Nm = capacity_Nm_[i];
-  const double torque_weight = 1.0 / torque_variance_[i];
+  const auto [slip_weight, torque_weight, tilt_Nm] = independent(i);
   // What the mean of the curve over a sample is more than the curve at the mean slip, Nm.
   double bend_Nm = 0.0;
   if (!(slip_spread_[i] < kSpreadLeast)) {
@@ -39,9 +39,9 @@ void FootBatch::find_one(std::size_t i) {
     const CurveShape::Point point = curve_.evaluate(x);
     const double model_Nm = capacity_Nm * point.value;
     const double gap_slip = slip - x * peak_;
-    const double gap_Nm = torque_Nm - model_Nm;
+    const double gap_Nm = torque_Nm - model_Nm - tilt_Nm * gap_slip;
     return {x, model_Nm, capacity_Nm * point.slope * per_peak_,
-            gap_slip * gap_slip * slip_weight_ + gap_Nm * gap_Nm * torque_weight};
+            gap_slip * gap_slip * slip_weight + gap_Nm * gap_Nm * torque_weight};
   };
   CurvePoint foot = at(slip * per_peak_);
   // Right of the rising branch the next point of the curve may lie on it, at the same torque:
@@ -52,9 +52,10 @@ void FootBatch::find_one(std::size_t i) {
   // Gauss-Newton, the step shortened while the distance would grow.
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     const double gap_slip = slip - foot.x * peak_;
-    const double gap_Nm = torque_Nm - foot.model_Nm;
-    double step = (gap_slip * slip_weight_ + foot.slope * gap_Nm * torque_weight) /
-                  ((slip_weight_ + foot.slope * foot.slope * torque_weight) * peak_);
+    const double gap_Nm = torque_Nm - foot.model_Nm - tilt_Nm * gap_slip;
+    const double slope = foot.slope - tilt_Nm;
+    double step = (gap_slip * slip_weight + slope * gap_Nm * torque_weight) /
+                  ((slip_weight + slope * slope * torque_weight) * peak_);
     step = std::clamp(step, -kStepMost, kStepMost);
     const double before = foot.x;
     for (int halving = 0; halving < kHalvings; ++halving, step *= kShorter) {
@@ -68,7 +69,9 @@ void FootBatch::find_one(std::size_t i) {
   x_[i] = foot.x;
   model_Nm_[i] = foot.model_Nm;
   slope_[i] = foot.slope;
-  weight_[i] = 1.0 / std::sqrt(torque_variance_[i] + foot.slope * foot.slope * slip_variance_);
+  const double force_Nm = of_force_Nm(i);
+  weight_[i] = 1.0 / std::sqrt(torque_variance_[i] + foot.slope * foot.slope * slip_variance_[i] +
+                               force_Nm * force_Nm);
   value_[i] = (torque_Nm - foot.model_Nm - foot.slope * (slip - foot.x * peak_)) * weight_[i];
 }
 
@@ -133,12 +136,13 @@ class FootSearch {
   // Behind the last sample: lanes that are counted nowhere.
   BELTGRIP_LANES void fill_up(std::size_t i) {
     batch_.slip_[i] = batch_.torque_Nm_[i] = batch_.slip_spread_[i] = 0.0;
-    batch_.capacity_Nm_[i] = batch_.torque_variance_[i] = 1.0;
+    batch_.force_share_[i] = batch_.slip_of_force_[i] = 0.0;
+    batch_.capacity_Nm_[i] = batch_.slip_variance_[i] = batch_.torque_variance_[i] = 1.0;
     batch_.x_[i] = batch_.model_Nm_[i] = batch_.slope_[i] = 0.0;
   }
 
   struct Sample {
-    Value slip, torque_Nm, capacity_Nm, torque_weight;
+    Value slip, torque_Nm, capacity_Nm, slip_weight, torque_weight, tilt_Nm;
   };
   struct CurvePoint {
     Value x, model_Nm, slope, distance;
@@ -147,28 +151,34 @@ class FootSearch {
     const typename Curve::Point point = curve_.evaluate(x);
     const Value model_Nm = sample.capacity_Nm * point.value;
     const Value gap_slip = sample.slip - x * batch_.peak_;
-    const Value gap_Nm = sample.torque_Nm - model_Nm;
+    const Value gap_Nm = sample.torque_Nm - model_Nm - sample.tilt_Nm * gap_slip;
     return {x, model_Nm, sample.capacity_Nm * point.slope * batch_.per_peak_,
-            gap_slip * gap_slip * batch_.slip_weight_ + gap_Nm * gap_Nm * sample.torque_weight};
+            gap_slip * gap_slip * sample.slip_weight + gap_Nm * gap_Nm * sample.torque_weight};
   }
   BELTGRIP_LANES static CurvePoint chosen(Mask first, const CurvePoint& a, const CurvePoint& b) {
     return {first ? a.x : b.x, first ? a.model_Nm : b.model_Nm, first ? a.slope : b.slope,
             first ? a.distance : b.distance};
   }
   BELTGRIP_LANES Value step_from(const Sample& sample, const CurvePoint& foot) const {
-    const double weight = batch_.slip_weight_;
+    const Value weight = sample.slip_weight, slope = foot.slope - sample.tilt_Nm;
     const Value gap_slip = sample.slip - foot.x * batch_.peak_;
-    const Value gap_Nm = sample.torque_Nm - foot.model_Nm;
-    const Value step = (gap_slip * weight + foot.slope * gap_Nm * sample.torque_weight) /
-                       ((weight + foot.slope * foot.slope * sample.torque_weight) * batch_.peak_);
+    const Value gap_Nm = sample.torque_Nm - foot.model_Nm - sample.tilt_Nm * gap_slip;
+    const Value step = (gap_slip * weight + slope * gap_Nm * sample.torque_weight) /
+                       ((weight + slope * slope * sample.torque_weight) * batch_.peak_);
     const Value least = Value{} - kStepMost, most = Value{} + kStepMost;
     return step < least ? least : step > most ? most : step;
   }
 
   BELTGRIP_LANES void begin(std::size_t i) {
     const Value capacity_Nm = load(batch_.capacity_Nm_, i), spread = load(batch_.slip_spread_, i);
+    for (std::size_t lane = i; lane < i + kCount; ++lane) {
+      const FootBatch::Independent by = batch_.independent(lane);
+      slip_weight_[lane] = by.slip_weight;
+      torque_weight_[lane] = by.torque_weight;
+      tilt_Nm_[lane] = by.tilt_Nm;
+    }
     Sample sample{load(batch_.slip_, i), load(batch_.torque_Nm_, i), capacity_Nm,
-                  1.0 / load(batch_.torque_variance_, i)};
+                  load(slip_weight_, i), load(torque_weight_, i),    load(tilt_Nm_, i)};
     const Value x = sample.slip * batch_.per_peak_;
     const Value above = x + kBendStep, below = x - kBendStep;
     if (any(~(spread < kSpreadLeast))) {
@@ -188,7 +198,6 @@ class FootSearch {
     store(sample.torque_Nm, torque_Nm_, i);
     store(sample.torque_Nm, level_Nm_, i);
     store(sample.capacity_Nm, capacity_Nm_, i);
-    store(sample.torque_weight, torque_weight_, i);
     keep(foot, i);
     store(step_from(sample, foot), step_, i);
     store(Value{}, halvings_, i);
@@ -203,8 +212,8 @@ class FootSearch {
   }
 
   BELTGRIP_LANES void step(std::size_t i) {
-    const Sample sample{load(slip_, i), load(torque_Nm_, i), load(capacity_Nm_, i),
-                        load(torque_weight_, i)};
+    const Sample sample{load(slip_, i),        load(torque_Nm_, i),     load(capacity_Nm_, i),
+                        load(slip_weight_, i), load(torque_weight_, i), load(tilt_Nm_, i)};
     const CurvePoint before{load(x_, i), load(model_Nm_, i), load(slope_, i), load(distance_, i)};
     const Value tried = load(step_, i);
     const CurvePoint there = at(sample, before.x + tried);
@@ -234,7 +243,8 @@ class FootSearch {
   BELTGRIP_LANES void move(std::size_t from, std::size_t to) {
     const auto each = [&](Column& column)
                           BELTGRIP_INLINE { column.data()[to] = column.data()[from]; };
-    each(slip_), each(torque_Nm_), each(capacity_Nm_), each(torque_weight_);
+    each(slip_), each(torque_Nm_), each(capacity_Nm_);
+    each(slip_weight_), each(torque_weight_), each(tilt_Nm_);
     each(x_), each(model_Nm_), each(slope_), each(distance_);
     each(step_), each(halvings_), each(iterations_);
     sample_[to] = sample_[from];
@@ -242,8 +252,11 @@ class FootSearch {
 
   BELTGRIP_LANES void weigh(std::size_t i) {
     const Value slope = load(batch_.slope_, i);
+    const Value force_Nm = load(batch_.model_Nm_, i) * load(batch_.force_share_, i) -
+                           slope * load(batch_.slip_of_force_, i);
     const Value noise =
-        Curve::root(load(batch_.torque_variance_, i) + slope * slope * batch_.slip_variance_);
+        Curve::root(load(batch_.torque_variance_, i) +
+                    slope * slope * load(batch_.slip_variance_, i) + force_Nm * force_Nm);
     const Value weight = 1.0 / noise;
     const Value value = (load(level_Nm_, i) - load(batch_.model_Nm_, i) -
                          slope * (load(batch_.slip_, i) - load(batch_.x_, i) * batch_.peak_)) *
@@ -254,7 +267,8 @@ class FootSearch {
 
   FootBatch& batch_;
   Curve curve_;
-  alignas(64) Column slip_, torque_Nm_, capacity_Nm_, torque_weight_;
+  alignas(64) Column slip_, torque_Nm_, capacity_Nm_;
+  alignas(64) Column slip_weight_, torque_weight_, tilt_Nm_;
   alignas(64) Column x_, model_Nm_, slope_, distance_, step_, halvings_, iterations_;
   alignas(64) Flags ends_, is_beyond_;
   std::array<std::size_t, kMost> sample_;

@@ -46,11 +46,9 @@ namespace {
 using Row = std::ptrdiff_t;
 constexpr double kLeast_N = 50.0;  // chosen, of what a noise of the force is divided by
 
-// Variance of what the noise of the clamp force comes to in the torque that the belt carries. The
-// force as configured: its noise is the same share of it in every hypothesis (evaluate()), and one
-// with less force would be forgiven more else.
-ArrayXd carried_variance_Nm2(const Campaign& campaign, const ExperimentData& data,
-                             const ArrayXd& belt_torque_Nm) {
+// One sigma of the clamp force as a share of it: as configured, so that it is the same in every
+// hypothesis (evaluate()), and one with less force is not forgiven more else.
+ArrayXd force_noise_share(const Campaign& campaign, const ExperimentData& data) {
   const estimator::VariatorParameters& variator = campaign.variator;
   ArrayXd out(data.size());
   for_rows(data.size(),
@@ -58,12 +56,22 @@ ArrayXd carried_variance_Nm2(const Campaign& campaign, const ExperimentData& dat
             spring_N = variator.secondary_spring_force_N,
             per_speed2_N_s2 = variator.secondary_centrifugal_N_s2,
             pressure_Pa = data.pressure.value.data(), omega_s = data.omega_s.value.data(),
-            torque_Nm = belt_torque_Nm.data(), to = out.data()](Row k) BELTGRIP_INLINE {
+            to = out.data()](Row k) BELTGRIP_INLINE {
              const double force_N =
                  area_m2 * pressure_Pa[k] + spring_N + per_speed2_N_s2 * omega_s[k] * omega_s[k];
-             const double carried_Nm = torque_Nm[k] * noise_N / std::max(force_N, kLeast_N);
-             to[k] = carried_Nm * carried_Nm;
+             to[k] = noise_N / std::max(force_N, kLeast_N);
            });
+  return out;
+}
+
+// What it comes to in the slip, by the pulleys that give way.
+ArrayXd slip_noise_of_force(const Campaign& campaign, const Quantities& q) {
+  ArrayXd out = q.deformation;
+  if (q.deformation_bend.size() > 0) out += q.deformation_bend;
+  for_rows(out.size(), [noise_N = campaign.noise.force_N, slip = q.slip_share.data(),
+                        force_N = q.force_N.data(), to = out.data()](Row k) BELTGRIP_INLINE {
+    to[k] *= noise_N * (1.0 - slip[k]) / std::max(force_N[k], kLeast_N);
+  });
   return out;
 }
 }  // namespace
@@ -83,7 +91,9 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
   const double slip_variance =
       campaign.slip_noise_share_of(run) * campaign.slip_noise_share_of(run);
   const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
-  out.carried_variance_Nm2 = carried_variance_Nm2(campaign, data, q.belt_torque);
+  out.of_force_Nm = ArrayXd::Zero(n);
+  const ArrayXd force_share = force_noise_share(campaign, data);
+  const ArrayXd slip_of_force = slip_noise_of_force(campaign, q);
   std::array<std::vector<int>, kStops> at_stop;  // samples
   for (std::vector<int>& each : at_stop) each.reserve(static_cast<std::size_t>(data.valid_count));
   for (const auto& [begin, end] : data.stretches) {
@@ -96,10 +106,10 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
     for (std::size_t first = 0; first < all.size(); first += FootBatch::kMost) {
       const auto samples =
           std::span(all).subspan(first, std::min(FootBatch::kMost, all.size() - first));
-      FootBatch batch(curve[stop], std::exp(q.ln_peak_slip[stop]), slip_variance);
+      FootBatch batch(curve[stop], std::exp(q.ln_peak_slip[stop]));
       for (const int k : samples) {
         batch.add(q.slip_share[k], q.belt_torque[k], q.capacity[k], data.slip_spread_share2[k],
-                  sensor_variance + out.carried_variance_Nm2[k]);
+                  {slip_variance, sensor_variance, force_share[k], slip_of_force[k]});
       }
       batch.find();
       for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -108,18 +118,13 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
         out.slope[k] = batch.slope(i);
         out.model_Nm[k] = batch.model_Nm(i);
         out.weight[k] = batch.weight(i);
+        out.of_force_Nm[k] = batch.of_force_Nm(i);
         out.value[kFrictionResidual][k] = batch.value(i);
       }
     }
   }
-  out.balance_weight = ArrayXd::Zero(n);
-  for (int k = 0; k < n; k += kBalanceStep) {
-    const auto i = static_cast<std::size_t>(k);
-    if (data.valid[i]) {
-      out.balance_weight[k] =
-          1.0 / campaign.noise.balance_Nm[static_cast<std::size_t>(data.stop[i])];
-    }
-  }
+  out.balance_variance = balance_variance(campaign, data, q, state);
+  out.balance_weight = out.balance_variance.per_Nm();
   const auto masked = [&](const ArrayXd& values, const ArrayXd& scale) -> ArrayXd {
     if (values.size() == 0) return ArrayXd::Zero(n);
     return (out.weight > 0.0).select(values * scale, 0.0);
@@ -136,38 +141,32 @@ namespace {
 constexpr double kMoveMost = 0.2;  // chosen, of the clamp force: no foot point is farther
 }  // namespace
 
-// The foot point of what stands in the regressors: of the misfit in torque, the clamp force takes
-// its share.
+// What stands in the regressors, without what of the misfit is the noise of the torque and of the
+// clamp force: of each what is most probable by the noises of all three.
 void move_to_foot(const Campaign& campaign, int run, Residuals& at) {
   if (at.clean_Nm.size() > 0) return;
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   const Quantities& q = at.measured;
-  const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
-  at.clean_Nm = at.model_Nm;
+  at.clean_Nm = q.belt_torque;
   at.clean_pressure_Pa = data.pressure.value;
   at.clean_reading_Nm = data.torque.value;
   for (const auto& [begin, end] : data.stretches) {
-    for_rows(end - begin, [=, area_m2 = campaign.variator.secondary_piston_area_m2,
-                           carried_Nm2 = at.carried_variance_Nm2.data() + begin,
-                           belt_Nm = q.belt_torque.data() + begin,
-                           model_Nm = at.model_Nm.data() + begin,
-                           force_N = q.force_N.data() + begin,
-                           clean_Pa = at.clean_pressure_Pa.data() + begin,
-                           clean_Nm = at.clean_Nm.data() + begin,
-                           reading_Nm = at.clean_reading_Nm.data() + begin](Row k) BELTGRIP_INLINE {
-      // Of the misfit that is the clamp force's: its noise comes with the torque it
-      // carries.
-      const double force_share = carried_Nm2[k] / (sensor_variance + carried_Nm2[k]);
-      const double off_Nm = belt_Nm[k] - model_Nm[k];
-      const bool carries = model_Nm[k] != 0.0;
-      const double share = off_Nm * force_share / (carries ? model_Nm[k] : 1.0);
-      const double most = share < -kMoveMost ? -kMoveMost : share > kMoveMost ? kMoveMost : share;
-      const double relative = carries ? most : 0.0;
-      const double moved_Nm = model_Nm[k] * (1.0 + relative);
-      clean_Pa[k] += relative * force_N[k] / area_m2;
-      clean_Nm[k] = moved_Nm;
-      reading_Nm[k] -= off_Nm - (moved_Nm - model_Nm[k]);
-    });
+    for_rows(
+        end - begin,
+        [sensor_Nm2 = campaign.noise.torque_Nm * campaign.noise.torque_Nm,
+         noise_N = campaign.noise.force_N, area_m2 = campaign.variator.secondary_piston_area_m2,
+         value = at.value[kFrictionResidual].data() + begin, weight = at.weight.data() + begin,
+         of_force_Nm = at.of_force_Nm.data() + begin, force_N = q.force_N.data() + begin,
+         clean_Pa = at.clean_pressure_Pa.data() + begin, clean_Nm = at.clean_Nm.data() + begin,
+         reading_Nm = at.clean_reading_Nm.data() + begin](Row k) BELTGRIP_INLINE {
+          const double misfit_per_Nm = value[k] * weight[k];
+          const double off_Nm = sensor_Nm2 * misfit_per_Nm;
+          const double off_N = noise_N * of_force_Nm[k] * misfit_per_Nm;
+          const double most_N = kMoveMost * force_N[k];
+          clean_Pa[k] += (off_N < -most_N ? -most_N : off_N > most_N ? most_N : off_N) / area_m2;
+          clean_Nm[k] -= off_Nm;
+          reading_Nm[k] -= off_Nm;
+        });
   }
   if (q.balance.size() > 0) at.output_torque = at.clean_Nm / q.ratio;
 }
@@ -262,9 +261,13 @@ ResidualColumns propagated(const Campaign& campaign, const Residuals& at,
   if (campaign.has_balance && change.balance.size() > 0) {
     out[kBalanceResidual] = column([&](int begin, Row count, double* to) {
       for_rows(count, [=, balance = change.balance.data() + begin,
+                       ln_noise = from(change.ln_balance_noise, begin),
+                       value = at.value[kBalanceResidual].data() + begin,
                        balance_weight = at.balance_weight.data() + begin,
                        weight = at.weight.data() + begin](Row k) BELTGRIP_INLINE {
-        to[k] = (weight[k] > 0.0 ? balance[k] * balance_weight[k] : 0.0) * scale;
+        double by = balance[k] * balance_weight[k];
+        if (ln_noise != nullptr) by -= value[k] * ln_noise[k];
+        to[k] = (weight[k] > 0.0 ? by : 0.0) * scale;
       });
     });
   }
@@ -355,6 +358,9 @@ QuantityChange deformation_change(const ExperimentData& data, const Residuals& a
   if (q.balance.size() > 0) {
     change.balance =
         (q.balance - q.belt_torque - data.torque.slow + at.clean_reading_Nm) * ln_ratio;
+    const BalanceVariance& noise = at.balance_variance;
+    change.ln_balance_noise =
+        (noise.total > 0.0).select(noise.behind / noise.total * ln_ratio, 0.0);
   }
   return change;
 }
@@ -384,8 +390,13 @@ std::optional<QuantityChange> known_change(const Campaign& campaign, const Exper
       change.tracking = ArrayXd::Constant(n, -1.0);
       return change;
     }
-    case kSecondaryInertia_kgm2:
-      return balance_change(-at.measured.ratio * at.measured.slope_s);
+    case kSecondaryInertia_kgm2: {
+      QuantityChange change = balance_change(-at.measured.ratio * at.measured.slope_s);
+      const BalanceVariance& noise = at.balance_variance;
+      change.ln_balance_noise =
+          (noise.total > 0.0).select(0.5 * noise.per_inertia_kg_m2 / noise.total, 0.0);
+      return change;
+    }
     case kSecondaryLoss_Nm:
       return balance_change(-at.measured.ratio);
     case kSecondaryLossPerSpeed_Nms:
@@ -420,14 +431,19 @@ QuantityChange difference(const Campaign& campaign, int run, const ModelState& s
   value += step;
   const Readings clean{at.clean_pressure_Pa, at.clean_reading_Nm};
   const Quantities above = quantities(campaign, data, clean, run, moved);
+  const BalanceVariance noise_above = balance_variance(campaign, data, above, moved);
   value -= 2.0 * step;
   const Quantities below = quantities(campaign, data, clean, run, moved);
+  const BalanceVariance noise_below = balance_variance(campaign, data, below, moved);
   const double scale = 0.5 / step;
   QuantityChange change;
   change.slip_share = (above.slip_share - below.slip_share) * scale;
   change.torque = (above.belt_torque - below.belt_torque) * scale;
   change.ln_capacity = (above.capacity / below.capacity).log() * scale;
-  if (above.balance.size() > 0) change.balance = (above.balance - below.balance) * scale;
+  if (above.balance.size() > 0) {
+    change.balance = (above.balance - below.balance) * scale;
+    change.ln_balance_noise = noise_above.ln_sigma_over(noise_below) * scale;
+  }
   if (above.tracking.size() > 0) change.tracking = (above.tracking - below.tracking) * scale;
   for (int stop = 0; stop < kStops; ++stop) {  // friction_shape acts on the curve itself
     const auto s = static_cast<std::size_t>(stop);
@@ -498,12 +514,25 @@ ResidualColumns secant(const Campaign& campaign, int run, const ModelState& stat
   change.slip_share = (there.slip_share - here.slip_share) / step;
   change.torque = (there.belt_torque - here.belt_torque) / step;
   change.ln_capacity = (there.capacity / here.capacity).log() / step;
-  if (there.balance.size() > 0) change.balance = (there.balance - here.balance) / step;
+  if (there.balance.size() > 0) {
+    change.balance = (there.balance - here.balance) / step;
+    const BalanceVariance noise = balance_variance(campaign, data, there, moved);
+    change.ln_balance_noise = noise.ln_sigma_over(at.balance_variance) / step;
+  }
   if (there.tracking.size() > 0) change.tracking = (there.tracking - here.tracking) / step;
   return propagate(campaign, at, change);
 }
 
+namespace {
+// The slip's noise is that of the speeds: what the clamp force's comes to in it counts by itself.
+ModelState with_stiff_pulleys(ModelState state) {
+  state.nuisance[kDeformationPerkN] = 0.0;
+  return state;
+}
+}  // namespace
+
 NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& state) {
+  const ModelState stiff = with_stiff_pulleys(state);
   std::vector<double> slip_share, torque, tracking, force;
   std::array<std::vector<double>, kStops> balance;
   for (int run = 0; run < static_cast<int>(campaign.runs.size()); ++run) {
@@ -521,7 +550,7 @@ NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& st
         into.push_back(probe.at(y, k));
       }
     };
-    collect(q.slip_share, slip_share);
+    collect(quantities(campaign, data, run, stiff).slip_share, slip_share);
     collect(q.belt_torque, torque);
     for (const int stop : {kOverdriveStop, kLowStop}) {
       collect(q.balance, balance[static_cast<std::size_t>(stop)], stop);
@@ -548,10 +577,12 @@ NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& st
   NoiseLevels out;
   out.slip_share = std::max(robust_sigma(slip_share), 2e-6);
   out.torque_Nm = std::max({robust_sigma(torque), 2e-3, torque_Nm});
+  std::array<double, kStops> balance_Nm{};
   for (std::size_t stop = 0; stop < kStops; ++stop) {
-    out.balance_Nm[stop] = std::max(
+    balance_Nm[stop] = std::max(
         {robust_sigma(balance[stop]), 2e-3, std::hypot(torque_Nm, ratio[stop] * torque_s_Nm)});
   }
+  out.balance = parts_of_balance_noise(campaign, state, balance_Nm);
   out.force_N = std::max({robust_sigma(force), 0.2,
                           campaign.variator.secondary_piston_area_m2 *
                               rounding(&ExperimentData::left_of_rounding_Pa)});
@@ -561,10 +592,11 @@ NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& st
 
 std::vector<double> estimate_slip_noise_shares(const Campaign& campaign, const ModelState& state) {
   constexpr double kLeast = 0.3, kMost = 5.0;
+  const ModelState stiff = with_stiff_pulleys(state);
   std::vector<double> sigma;
   for (int run = 0; run < static_cast<int>(campaign.runs.size()); ++run) {
     const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
-    const Quantities q = quantities(campaign, data, run, state);
+    const Quantities q = quantities(campaign, data, run, stiff);
     std::vector<double> slip_share;
     constexpr int kReach = kFastProbe.reach();
     for (int k = kReach; k + kReach < data.size(); ++k) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "tools/diagnose/data/experiment_data.h"
+#include "tools/diagnose/infer/balance_noise.h"
 #include "tools/diagnose/model/effects/effect.h"
 #include "tools/diagnose/model/variator_model.h"
 
@@ -21,19 +22,17 @@ namespace beltgrip::diagnose {
 
 enum ResidualKind : int { kFrictionResidual, kBalanceResidual, kTrackingResidual, kResidualKinds };
 
-inline constexpr int kBalanceStep = 5;  // samples of the slow copies, nearly independent
-
 // One sigma of the noise of one grid sample, from differences of neighbours.
 struct NoiseLevels {
   double slip_share = 1e-4;
   double torque_Nm = 0.1;
-  std::array<double, kStops> balance_Nm{0.1, 0.1};  // the secondary side counts by the ratio
+  std::array<BalanceNoise, kStops> balance;
   double tracking_Pa = 1e3;
   double force_N = 1.0;
   NoiseLevels times(double factor) const {
     return {slip_share * factor,
             torque_Nm * factor,
-            {balance_Nm[0] * factor, balance_Nm[1] * factor},
+            {balance[0].times(factor), balance[1].times(factor)},
             tracking_Pa * factor,
             force_N * factor};
   }
@@ -101,9 +100,11 @@ struct Residuals {
   Eigen::ArrayXd model_Nm;        // curve at the foot point, at the measured clamp force
   Eigen::ArrayXd weight;          // 1 / (noise of the distance)
   Eigen::ArrayXd balance_weight;  // 1 / (noise of the balance)
-  Quantities measured;            // the model at the state, on the data as they are
-  // Of what the noise of the clamp force comes to in the torque that the belt carries.
-  Eigen::ArrayXd carried_variance_Nm2;
+  BalanceVariance balance_variance;
+  Quantities measured;  // the model at the state, on the data as they are
+  // One sigma of the clamp force, in Nm of the distance: what it carries less what it takes of the
+  // slip by the pulleys that give way.
+  Eigen::ArrayXd of_force_Nm;
   // By move_to_foot only: of the belt at the foot point, and what the sensors would read there. No
   // noise in a regressor.
   Eigen::ArrayXd clean_Nm, output_torque;
@@ -140,9 +141,11 @@ ResidualColumns derivative_rows(const Campaign& campaign, int run, const ModelSt
 ResidualColumns secant(const Campaign& campaign, int run, const ModelState& state,
                        const Residuals& at, int slot, double size);
 
-// Effect of a change of slip, torque, ln(capacity), balance and tracking on the residuals.
+// Effect of a change of slip, torque, ln(capacity), balance and tracking on the residuals, and of
+// the noise of the balance.
 struct QuantityChange {
   Eigen::ArrayXd slip_share, torque, ln_capacity, balance, tracking;  // empty: none
+  Eigen::ArrayXd ln_balance_noise;                                    // empty: none
 };
 ResidualColumns propagate(const Campaign& campaign, const Residuals& at,
                           const QuantityChange& change);

@@ -84,7 +84,7 @@ void apply_learned(Context& c, const estimator::LearnedTerm& term, Stage stage) 
       c.torque -= by;
       break;
     case LearnedPoint::kTorqueGain:  // of the slow copy, as of torque_gain
-      c.torque -= c.run.torque.slow * by / (1.0 + by).max(kLeast);
+      take_torque_share(by / (1.0 + by).max(kLeast), c);
       break;
     case LearnedPoint::kClampForce:
       c.force_N += by;

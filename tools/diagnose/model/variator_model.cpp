@@ -348,6 +348,12 @@ class Passes {
 };
 }  // namespace
 
+void take_torque_share(const ArrayXd& share, Context& c) {
+  c.torque -= c.run.torque.slow * share;
+  if (c.torque_share.size() == 0) c.torque_share = ArrayXd::Ones(share.size());
+  c.torque_share -= share;
+}
+
 Quantities evaluate(const ExperimentData& run, int experiment,
                     const estimator::VariatorParameters& variator, const Eigen::VectorXd& nuisance,
                     const Effects& effects) {
@@ -367,11 +373,13 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
             run.omega_s.value,
             read.pressure_Pa,
             read.torque_Nm,
+            {},
             run.omega_p.slow_slope,
             run.omega_s.slow_slope,
             variator.primary_inertia_kg_m2 *
                 (1.0 - effects.primary_share_of_gain * nuisance[kSecondaryTorqueGain]),
             run.command.present ? run.command.value : ArrayXd(),
+            {},
             {},
             {},
             {},
@@ -421,6 +429,8 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
   q.omega_p = std::move(c.omega_p);
   q.omega_s = std::move(c.omega_s);
   q.slope_s = std::move(c.slope_s);
+  q.torque_share = std::move(c.torque_share);
+  q.deformation_bend = std::move(c.deformation_bend);
   q.ln_peak_slip = c.ln_peak_slip;
   q.fall = c.fall;
   return q;

@@ -77,7 +77,8 @@ struct Context {
   const estimator::VariatorParameters& variator;
   int experiment = 0;                                 // its place in the order given
   Eigen::ArrayXd omega_p, omega_s, pressure, torque;  // the true ones, as the model believes
-  Eigen::ArrayXd slope_p, slope_s;                    // of both speeds, slow copies
+  Eigen::ArrayXd torque_share;      // of the torque's slow copy, what is believed of it; empty: all
+  Eigen::ArrayXd slope_p, slope_s;  // of both speeds, slow copies
   // Before the belt, in the measure of the primary torque: what that reads too little is missing
   // of what speeding up takes as well.
   double primary_inertia_kg_m2 = 0.0;
@@ -85,6 +86,8 @@ struct Context {
   Eigen::ArrayXd force_N;      // F_s
   Eigen::ArrayXd loss_Nm;      // between shaft and belt, drag positive
   Eigen::ArrayXd deformation;  // r_g = r_g0 (1 - deformation) exp(ln_ratio)
+  // F d(deformation)/dF beyond the deformation itself; empty: it grows in proportion.
+  Eigen::ArrayXd deformation_bend;
   Eigen::ArrayXd ln_ratio;
   Eigen::ArrayXd slip_share, belt_torque;
   Eigen::ArrayXd secondary_loss_Nm;  // between belt and secondary torque, drag positive
@@ -92,12 +95,16 @@ struct Context {
   std::array<double, kStops> ln_peak_slip{}, fall{};
 };
 
+// The torque less a share of what its slow copy reads.
+void take_torque_share(const Eigen::ArrayXd& share, Context& c);
+
 // What the residuals are made of.
 struct Quantities {
   Eigen::ArrayXd slip_share, belt_torque, capacity, force_N, deformation, ratio, balance, tracking;
-  Eigen::ArrayXd omega_p, omega_s;   // the true ones
-  Eigen::ArrayXd slope_s;            // of omega_s
-  Eigen::ArrayXd secondary_loss_Nm;  // empty without secondary torque
+  Eigen::ArrayXd omega_p, omega_s;                // the true ones
+  Eigen::ArrayXd slope_s;                         // of omega_s
+  Eigen::ArrayXd torque_share, deformation_bend;  // of Context
+  Eigen::ArrayXd secondary_loss_Nm;               // empty without secondary torque
   std::array<double, kStops> ln_peak_slip{}, fall{};
 };
 

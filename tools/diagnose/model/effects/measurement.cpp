@@ -4,7 +4,9 @@
 namespace beltgrip::diagnose {
 
 namespace {
-Eigen::ArrayXd shift_change(const GridSignal& signal, double dt_s, double shift_s) {
+using Eigen::ArrayXd;
+
+ArrayXd shift_change(const GridSignal& signal, double dt_s, double shift_s) {
   return shifted(signal, dt_s, shift_s) - signal.sharp;
 }
 
@@ -12,7 +14,7 @@ void apply_torque_bias(Context& c, const Slot&, double bias_Nm) { c.torque -= bi
 // Of the slow copy: dividing the samples themselves would also divide their noise, and the larger
 // gain would fit better for that alone.
 void apply_torque_gain(Context& c, const Slot&, double gain) {
-  c.torque -= c.run.torque.slow * gain / (1.0 + gain);
+  take_torque_share(ArrayXd::Constant(c.run.size(), gain / (1.0 + gain)), c);
 }
 void apply_torque_delay(Context& c, const Slot&, double delay_s) {
   c.torque += shift_change(c.run.torque, c.run.dt_s, delay_s);
