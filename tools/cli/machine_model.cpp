@@ -60,9 +60,11 @@ void apply_model(const std::string& path, sim::RigScenario& scenario) {
        belt.peak_slip_percent);
   take(model.driveline, "secondary_loss_constant_Nm", scenario.variator.secondary_loss_Nm);
   take(model.driveline, "secondary_loss_per_rad_s_Nm", scenario.variator.secondary_loss_Nm_s);
+  take(model.driveline, "secondary_loss_per_kN_Nm", scenario.variator.secondary_loss_Nm_per_N,
+       1e-3);
   ModelFile rest = model;  // these are the variator's
-  for (const char* key :
-       {"deformation_per_kN", "secondary_loss_constant_Nm", "secondary_loss_per_rad_s_Nm"}) {
+  for (const char* key : {"deformation_per_kN", "secondary_loss_constant_Nm",
+                          "secondary_loss_per_rad_s_Nm", "secondary_loss_per_kN_Nm"}) {
     rest.driveline.erase(key);
   }
   MachineEffects whole = daemon::whole_machine(rest);
@@ -99,8 +101,9 @@ void apply_model(const std::string& path, sim::VehicleScenario& scenario) {
   // The first three are the variator's; the drag at the wheels' side no model of a car has
   // measured.
   ModelFile rest = model;
-  for (const char* key : {"deformation_per_kN", "loss_constant_Nm", "loss_per_kN_Nm",
-                          "secondary_loss_constant_Nm", "secondary_loss_per_rad_s_Nm"}) {
+  for (const char* key :
+       {"deformation_per_kN", "loss_constant_Nm", "loss_per_kN_Nm", "secondary_loss_constant_Nm",
+        "secondary_loss_per_rad_s_Nm", "secondary_loss_per_kN_Nm"}) {
     rest.driveline.erase(key);
   }
   lay(daemon::whole_machine(rest), scenario.effects);

@@ -24,9 +24,13 @@ FrictionPoint VariatorPlant::friction_now(double slip_share) const {
   return {friction_factor_ * point.mu, friction_factor_ * point.slope};
 }
 
-double VariatorPlant::drag_Nm(double omega_s_rad_s) const {
+double VariatorPlant::constant_drag_Nm(double clamp_force_N) const {
+  return variator_.secondary_loss_Nm + variator_.secondary_loss_Nm_per_N * clamp_force_N;
+}
+
+double VariatorPlant::drag_Nm(double omega_s_rad_s, double clamp_force_N) const {
   // Smooth through standstill: full drag from about 1 rad/s on.
-  return variator_.secondary_loss_Nm * tanh_of(omega_s_rad_s) +
+  return constant_drag_Nm(clamp_force_N) * tanh_of(omega_s_rad_s) +
          variator_.secondary_loss_Nm_s * omega_s_rad_s;
 }
 
@@ -57,7 +61,7 @@ PlantOutput VariatorPlant::output(double clamp_force_N) const {
 }
 
 double VariatorPlant::balancing_load_Nm(double torque_p_Nm, double clamp_force_N) const {
-  return torque_p_Nm / ratio_at(clamp_force_N) - drag_Nm(state_.omega_s_rad_s);
+  return torque_p_Nm / ratio_at(clamp_force_N) - drag_Nm(state_.omega_s_rad_s, clamp_force_N);
 }
 
 bool VariatorPlant::finite() const {
@@ -80,11 +84,12 @@ VariatorPlant::Derivative VariatorPlant::derivative(const PlantState& state,
                        input.drive_torque_slope_Nm_s * (state.omega_p_rad_s - omega_p_start_rad_s);
   const double t = tanh_of(state.omega_s_rad_s);
   const double drag_per_s =
-      variator_.secondary_loss_Nm * (1.0 - t * t) + variator_.secondary_loss_Nm_s;
+      constant_drag_Nm(input.clamp_force_N) * (1.0 - t * t) + variator_.secondary_loss_Nm_s;
 
   Derivative d;
   d.p = (drive - torque_p) / variator_.primary_inertia_kg_m2;
-  d.s = (torque_p / ratio - drag_Nm(state.omega_s_rad_s) - input.load_torque_Nm) /
+  d.s = (torque_p / ratio - drag_Nm(state.omega_s_rad_s, input.clamp_force_N) -
+         input.load_torque_Nm) /
         variator_.secondary_inertia_kg_m2;
   d.pp = (input.drive_torque_slope_Nm_s - torque_p_per_slip * slip_per_p) /
          variator_.primary_inertia_kg_m2;

@@ -63,7 +63,8 @@ class VariatorPlant {
   };
   double ratio_at(double clamp_force_N) const;
   FrictionPoint friction_now(double slip_share) const;
-  double drag_Nm(double omega_s_rad_s) const;
+  double constant_drag_Nm(double clamp_force_N) const;  // at any speed
+  double drag_Nm(double omega_s_rad_s, double clamp_force_N) const;
   // Drive torque is linearised around omega_p of the step's start.
   Derivative derivative(const PlantState& state, const PlantInput& input,
                         double omega_p_start_rad_s) const;

@@ -36,6 +36,7 @@ struct VariatorParameters {
   double primary_loss_Nm_per_N = 0.0;    // and in proportion to the clamp
   double secondary_loss_Nm = 0.0;        // bearings and seals, at any speed
   double secondary_loss_Nm_s = 0.0;      // and in proportion to speed
+  double secondary_loss_Nm_per_N = 0.0;  // and to the clamp: a rig's, as a model of it says
   double shift_gain = 0.0;               // Delta of variator-facts 3.4
   double force_ratio_slope = 0.0;        // ln(F_p / F_s) in equilibrium per ln(r_g)
   double force_ratio_load = 0.0;         // and per share of the torque capacity in use

@@ -98,8 +98,27 @@ void expect_silence(const json& result) {
   EXPECT_TRUE(result.at("unexplained").is_null()) << result.dump(1);
 }
 
+// What a variator loses more with more clamp, at either shaft, is told by nobody beforehand, nor
+// that its pulleys give way in proportion to it: up to what is usual no cause.
+TEST_F(Diagnose, AMachineLosesWithTheClampForceWhatItMay) {
+  const auto tables = record(rig(12, {{"torque_loss", {{"per_kN_Nm", 0.2}}, ""},
+                                      {"pulley_deformation", {{"per_kN2", 2e-5}}, ""}}))
+                          .csv;
+  std::vector<std::string> with_both;
+  for (const std::string& table : tables) {
+    with_both.push_back(changed(table, [](auto& cells) {
+      const double force_kN = 1e-3 * (0.0113 * number(cells[3]) + 500.0);
+      cells[5] = std::to_string(number(cells[5]) - 0.12 * force_kN);
+      return true;
+    }));
+  }
+  const json result = of(with_both);
+  EXPECT_EQ(result.at("verdict"), "nothing_wrong") << result.at("headline");
+  EXPECT_NEAR(result.at("machine").at("deformation_per_kN2").at("value").get<double>(), 2e-5, 5e-6);
+}
+
 TEST_F(Diagnose, NamesTheCauseWritesTheModelAndIsContentWithIt) {
-  // Of a drag the machine itself has 0.05 Nm/kN, 0.17 at most.
+  // Of a drag any machine has 0.12 Nm/kN, 0.36 at most.
   const blind::Trial trial = rig(12, {{"torque_loss", {{"per_kN_Nm", 0.8}}, ""}});
   const auto recording = record(trial);
   const auto logs = write(recording.csv);
@@ -112,7 +131,7 @@ TEST_F(Diagnose, NamesTheCauseWritesTheModelAndIsContentWithIt) {
   const json& finding = first.at("findings")[0];
   EXPECT_EQ(finding.at("effect"), "torque_loss");
   const json& size = finding.at("parameters").at("per_kN_Nm");
-  EXPECT_NEAR(size.at("value").get<double>(), 0.75, 0.06);
+  EXPECT_NEAR(size.at("value").get<double>(), 0.68, 0.06);
   EXPECT_LT(size.at("ci95")[0].get<double>(), 0.8);
   EXPECT_GT(size.at("ci95")[1].get<double>(), 0.8);
   EXPECT_GT(finding.at("probability").get<double>(), 0.9);
@@ -515,7 +534,8 @@ TEST_F(Diagnose, ACopyWithOtherDigitsIsNoReplicate) {
 }
 
 TEST_F(Diagnose, WithTwoExperimentsALargeEffectIsSaidAndNotNamed) {
-  const json result = of(record(rig(2, {{"torque_loss", {{"per_kN_Nm", 0.9}}, ""}})).csv);
+  // By 3 kN it takes no more than a variator may lose where it is 0.9 Nm/kN.
+  const json result = of(record(rig(2, {{"torque_loss", {{"per_kN_Nm", 1.5}}, ""}})).csv);
   EXPECT_EQ(result.at("findings").size(), 0U) << result.dump(1);
   EXPECT_NE(result.at("verdict"), "nothing_wrong");
   EXPECT_NE(notes(result).find("fewer than three experiments"), std::string::npos);
@@ -609,7 +629,7 @@ TEST_F(Diagnose, ASaturatedTorqueIsLeftOutAndSaid) {
     });
   }
   const json result = of(recording.csv);
-  EXPECT_EQ(result.at("findings").size(), 0U) << result.dump(1);
+  EXPECT_NE(result.at("verdict"), "explained") << result.dump(1);
   EXPECT_NE(notes(result).find("a torque rests on its bound"), std::string::npos) << notes(result);
 }
 

@@ -12,7 +12,8 @@
 namespace beltgrip::diagnose {
 namespace {
 
-constexpr double kLoss_Nm_per_kN = 0.9;
+// Of a drag any machine has 0.12 Nm/kN, which is no part of the finding.
+constexpr double kLoss_Nm_per_kN = 0.9, kBeyond_Nm_per_kN = kLoss_Nm_per_kN - 0.12;
 
 TEST(FindingPicture, IsTheCauseOverWhatItFollows) {
   blind::Trial trial;
@@ -39,7 +40,7 @@ TEST(FindingPicture, IsTheCauseOverWhatItFollows) {
   ASSERT_GT(law.x.size(), 20U);
   for (std::size_t i = 0; i < law.x.size(); ++i) {
     const double force_kN = 1e-3 * (0.0113 * 1e5 * law.x[i] + 500.0);
-    EXPECT_NEAR(law.y[i], kLoss_Nm_per_kN * force_kN, 0.1 * kLoss_Nm_per_kN * force_kN) << i;
+    EXPECT_NEAR(law.y[i], kBeyond_Nm_per_kN * force_kN, 0.1 * kBeyond_Nm_per_kN * force_kN) << i;
     EXPECT_NEAR(low.y[i] / law.y[i], 0.8 / 0.9, 1e-9);
     EXPECT_NEAR(high.y[i] / law.y[i], 1.0 / 0.9, 1e-9);
     EXPECT_NEAR(asked.y[i] - left.y[i], law.y[i], 1e-9);

@@ -2,10 +2,12 @@
 // one that has more clamp force must not fit better for dividing the noise by more.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
 
+#include "tests/tools/diagnose/noise.h"
 #include "tests/tools/diagnose/recorded_runs.h"
 #include "tests/tools/diagnose/rig_table.h"
 #include "tools/diagnose/decide/namer.h"
@@ -59,6 +61,46 @@ TEST(ForceNoise, IsTheSameShareOfTheCapacityInEveryHypothesis) {
     ++tried;
   }
   EXPECT_EQ(tried, 5);
+}
+
+// Pulleys that give way bring it into the slip as well, where it counts by itself: whoever says
+// that they do, the machine, a model file or an effect, the noise of the slip is that of the
+// speeds.
+TEST(ForceNoise, IsNoneOfTheSlip) {
+  constexpr double kPerkN = 4e-3, kSpeed_rad_s = 5e-3, kPressureNoise_Pa = 3e3;
+  const estimator::VariatorParameters variator;
+  Noise noise;
+  const SignalTable table = rig_table(12000, 0.005, [&](double t_s) -> RigSample {
+    const double pressure_Pa = kPressure_Pa + 1e5 * std::sin(2.0 * std::numbers::pi * 0.05 * t_s);
+    const double ratio = variator.ratio_overdrive * 0.99;
+    return {100.0 + kSpeed_rad_s * noise(), 100.0 * ratio,
+            pressure_Pa + kPressureNoise_Pa * noise(), 50.0};
+  });
+  Campaign campaign = make_campaign({prepare(table, variator)}, nominal_model(variator));
+  ModelState stiff;
+  stiff.nuisance.setZero(kNuisanceCount);
+  stiff.nuisance[kLnMuMax] = std::log(0.1);
+  stiff.effects.setZero(static_cast<Eigen::Index>(campaign.slots.size()));
+  const double of_speeds = estimate_noise_levels(campaign, stiff).slip_share;
+  campaign.noise.slip_share = of_speeds;
+  const double share = estimate_slip_noise_shares(campaign, stiff)[0];
+  const auto expect_that = [&](const ModelState& state) {
+    EXPECT_NEAR(estimate_noise_levels(campaign, state).slip_share, of_speeds, 0.02 * of_speeds);
+    EXPECT_NEAR(estimate_slip_noise_shares(campaign, state)[0], share, 0.02 * share);
+  };
+  ModelState machine = stiff;
+  machine.nuisance[kDeformationPerkN] = kPerkN;
+  expect_that(machine);
+  const auto slot =
+      std::find_if(campaign.slots.begin(), campaign.slots.end(),
+                   [](const Slot& each) { return each.label() == "pulley_deformation.per_kN"; });
+  ASSERT_NE(slot, campaign.slots.end());
+  const auto index = slot - campaign.slots.begin();
+  ModelState effect = stiff;
+  effect.effects[index] = kPerkN;
+  expect_that(effect);
+  campaign.switched_on[index] = kPerkN;
+  expect_that(stiff);
 }
 
 // Two experiments in the middle with less friction than those before and behind them: that is no

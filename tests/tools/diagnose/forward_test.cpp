@@ -45,6 +45,8 @@ ModelState nominal_state(const Campaign& campaign) {
   for (int i = 0; i < kNuisanceCount; ++i) {
     state.nuisance[i] = campaign.nuisances[static_cast<std::size_t>(i)].nominal;
   }
+  state.nuisance[kLossPerkN_Nm] = 1e3 * kLossPerN_Nm;
+  state.nuisance[kSecondaryLossPerkN_Nm] = 0.0;
   // The curve of traction(), without departures.
   state.nuisance.segment(kShapeOverdrive, kEndOfShapes - kShapeOverdrive + 1).setZero();
   return state;

@@ -98,7 +98,8 @@ TEST(Rows, TheMachineIsWhatItsEquationsSayOfWholeArrays) {
                 (data.omega_p.slope + data.omega_p.slow_slope - data.omega_p.slow_slope);
       }
       expect_same(q.belt_torque, torque - loss);
-      const ArrayXd deformation = x[kDeformationPerkN] * 1e-3 * force;
+      const ArrayXd deformation =
+          x[kDeformationPerkN] * 1e-3 * force + x[kDeformationPerkN2] * 1e-6 * force.square();
       expect_same(q.deformation, deformation);
       const double unloaded = low ? variator.ratio_low * std::exp(x[kLnRatioLow])
                                   : variator.ratio_overdrive * std::exp(x[kLnRatioOverdrive]);
@@ -118,11 +119,11 @@ TEST(Rows, TheMachineIsWhatItsEquationsSayOfWholeArrays) {
           (low ? variator.primary_radius_low_m : variator.primary_radius_overdrive_m);
       expect_same(valid(q.capacity), valid(lever_m * force.max(50.0)));
       if (!data.torque_s.present) continue;
-      ArrayXd balance =
-          q.belt_torque + data.torque.slow - torque -
-          q.ratio * (data.torque_s.slow / (1.0 + x[kSecondaryTorqueGain]) +
-                     x[kSecondaryInertia_kgm2] * data.omega_s.slow_slope +
-                     (x[kSecondaryLoss_Nm] + x[kSecondaryLossPerSpeed_Nms] * omega_s));
+      ArrayXd balance = q.belt_torque + data.torque.slow - torque -
+                        q.ratio * (data.torque_s.slow / (1.0 + x[kSecondaryTorqueGain]) +
+                                   x[kSecondaryInertia_kgm2] * data.omega_s.slow_slope +
+                                   (x[kSecondaryLoss_Nm] + x[kSecondaryLossPerSpeed_Nms] * omega_s +
+                                    x[kSecondaryLossPerkN_Nm] * 1e-3 * force));
       if (data.torque_is_engine) {
         balance += variator.primary_inertia_kg_m2 * (data.omega_p.slope - data.omega_p.slow_slope);
       }

@@ -51,7 +51,8 @@ TEST(Timing, TheAccelerationOfALateSpeedIsLateToo) {
   machine[kSecondaryInertia_kgm2] = kInertia_kgm2;
   machine[kLossConstant_Nm] = machine[kLossPerSpeed_Nms] = machine[kDeformationPerkN] = 0.0;
   machine[kLossPerkN_Nm] = 0.0;
-  machine[kSecondaryLoss_Nm] = machine[kSecondaryLossPerSpeed_Nms] = 0.0;
+  machine[kSecondaryLoss_Nm] = machine[kSecondaryLossPerSpeed_Nms] =
+      machine[kSecondaryLossPerkN_Nm] = 0.0;
   const std::vector<Slot> slots = make_slots({run});
   Eigen::VectorXd late = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(slots.size()));
   for (std::size_t i = 0; i < slots.size(); ++i) {

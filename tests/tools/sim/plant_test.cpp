@@ -210,6 +210,25 @@ TEST(Plant, MacroSlipGrowsWithTheTorqueDeficit) {
   EXPECT_NEAR(rate_percent_s, 100.0 * 0.01 * belt_Nm / (0.5 * ratio * 105.0), 2e-3);
 }
 
+TEST(Plant, LosesBehindTheBeltInProportionToTheClampForce) {
+  RigScenario s = rig({});
+  const auto load_Nm = [&](double per_N) {
+    s.variator.secondary_loss_Nm_per_N = per_N;
+    VariatorPlant plant(s.variator, s.friction());
+    EXPECT_TRUE(plant.settle(105.0, 30.0, 3000.0));
+    const double balancing_Nm = plant.balancing_load_Nm(30.0, 3000.0);
+    // In balance it stays as it is.
+    PlantInput input;
+    input.clamp_force_N = 3000.0;
+    input.drive_torque_Nm = 30.0;
+    input.load_torque_Nm = balancing_Nm;
+    for (int i = 0; i < 200; ++i) plant.step(input, 5e-4);
+    EXPECT_NEAR(plant.state().omega_p_rad_s, 105.0, 1e-3);
+    return balancing_Nm;
+  };
+  EXPECT_NEAR(load_Nm(0.0) - load_Nm(2e-4), 0.6, 1e-6);
+}
+
 TEST(Plant, IntegratorIsOfSecondOrderAndStableWhenStiff) {
   RigScenario s = rig({"belts.new.curve=magic_formula"});
   const auto omega_after = [&](double step_s, double time_s) {

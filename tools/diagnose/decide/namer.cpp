@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <set>
@@ -76,9 +77,11 @@ constexpr double kLeftOutSure = 3.0;
 // Chosen, times the threshold: sums of exponential variables have heavier tails than the normal.
 constexpr double kRippleTail = 3.0;
 
-constexpr std::array kConstants{kDeformationPerkN, kLossConstant_Nm,          kLossPerSpeed_Nms,
-                                kLossPerkN_Nm,     kLnRatioOverdrive,         kLnRatioLow,
-                                kSecondaryLoss_Nm, kSecondaryLossPerSpeed_Nms};
+constexpr std::array kConstants{
+    kDeformationPerkN,     kDeformationPerkN2, kLossConstant_Nm,
+    kLossPerSpeed_Nms,     kLossPerkN_Nm,      kLnRatioOverdrive,
+    kLnRatioLow,           kSecondaryLoss_Nm,  kSecondaryLossPerSpeed_Nms,
+    kSecondaryLossPerkN_Nm};
 
 std::string_view id_of(const Engine& engine, int slot) {
   return engine.campaign().slots[static_cast<std::size_t>(slot)].row->id;
@@ -193,6 +196,37 @@ bool bends_machine(const Engine& engine, const Hypothesis& h) {
   return off(h.state) > std::max(kTolerances, off(engine.state()) + 1.0);
 }
 
+// The least clamp force of all samples that count, as configured.
+double least_force_kN(const Campaign& campaign) {
+  const estimator::VariatorParameters& variator = campaign.variator;
+  double least_Pa = std::numeric_limits<double>::infinity();
+  for (const ExperimentData& run : campaign.runs) {
+    for (int k = 0; k < run.size(); ++k) {
+      if (run.valid[static_cast<std::size_t>(k)]) {
+        least_Pa = std::min(least_Pa, run.pressure.value[k]);
+      }
+    }
+  }
+  return 1e-3 * (variator.secondary_piston_area_m2 * least_Pa + variator.secondary_spring_force_N);
+}
+
+// Pulleys that open as the force falls are none: there the machine's own giving way, below zero,
+// makes up for what the effect is said to be.
+bool opens_with_less_force(const Engine& engine, const Hypothesis& h) {
+  const Campaign& campaign = engine.campaign();
+  double per_kN = h.state.nuisance[kDeformationPerkN];
+  double per_kN2 = h.state.nuisance[kDeformationPerkN2];
+  bool is_asked = false;
+  for (const int slot : h.slots) {
+    const EffectRow& row = *campaign.slots[static_cast<std::size_t>(slot)].row;
+    if (row.id != "pulley_deformation") continue;
+    is_asked = true;
+    (row.parameter == "per_kN" ? per_kN : per_kN2) +=
+        h.state.effects[slot] + campaign.switched_on[slot];
+  }
+  return is_asked && per_kN + 2.0 * per_kN2 * least_force_kN(campaign) < 0.0;
+}
+
 // A value that is held from one sample to the next is late by half the time between them, and one
 // held from one step to the next is off by half a step: that much is no finding.
 bool is_beyond_holding(const Engine& engine, int slot, double size) {
@@ -252,8 +286,9 @@ bool credible(const Engine& engine, int slot, double size) {
   const bool shifts_speed = row.id == "channel_skew" && !shifts_pressure(which);
   if (shifts_speed && !engine.campaign().speeds_move) return false;
   const double whole = engine.campaign().switched_on[slot] + size;
+  const double least = least_size(engine.campaign(), slot);
   return std::abs(size) / row.typical < kBelievable && whole < row.high &&
-         (whole > row.low || row.low == 0.0);
+         (whole > least || least == 0.0);
 }
 
 // Friction that falls from one experiment on and rises from another one on is no wear.
@@ -267,7 +302,9 @@ bool comes_back(const Engine& engine, const Hypothesis& h) {
 }
 
 bool credible(const Engine& engine, const Hypothesis& h) {
-  if (bends_machine(engine, h) || comes_back(engine, h)) return false;
+  if (bends_machine(engine, h) || comes_back(engine, h) || opens_with_less_force(engine, h)) {
+    return false;
+  }
   return std::all_of(h.slots.begin(), h.slots.end(),
                      [&](int slot) { return credible(engine, slot, h.state.effects[slot]); });
 }

@@ -393,8 +393,8 @@ Engine::Engine(Campaign campaign, int jobs) : jobs_(jobs), campaign_(std::move(c
     const bool is_overdrive = i == kLnPeakSlipOverdrive ||
                               (i >= kShapeOverdrive && i < kShapeLow) || i == kLnRatioOverdrive;
     if ((is_low && !low) || (is_overdrive && !overdrive)) continue;
-    const bool is_secondary =
-        i == kSecondaryInertia_kgm2 || i == kSecondaryLoss_Nm || i == kSecondaryLossPerSpeed_Nms;
+    const bool is_secondary = i == kSecondaryInertia_kgm2 || i == kSecondaryLoss_Nm ||
+                              i == kSecondaryLossPerSpeed_Nms || i == kSecondaryLossPerkN_Nm;
     if (is_secondary && !campaign_.has_balance) continue;
     if (i == kSecondaryTorqueGain && !campaign_.has_balance) continue;
     if (campaign_.nuisances[static_cast<std::size_t>(i)].tolerance == 0.0) continue;  // is known
@@ -893,7 +893,8 @@ void Engine::move(const std::vector<int>& parameters, const VectorXd& step, doub
       value += by;
       // The data hold it far better than the usual values do: without a bound any drag would be the
       // machine's own, and what it explains would be no gain.
-      constexpr std::array kBounded{kLossPerkN_Nm, kSecondaryTorqueGain, kPressureBias_Pa};
+      constexpr std::array kBounded{kLossPerkN_Nm, kSecondaryLossPerkN_Nm, kSecondaryTorqueGain,
+                                    kPressureBias_Pa};
       if (std::find(kBounded.begin(), kBounded.end(), parameters[j]) != kBounded.end()) {
         const NuisanceRow& row = campaign_.nuisances[static_cast<std::size_t>(parameters[j])];
         value = std::clamp(value, row.nominal - kReach * row.tolerance,
@@ -901,10 +902,11 @@ void Engine::move(const std::vector<int>& parameters, const VectorXd& step, doub
       }
     } else {
       const int slot = parameters[j] - kNuisanceCount;
-      const EffectRow& row = *campaign_.slots[static_cast<std::size_t>(slot)].row;
       const double on = campaign_.switched_on[slot];
-      state.effects[slot] = std::clamp(state.effects[slot] + by, std::min(0.0, row.low - on),
-                                       std::max(0.0, row.high - on));
+      const EffectRow& row = *campaign_.slots[static_cast<std::size_t>(slot)].row;
+      state.effects[slot] =
+          std::clamp(state.effects[slot] + by, std::min(0.0, least_size(campaign_, slot) - on),
+                     std::max(0.0, row.high - on));
     }
   }
 }

@@ -76,6 +76,12 @@ ArrayXd slip_noise_of_force(const Campaign& campaign, const Quantities& q) {
 }
 }  // namespace
 
+double least_size(const Campaign& campaign, int slot) {
+  const EffectRow& row = *campaign.slots[static_cast<std::size_t>(slot)].row;
+  return row.id == "inertia_torque" ? std::max(row.low, -campaign.variator.primary_inertia_kg_m2)
+                                    : row.low;
+}
+
 Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state) {
   const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
   Residuals out;
@@ -350,9 +356,10 @@ QuantityChange ratio_change(const Residuals& at, const ArrayXd& ln_ratio) {
   return change;
 }
 
-QuantityChange deformation_change(const ExperimentData& data, const Residuals& at) {
+QuantityChange deformation_change(const ExperimentData& data, const Residuals& at,
+                                  const ArrayXd& by) {
   const Quantities& q = at.there;
-  const ArrayXd ln_ratio = -1e-3 * q.force_N / (1.0 - q.deformation).max(0.05);
+  const ArrayXd ln_ratio = -by / (1.0 - q.deformation).max(kLeastRadiusShare);
   QuantityChange change;
   change.slip_share = (1.0 - q.slip_share) * ln_ratio;
   if (q.balance.size() > 0) {
@@ -384,7 +391,9 @@ std::optional<QuantityChange> known_change(const Campaign& campaign, const Exper
       return ratio_change(at, here);
     }
     case kDeformationPerkN:
-      return deformation_change(data, at);
+      return deformation_change(data, at, 1e-3 * at.there.force_N);
+    case kDeformationPerkN2:
+      return deformation_change(data, at, 1e-6 * at.there.force_N.square());
     case kCommandOffset_Pa: {
       QuantityChange change;
       change.tracking = ArrayXd::Constant(n, -1.0);
@@ -401,6 +410,8 @@ std::optional<QuantityChange> known_change(const Campaign& campaign, const Exper
       return balance_change(-at.measured.ratio);
     case kSecondaryLossPerSpeed_Nms:
       return balance_change(-at.measured.ratio * at.measured.omega_s);
+    case kSecondaryLossPerkN_Nm:
+      return balance_change(-1e-3 * at.there.ratio * at.there.force_N);
     case kSecondaryTorqueGain: {  // by the torque of the foot point: no noise in a regressor
       QuantityChange change = balance_change(at.clean_Nm);
       const double inertia_kg_m2 =
@@ -524,15 +535,14 @@ ResidualColumns secant(const Campaign& campaign, int run, const ModelState& stat
 }
 
 namespace {
-// The slip's noise is that of the speeds: what the clamp force's comes to in it counts by itself.
-ModelState with_stiff_pulleys(ModelState state) {
-  state.nuisance[kDeformationPerkN] = 0.0;
-  return state;
+// The slip's noise is that of the speeds: what the clamp force's comes to in it, by pulleys that
+// give way, counts by itself, whoever says that they do.
+ArrayXd slip_by_stiff_pulleys(const Quantities& q) {
+  return 1.0 - (1.0 - q.slip_share) * (1.0 - q.deformation).max(kLeastRadiusShare);
 }
 }  // namespace
 
 NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& state) {
-  const ModelState stiff = with_stiff_pulleys(state);
   std::vector<double> slip_share, torque, tracking, force;
   std::array<std::vector<double>, kStops> balance;
   for (int run = 0; run < static_cast<int>(campaign.runs.size()); ++run) {
@@ -550,7 +560,7 @@ NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& st
         into.push_back(probe.at(y, k));
       }
     };
-    collect(quantities(campaign, data, run, stiff).slip_share, slip_share);
+    collect(slip_by_stiff_pulleys(q), slip_share);
     collect(q.belt_torque, torque);
     for (const int stop : {kOverdriveStop, kLowStop}) {
       collect(q.balance, balance[static_cast<std::size_t>(stop)], stop);
@@ -592,11 +602,10 @@ NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& st
 
 std::vector<double> estimate_slip_noise_shares(const Campaign& campaign, const ModelState& state) {
   constexpr double kLeast = 0.3, kMost = 5.0;
-  const ModelState stiff = with_stiff_pulleys(state);
   std::vector<double> sigma;
   for (int run = 0; run < static_cast<int>(campaign.runs.size()); ++run) {
     const ExperimentData& data = campaign.runs[static_cast<std::size_t>(run)];
-    const Quantities q = quantities(campaign, data, run, stiff);
+    const ArrayXd slip = slip_by_stiff_pulleys(quantities(campaign, data, run, state));
     std::vector<double> slip_share;
     constexpr int kReach = kFastProbe.reach();
     for (int k = kReach; k + kReach < data.size(); ++k) {
@@ -604,7 +613,7 @@ std::vector<double> estimate_slip_noise_shares(const Campaign& campaign, const M
           !data.valid[static_cast<std::size_t>(k) + kReach]) {
         continue;
       }
-      slip_share.push_back(kFastProbe.at(q.slip_share, k));
+      slip_share.push_back(kFastProbe.at(slip, k));
     }
     const double here = robust_sigma(slip_share);
     const double share =

@@ -92,6 +92,9 @@ struct Campaign {
   bool has_tracking = false;
 };
 
+// The least that an effect may be: what its table says, and no shaft has less inertia than none.
+double least_size(const Campaign& campaign, int slot);
+
 // Residuals of one experiment and what their derivatives need.
 struct Residuals {
   std::array<Eigen::ArrayXd, kResidualKinds> value;  // empty where the kind does not exist

@@ -136,7 +136,8 @@ double variance_of_halves(const Engine& engine, const std::vector<Score>& scores
     if (!(score.gain > kHalf * best->gain)) continue;
     const EffectRow& row = *engine.campaign().slots[static_cast<std::size_t>(score.slot)].row;
     slots.push_back(score.slot);
-    sizes.push_back(std::clamp(score.value, row.low, row.high) / row.typical);
+    const double least = least_size(engine.campaign(), score.slot);
+    sizes.push_back(std::clamp(score.value, least, row.high) / row.typical);
   }
   if (slots.empty()) return 0.0;
   const Eigen::VectorXd levers = beside(engine, slots, lever).levers;

@@ -40,6 +40,7 @@ enum Nuisance : int {
   kShapeLow = kShapeOverdrive + kShapeKnots,
   kEndOfShapes = kShapeLow + kShapeKnots - 1,
   kDeformationPerkN,
+  kDeformationPerkN2,
   kLossConstant_Nm,
   kLossPerSpeed_Nms,
   kLossPerkN_Nm,
@@ -48,6 +49,7 @@ enum Nuisance : int {
   kSecondaryInertia_kgm2,
   kSecondaryLoss_Nm,
   kSecondaryLossPerSpeed_Nms,
+  kSecondaryLossPerkN_Nm,
   kSecondaryTorqueGain,  // T_measured = (1 + gain) T_true, as far as the sensors' accuracies go
   kPressureBias_Pa,      // p_measured = p_true + bias, the same
   kCommandOffset_Pa,     // tracking residual only
@@ -70,6 +72,8 @@ struct Readings {
   const Eigen::ArrayXd& torque_Nm;
 };
 
+constexpr double kLeastRadiusShare = 0.05;  // chosen: no deformation leaves less
+
 // State of one evaluation; effects change it at their injection point.
 struct Context {
   const ExperimentData& run;
@@ -85,7 +89,7 @@ struct Context {
   Eigen::ArrayXd track;        // what p_s should be by the command (tracking residual)
   Eigen::ArrayXd force_N;      // F_s
   Eigen::ArrayXd loss_Nm;      // between shaft and belt, drag positive
-  Eigen::ArrayXd deformation;  // r_g = r_g0 (1 - deformation) exp(ln_ratio)
+  Eigen::ArrayXd deformation;  // r_g = r_g0 max(1 - deformation, kLeastRadiusShare) exp(ln_ratio)
   // F d(deformation)/dF beyond the deformation itself; empty: it grows in proportion.
   Eigen::ArrayXd deformation_bend;
   Eigen::ArrayXd ln_ratio;

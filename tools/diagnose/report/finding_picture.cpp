@@ -43,11 +43,16 @@ QuantityChange of_force(const Residuals& at, const Eigen::VectorXd& nuisance) {
   constexpr double kPerN = 1e-3;  // of what is given per kN
   QuantityChange out;
   out.ln_capacity = 1.0 / at.measured.force_N.max(50.0);
-  out.slip_share = -kPerN * nuisance[kDeformationPerkN] * (1.0 - at.measured.slip_share) /
-                   (1.0 - at.measured.deformation);
+  const ArrayXd deformation =
+      kPerN * nuisance[kDeformationPerkN] +
+      2.0 * kPerN * kPerN * nuisance[kDeformationPerkN2] * at.measured.force_N;
+  out.slip_share = -deformation * (1.0 - at.measured.slip_share) / (1.0 - at.measured.deformation);
   out.torque = ArrayXd::Constant(at.foot.size(), -kPerN * nuisance[kLossPerkN_Nm]);
   out.balance = out.torque;
-  if (at.measured.balance.size() > 0) out.balance -= at.clean_Nm * out.slip_share;
+  if (at.measured.balance.size() > 0) {
+    out.balance -=
+        at.clean_Nm * out.slip_share + kPerN * nuisance[kSecondaryLossPerkN_Nm] * at.measured.ratio;
+  }
   return out;
 }
 QuantityChange of_friction(const Residuals& at, const Eigen::VectorXd& /*nuisance*/) {

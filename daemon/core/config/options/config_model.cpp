@@ -44,6 +44,7 @@ constexpr OptionRow kFriction[] = {
 constexpr OptionRow kDriveline[] = {
     key("driveline", "deformation_per_kN", "1/kN",
         "Share of the ratio that the deformation of the pulleys takes, per clamping force."),
+    key("driveline", "deformation_per_kN2", "1/kN^2", "And per square of it."),
     key("driveline", "loss_constant_Nm", "Nm", "Torque that is lost before the belt, constant."),
     key("driveline", "loss_per_rad_s_Nm", "Nm s/rad", "And per speed of the primary pulley."),
     key("driveline", "loss_per_kN_Nm", "Nm/kN", "And per clamping force."),
@@ -56,6 +57,7 @@ constexpr OptionRow kDriveline[] = {
         "Torque that is lost between the belt and secondary_torque, constant."),
     key("driveline", "secondary_loss_per_rad_s_Nm", "Nm s/rad",
         "And per speed of the secondary pulley."),
+    key("driveline", "secondary_loss_per_kN_Nm", "Nm/kN", "And per clamping force."),
     key("driveline", "command_offset_Pa", "Pa",
         "By how much the secondary pressure is above its command."),
     key("driveline", "command_gain", "", "And by which share of the command."),
@@ -274,6 +276,7 @@ MachineEffects whole_machine(const ModelFile& model) {
   out.secondary_loss_constant_Nm += given("secondary_loss_constant_Nm");
   out.secondary_loss_per_rad_s_Nm += given("secondary_loss_per_rad_s_Nm");
   out.deformation_per_kN += given("deformation_per_kN");
+  out.deformation_per_kN2 += given("deformation_per_kN2");
   out.end_stop_low += given("ratio_low_relative");
   out.end_stop_overdrive += given("ratio_overdrive_relative");
   return out;

@@ -40,7 +40,7 @@ void apply_deformation_linear(Context& c, const Slot&, double per_kN) {
 void apply_deformation_quadratic(Context& c, const Slot&, double per_kN2) {
   const Eigen::ArrayXd deformation = per_kN2 * 1e-6 * c.force_N.square();
   c.deformation += deformation;
-  c.deformation_bend = deformation;
+  c.deformation_bend += deformation;
 }
 void apply_radius_tilt(Context& c, const Slot&, double per_Nm) { c.ln_ratio -= per_Nm * c.torque; }
 void apply_end_stop_low(Context& c, const Slot&, double relative) {
