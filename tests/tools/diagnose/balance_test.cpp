@@ -1,7 +1,9 @@
 // The balance of torques before and behind the belt, of a machine without any loss.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "tests/tools/diagnose/noise.h"
 #include "tools/diagnose/infer/engine.h"
@@ -130,6 +132,29 @@ TEST(Balance, HoldsWhereTheEnginesTorqueReadsTooMuch) {
     if (!run.valid[static_cast<std::size_t>(k)]) continue;
     EXPECT_NEAR(balance[k], 0.0, 0.03) << k;
   }
+}
+
+// What the shaft turns, configured and beyond, is no less than nothing: a fit that asks for less
+// ends there.
+TEST(Balance, NoShaftHasLessInertiaThanNone) {
+  estimator::VariatorParameters variator;
+  variator.primary_inertia_kg_m2 = kInertia_kgm2;
+  const Engine engine(make_campaign({prepare(pulse(variator), variator)}, nominal_model(variator)));
+  const std::vector<Slot>& slots = engine.campaign().slots;
+  const auto found = std::find_if(slots.begin(), slots.end(), [](const Slot& each) {
+    return each.row->id == "inertia_torque";
+  });
+  ASSERT_NE(found, slots.end());
+  const auto slot = static_cast<int>(found - slots.begin());
+  const std::vector<int> parameters{kNuisanceCount + slot};
+  const auto moved_by = [&](double size_kg_m2) {
+    ModelState state = engine.state();
+    const double step = size_kg_m2 / engine.scale(parameters[0]);
+    engine.move(parameters, Eigen::VectorXd::Constant(1, step), 1.0, state);
+    return state.effects[slot];
+  };
+  EXPECT_NEAR(moved_by(-0.5 * kInertia_kgm2), -0.5 * kInertia_kgm2, 1e-12);
+  EXPECT_NEAR(moved_by(-2.0 * kInertia_kgm2), -kInertia_kgm2, 1e-12);
 }
 
 // By the more accurate one less: of stated 3 and 4 % a gain is the primary's by 9 in 25.

@@ -66,8 +66,7 @@ ArrayXd force_noise_share(const Campaign& campaign, const ExperimentData& data) 
 
 // What it comes to in the slip, by the pulleys that give way.
 ArrayXd slip_noise_of_force(const Campaign& campaign, const Quantities& q) {
-  ArrayXd out = q.deformation;
-  if (q.deformation_bend.size() > 0) out += q.deformation_bend;
+  ArrayXd out = q.deformation + q.deformation_bend;
   for_rows(out.size(), [noise_N = campaign.noise.force_N, slip = q.slip_share.data(),
                         force_N = q.force_N.data(), to = out.data()](Row k) BELTGRIP_INLINE {
     to[k] *= noise_N * (1.0 - slip[k]) / std::max(force_N[k], kLeast_N);

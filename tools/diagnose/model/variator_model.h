@@ -90,7 +90,7 @@ struct Context {
   Eigen::ArrayXd force_N;      // F_s
   Eigen::ArrayXd loss_Nm;      // between shaft and belt, drag positive
   Eigen::ArrayXd deformation;  // r_g = r_g0 max(1 - deformation, kLeastRadiusShare) exp(ln_ratio)
-  // F d(deformation)/dF beyond the deformation itself; empty: it grows in proportion.
+  // F d(deformation)/dF beyond the deformation itself; 0 where it grows in proportion.
   Eigen::ArrayXd deformation_bend;
   Eigen::ArrayXd ln_ratio;
   Eigen::ArrayXd slip_share, belt_torque;
