@@ -629,7 +629,7 @@ TEST_F(Diagnose, ASaturatedTorqueIsLeftOutAndSaid) {
     });
   }
   const json result = of(recording.csv);
-  EXPECT_NE(result.at("verdict"), "explained") << result.dump(1);
+  EXPECT_EQ(result.at("findings").size(), 0U) << result.dump(1);
   EXPECT_NE(notes(result).find("a torque rests on its bound"), std::string::npos) << notes(result);
 }
 

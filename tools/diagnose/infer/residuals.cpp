@@ -77,8 +77,10 @@ ArrayXd slip_noise_of_force(const Campaign& campaign, const Quantities& q) {
 
 double least_size(const Campaign& campaign, int slot) {
   const EffectRow& row = *campaign.slots[static_cast<std::size_t>(slot)].row;
-  return row.id == "inertia_torque" ? std::max(row.low, -campaign.variator.primary_inertia_kg_m2)
-                                    : row.low;
+  const estimator::VariatorParameters& variator = campaign.variator;
+  if (row.id == "inertia_torque") return std::max(row.low, -variator.primary_inertia_kg_m2);
+  if (row.id == "centrifugal_force") return std::max(row.low, -variator.secondary_centrifugal_N_s2);
+  return row.low;
 }
 
 Residuals residuals_of(const Campaign& campaign, int run, const ModelState& state) {

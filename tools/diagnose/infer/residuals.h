@@ -92,7 +92,8 @@ struct Campaign {
   bool has_tracking = false;
 };
 
-// The least that an effect may be: what its table says, and no shaft has less inertia than none.
+// The least that an effect may be: what its table says, and with what is configured no shaft has
+// less inertia than none and no oil that turns pulls.
 double least_size(const Campaign& campaign, int slot);
 
 // Residuals of one experiment and what their derivatives need.

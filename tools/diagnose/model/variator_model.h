@@ -72,7 +72,9 @@ struct Readings {
   const Eigen::ArrayXd& torque_Nm;
 };
 
-constexpr double kLeastRadiusShare = 0.05;  // chosen: no deformation leaves less
+// Chosen (moved): no deformation leaves less; those of machines take some per cent, so that another
+// one decides nothing.
+constexpr double kLeastRadiusShare = 0.05;
 
 // State of one evaluation; effects change it at their injection point.
 struct Context {
