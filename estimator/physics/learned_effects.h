@@ -15,6 +15,7 @@ struct LearnedConditions {
   double oil_temperature_degC = std::numeric_limits<double>::quiet_NaN();
   double primary_speed_rad_s = std::numeric_limits<double>::quiet_NaN();
   double primary_pressure_Pa = std::numeric_limits<double>::quiet_NaN();
+  double secondary_pressure_Pa = std::numeric_limits<double>::quiet_NaN();  // as measured
   double torque_Nm = std::numeric_limits<double>::quiet_NaN();
 };
 
@@ -26,6 +27,8 @@ constexpr double condition(const LearnedConditions& now, LearnedVariable variabl
       return now.primary_speed_rad_s;
     case LearnedVariable::kPrimaryPressure:
       return now.primary_pressure_Pa;
+    case LearnedVariable::kSecondaryPressure:
+      return now.secondary_pressure_Pa;
     case LearnedVariable::kTorque:
       break;
   }

@@ -28,16 +28,18 @@ enum class LearnedVariable : std::uint8_t {
   kOilTemperature,
   kPrimarySpeed,
   kPrimaryPressure,
+  kSecondaryPressure,
   kTorque,
 };
 struct LearnedRole {
   std::string_view role;
   LearnedVariable variable;
 };
-inline constexpr std::array<LearnedRole, 5> kLearnedRoles{{
+inline constexpr std::array<LearnedRole, 6> kLearnedRoles{{
     {"oil_temperature", LearnedVariable::kOilTemperature},
     {"primary_speed", LearnedVariable::kPrimarySpeed},
     {"primary_pressure", LearnedVariable::kPrimaryPressure},
+    {"secondary_pressure", LearnedVariable::kSecondaryPressure},
     {"primary_torque", LearnedVariable::kTorque},
     {"engine_torque", LearnedVariable::kTorque},
 }};

@@ -74,6 +74,7 @@ const VariatorSample& InputCorrection::correct(const VariatorSample& measured,
   out_ = measured;
   force_error_N_ = 0.0;
   now.primary_speed_rad_s = measured.omega_p_rad_s;
+  now.secondary_pressure_Pa = measured.secondary_pressure_Pa;
   now.torque_Nm = measured.torque_Nm;
   uncovered_ = nullptr;
   for (const LearnedTerm& each : learned_) {

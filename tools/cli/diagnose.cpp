@@ -40,6 +40,7 @@ bool is_table(const std::string& path) { return path.ends_with(".csv"); }
 struct Loaded {
   daemon::Config config;
   diagnose::Accuracies stated;  // of the sensors
+  std::vector<daemon::AssumedAccuracy> assumed;
 };
 
 Loaded load(const DiagnoseOptions& options) {
@@ -54,7 +55,7 @@ Loaded load(const DiagnoseOptions& options) {
     }
     throw Failure{result.exit_code(), result.errors.back().text};
   }
-  return {*result.config, result.stated};
+  return {*result.config, result.stated, result.assumed};
 }
 
 diagnose::SignalTable read(const std::string& path, const daemon::Config& config) {
@@ -124,7 +125,7 @@ std::string today() { return utc(static_cast<double>(std::time(nullptr))).substr
 
 void run_diagnose(const DiagnoseOptions& options) {
   end_in_good_order();
-  const auto [config, stated] = load(options);
+  const auto [config, stated, assumed] = load(options);
   diagnose::Request request;
   daemon::ModelFile before = diagnose::nominal_model(config.variator);
   if (!options.model.empty()) {
@@ -136,6 +137,7 @@ void run_diagnose(const DiagnoseOptions& options) {
   }
   request.model = before;
   request.accuracies = stated;
+  request.assumed = assumed;
   request.is_model_given = !options.model.empty();
   Inputs inputs(options.logs);
   inputs.add(options.held_out);

@@ -42,6 +42,9 @@ BeyondBox EstimateStage::beyond() const noexcept {
     case estimator::LearnedVariable::kPrimaryPressure:
       beyond.role = Role::kPrimaryPressure;
       break;
+    case estimator::LearnedVariable::kSecondaryPressure:
+      beyond.role = Role::kSecondaryPressure;
+      break;
     case estimator::LearnedVariable::kTorque:
       beyond.role = torque_is_engine_ ? Role::kEngineTorque : Role::kPrimaryTorque;
       break;

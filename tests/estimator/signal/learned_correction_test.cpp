@@ -97,6 +97,14 @@ TEST(LearnedCorrection, FollowsWhatTheSampleHas) {
   EXPECT_EQ(correction.uncovered_at(), 151.0);
   EXPECT_TRUE(correction.correct(sample()).usable);
   EXPECT_EQ(correction.uncovered(), nullptr);
+
+  term.variable = LearnedVariable::kSecondaryPressure;
+  term.knot = {1e5, 2e5, 3e5};
+  InputCorrection over_pressure({}, {}, kRate_hz, {&term, 1});
+  EXPECT_NEAR(over_pressure.correct(sample()).torque_Nm, 48.0, 1e-9);
+  VariatorSample light = sample();
+  light.secondary_pressure_Pa = 0.9e5;
+  EXPECT_FALSE(over_pressure.correct(light).usable);
 }
 
 }  // namespace

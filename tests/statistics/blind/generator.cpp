@@ -157,6 +157,9 @@ double Experiment::friction_level(double t_s, double force_N, double omega_p, do
   return mu;
 }
 
+// From 0 to 1 about 6 kN, most of it within 1 kN.
+double sets_in(double force_kN) { return 0.5 * (1.0 + std::tanh((force_kN - 6.0) / 0.5)); }
+
 double Experiment::ratio_now(double force_N, double torque_Nm) const {
   const bool low = trial_.plan[static_cast<std::size_t>(index_)].low;
   const double kN = force_N * 1e-3;
@@ -166,6 +169,7 @@ double Experiment::ratio_now(double force_N, double torque_Nm) const {
            fault_("pulley_deformation.per_kN2") * kN * kN;
   ratio *= 1.0 - fault_("radius_tilt.per_Nm") * torque_Nm;
   ratio *= 1.0 + fault_("x_ratio_temperature.size") * (temperature_C_ - 80.0) / 50.0;
+  ratio *= 1.0 + fault_("x_ratio_force_step.size") * sets_in(kN);
   ratio *= 1.0 + fault_("x_belt_passage.size") * std::sin(belt_phase_);
   return ratio * std::exp(low ? creep_ : -creep_);
 }
@@ -287,7 +291,8 @@ History Experiment::run() {
                         fault_("torque_loss.constant_Nm") +
                         fault_("torque_loss.per_kN_Nm") * force * 1e-3 +
                         fault_("torque_loss.per_rad_s_Nm") * omega_p +
-                        fault_("x_loss_temperature.size") * (80.0 - temperature_C_) / 40.0;
+                        fault_("x_loss_temperature.size") * (80.0 - temperature_C_) / 40.0 +
+                        fault_("x_loss_force_step.size") * sets_in(force * 1e-3);
     const auto drag = [&](double w) {
       return m_.secondary_loss_Nm + fault_("secondary_loss.constant_Nm") +
              (m_.secondary_loss_per_speed_Nms + fault_("secondary_loss.per_rad_s_Nm")) * w;
@@ -582,9 +587,9 @@ const std::vector<std::string>& outside_causes() {
 }
 
 const std::vector<std::string>& further_causes() {
-  static const std::vector<std::string> kAll{"x_gain_temperature", "x_gain_speed",
-                                             "x_friction_dip",     "x_friction_between",
-                                             "x_force_ripple",     "x_belt_passage"};
+  static const std::vector<std::string> kAll{
+      "x_gain_temperature", "x_gain_speed",   "x_friction_dip",    "x_friction_between",
+      "x_force_ripple",     "x_belt_passage", "x_loss_force_step", "x_ratio_force_step"};
   return kAll;
 }
 

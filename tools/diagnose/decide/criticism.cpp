@@ -104,6 +104,8 @@ const Cell* own_shape(const Campaign& campaign, const std::vector<int>& accepted
                       const std::vector<Cell>& cells) {
   const Cell* out = nullptr;
   for (const Cell& cell : cells) {
+    // The friction curve follows the pressure too, and what it leaves is nothing of the effect's.
+    if (std::string_view(cell.abscissa.variable->name) == "secondary_pressure") continue;
     const bool is_own = std::any_of(accepted.begin(), accepted.end(), [&](int slot) {
       return campaign.slots[static_cast<std::size_t>(slot)].row->depends_on ==
              cell.abscissa.variable->name;
@@ -135,6 +137,7 @@ Criticism criticise(const Engine& engine, Steps steps) {
   out.base = scatter_base(engine);
   double law = 0.0, smooth = 0.0;
   for (const Cell& cell : out.cells) {
+    if (cell.is_told_by_form) continue;
     // A step that a smooth function sees nothing of rests on a moment of one experiment.
     if (cell.smooth_gain > thresholds::kSmoothBeside) law = std::max(law, cell.law_gain);
     smooth = std::max(smooth, cell.smooth_gain);

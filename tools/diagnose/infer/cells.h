@@ -44,6 +44,9 @@ struct CellScore {
 struct Cell {
   const InjectionRow* injection = nullptr;
   Abscissa abscissa;
+  // From the friction curve by the form that friction usually has, and by nothing else: it may
+  // explain what fails a test, and fails none itself.
+  bool is_told_by_form = false;
   std::vector<CellScore> scores;  // by scatter, from the fitted to the usual
   double law_gain = 0.0;          // twice the log evidence of the best family of laws over none
   double smooth_gain = 0.0;       // the same of a smooth function

@@ -15,6 +15,7 @@ using Eigen::ArrayXd;
 constexpr double kVaried = 0.05;      // of its middle; less may be the channel's own noise
 constexpr double kMovesShare = 0.06;  // of the span: an experiment that moves it less has one value
 constexpr double kLevelShare = 0.03;  // of the span: means nearer than that are one level
+constexpr double kSwept = 0.5;  // chosen, of the span: what experiments cover of it on average
 constexpr std::size_t kSamplesMin = 50;
 
 using estimator::LearnedVariable;
@@ -34,8 +35,8 @@ constexpr std::array kAll{
                   LearnedVariable::kOilTemperature},
     IndexVariable{"primary_speed", value_of<LearnedVariable::kPrimarySpeed>,
                   LearnedVariable::kPrimarySpeed},
-    IndexVariable{"secondary_pressure",
-                  [](const ExperimentData& r, int) -> ArrayXd { return r.pressure.slow; }},
+    IndexVariable{"secondary_pressure", value_of<LearnedVariable::kSecondaryPressure>,
+                  LearnedVariable::kSecondaryPressure},
     IndexVariable{"primary_pressure", value_of<LearnedVariable::kPrimaryPressure>,
                   LearnedVariable::kPrimaryPressure},
     IndexVariable{"torque", value_of<LearnedVariable::kTorque>, LearnedVariable::kTorque},
@@ -57,7 +58,8 @@ std::vector<double> valid_values(const ExperimentData& run, const ArrayXd& in) {
   return out;
 }
 
-void number_levels(Abscissa& out) {
+// apart: each experiment is a level of its own.
+void number_levels(bool apart, Abscissa& out) {
   std::vector<std::size_t> order;
   for (std::size_t e = 0; e < out.x.size(); ++e) {
     if (out.x[e].size() > 0) order.push_back(e);
@@ -67,7 +69,7 @@ void number_levels(Abscissa& out) {
   out.level.assign(out.x.size(), -1);
   double begun = 0.0;
   for (const std::size_t e : order) {
-    if (out.levels == 0 || out.mean[e] - begun > kLevelShare * (out.high - out.low)) {
+    if (apart || out.levels == 0 || out.mean[e] - begun > kLevelShare * (out.high - out.low)) {
       ++out.levels;
       begun = out.mean[e];
     }
@@ -103,14 +105,18 @@ std::optional<Abscissa> abscissa_of(const Campaign& campaign, const IndexVariabl
   out.high = all[all.size() - 1 - all.size() / 100];
   const double span = out.high - out.low;
   if (!(span > kVaried * std::abs(all[all.size() / 2]) + 1e-12)) return std::nullopt;
+  double covered = 0.0, used = 0.0;
   for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
     if (out.x[e].size() == 0) continue;
     const std::vector<double> here = valid_values(campaign.runs[e], out.x[e]);
     const auto [least, most] = std::minmax_element(here.begin(), here.end());
+    covered += *most - *least;
+    used += 1.0;
     if (*most - *least < kMovesShare * span) out.x[e].setConstant(out.mean[e]);
     out.x[e] = ((out.x[e] - out.low) / span).max(0.0).min(1.0);
   }
-  number_levels(out);
+  // What each experiment sweeps has as many levels as anybody asks for; left out are experiments.
+  number_levels(covered > kSwept * span * used, out);
   return out;
 }
 

@@ -58,6 +58,8 @@ ArrayXd recorded(const ExperimentData& run, LearnedVariable variable) {
       return run.omega_p.slow;
     case LearnedVariable::kPrimaryPressure:
       return run.pressure_p.present ? run.pressure_p.slow : ArrayXd();
+    case LearnedVariable::kSecondaryPressure:
+      return run.pressure.slow;
     case LearnedVariable::kTorque:
       break;
   }
@@ -69,9 +71,11 @@ ArrayXd recorded(const ExperimentData& run, LearnedVariable variable) {
 
 ArrayXd regressor(const ExperimentData& run, LearnedVariable variable) {
   const ArrayXd value = recorded(run, variable);
-  const bool is_quiet =
-      variable == LearnedVariable::kPrimarySpeed || variable == LearnedVariable::kPrimaryPressure;
-  return is_quiet || value.size() == 0 ? value : low_passed(value, run.dt_s);
+  // Of these it is the slow copy already.
+  const bool is_slow = variable == LearnedVariable::kPrimarySpeed ||
+                       variable == LearnedVariable::kPrimaryPressure ||
+                       variable == LearnedVariable::kSecondaryPressure;
+  return is_slow || value.size() == 0 ? value : low_passed(value, run.dt_s);
 }
 
 void apply_learned(Context& c, const estimator::LearnedTerm& term, Stage stage) {

@@ -85,6 +85,7 @@ class Run {
       return std::move(answer_);
     }
     check_friction(runs, request_.model.variator, implausible_);
+    note_assumed(runs);
     progress(0.1, "fit");
     Engine engine(make_campaign(std::move(runs), request_.model, request_.accuracies),
                   request_.jobs);
@@ -108,6 +109,18 @@ class Run {
   }
   void progress(double share, const std::string& what) const {
     if (request_.progress) request_.progress(share, what);
+  }
+
+  // What nobody told of a sensor that these data come from.
+  void note_assumed(const std::vector<ExperimentData>& runs) {
+    std::string all;
+    for (const daemon::AssumedAccuracy& each : request_.assumed) {
+      const bool is_torque = each.role == Role::kEngineTorque || each.role == Role::kPrimaryTorque;
+      const bool is_engine = each.role == Role::kEngineTorque;
+      if (is_torque && is_engine != runs.front().torque_is_engine) continue;
+      all += (all.empty() ? "" : ", ") + each.key + " = " + text_of(each.value);
+    }
+    if (!all.empty()) out().notes.push_back("assumed, since nobody told: " + all);
   }
 
   // With the note that most likely says why.

@@ -16,8 +16,9 @@ struct Request {
   std::vector<SignalTable> experiments;  // in the order in which they were made
   std::vector<SignalTable> held_out;     // empty: experiments are held out in turn
   ModelFile model;
-  bool is_model_given = false;  // else it is the usual machine
-  Accuracies accuracies{};      // what is known of the sensors'
+  bool is_model_given = false;                   // else it is the usual machine
+  Accuracies accuracies{};                       // what is known of the sensors'
+  std::vector<daemon::AssumedAccuracy> assumed;  // of these, what nobody told
   bool with_plots = false;
   int jobs = 1;                // threads; the answer is the same for every number
   std::function<bool()> stop;  // true: end with what is known

@@ -68,4 +68,26 @@ void assume(const TomlNode& root, const std::vector<std::string>& model_keys, Se
   if (config.friction_is_assumed) config.estimator.reading_reach = kReach;
 }
 
+void assume_beside(const SensorTexts& sensors, ConfigResult& result) {
+  const bool states_any = std::any_of(sensors.begin(), sensors.end(), [](const SensorText& each) {
+    return each.bias.has_value() || each.gain.has_value();
+  });
+  if (!states_any) return;
+  for (std::size_t i = 0; i < sensors.size(); ++i) {
+    const Role role = static_cast<Role>(i);
+    const std::optional<estimator::Sensor> sensor = sensor_of(role);
+    if (!sensor) continue;
+    const estimator::ChannelAccuracy& typical = estimator::typical_accuracy(*sensor).accuracy;
+    const std::string key = key_of("sensors", role_name(role));
+    const auto value = [&](const std::optional<double>& stated, double usual, std::string_view name,
+                           double& out) {
+      if (stated) return;
+      out = usual;
+      result.assumed.push_back({role, key_of(key, name), usual});
+    };
+    value(sensors[i].bias, typical.bias, bias_key(role_dimension(role)), result.stated[i].bias);
+    value(sensors[i].gain, typical.gain, "gain", result.stated[i].gain);
+  }
+}
+
 }  // namespace beltgrip::daemon

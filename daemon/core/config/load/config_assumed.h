@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/core/config/load/load_config.h"
 #include "daemon/core/config/options/config.h"
 #include "daemon/core/config/options/config_options.h"
 #include "daemon/core/config/toml/config_document.h"
@@ -16,5 +17,8 @@ using SensorTexts = std::array<SensorText, kRoleCount>;  // by role
 // `model_keys`: of [variator], that the model file states.
 void assume(const TomlNode& root, const std::vector<std::string>& model_keys, SensorTexts& sensors,
             Config& config);
+// The same for who reads no more than what [sensors] states: of a sensor that it leaves out beside
+// others.
+void assume_beside(const SensorTexts& sensors, ConfigResult& result);
 
 }  // namespace beltgrip::daemon

@@ -82,6 +82,7 @@ void Loader::load(ConfigScope scope) {
   for (std::size_t i = 0; i < result_.stated.size(); ++i) {
     result_.stated[i] = accuracy(static_cast<Role>(i));
   }
+  assume_beside(sensors_, result_);
   if (scope == ConfigScope::kAll) assume(root_, model_keys_, sensors_, config_);
   settle_sensors();
   result_.config = std::move(config_);

@@ -16,8 +16,10 @@ struct ConfigResult {
   std::optional<Config> config;       // set when errors is empty
   std::vector<ConfigError> errors;    // all of them
   std::vector<std::string> warnings;  // problems of the DBC files and the like, one line each
-  // What [sensors] states, by role; what it leaves out is 0.
+  // What [sensors] states, by role. Beside it, what it leaves out is as in other cars, and listed;
+  // where it states nothing at all, all is 0.
   std::array<estimator::ChannelAccuracy, kRoleCount> stated{};
+  std::vector<AssumedAccuracy> assumed;
 
   int exit_code() const { return errors.empty() ? 0 : errors.front().exit_code; }
 };

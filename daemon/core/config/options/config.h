@@ -143,6 +143,13 @@ struct TableSource {
 // Of a role that is read out of a table: the table has that column.
 inline bool has_column(const RoleBinding& binding) { return !binding.message_name.empty(); }
 
+// Of a sensor that the configuration says nothing of, while it does of others.
+struct AssumedAccuracy {
+  Role role = Role::kPrimarySpeed;
+  std::string key;     // "sensors.secondary_pressure.bias_Pa"
+  double value = 0.0;  // in its unit
+};
+
 struct Config {
   std::string interface = "vcan0";
   std::vector<std::string> dbc;

@@ -861,6 +861,37 @@ TEST_F(ConfigTest, AFurtherBus) {
   expect_error(further(bus + "dbc = [\"gone.dbc\"]\n", role), "bus.diag.dbc", {"gone.dbc"}, 0, 66);
 }
 
+// What a diagnosis counts with: of a sensor that nobody speaks of beside others, what is met in
+// cars.
+TEST_F(ConfigTest, ASensorLeftOutBesideOthersIsAsInOtherCars) {
+  const ConfigResult result =
+      load(with("sensors", "primary_torque = { bias_Nm = 0.4 }\nprimary_speed = { gain = 1e-4 }"));
+  ASSERT_TRUE(result.config.has_value());
+  const auto stated = [&](Role role) { return result.stated[static_cast<std::size_t>(role)]; };
+  EXPECT_EQ(stated(Role::kPrimaryTorque).bias, 0.4);
+  EXPECT_EQ(stated(Role::kPrimaryTorque).gain, 0.01);
+  EXPECT_EQ(stated(Role::kPrimarySpeed).gain, 1e-4);
+  EXPECT_EQ(stated(Role::kSecondaryPressure).bias, 30e3);
+  EXPECT_EQ(stated(Role::kSecondaryPressure).gain, 0.0125);
+  const auto assumed = [&](const std::string& key) {
+    return std::count_if(result.assumed.begin(), result.assumed.end(),
+                         [&](const AssumedAccuracy& each) { return each.key == key; });
+  };
+  EXPECT_EQ(assumed("sensors.secondary_pressure.bias_Pa"), 1);
+  EXPECT_EQ(assumed("sensors.primary_torque.gain"), 1);
+  EXPECT_EQ(assumed("sensors.primary_torque.bias_Nm"), 0);
+}
+
+TEST_F(ConfigTest, WhereNoSensorIsSpokenOfNothingIsAssumedOfThem) {
+  const ConfigResult result = load(test::kVehicleToml);
+  ASSERT_TRUE(result.config.has_value());
+  EXPECT_TRUE(result.assumed.empty());
+  for (const estimator::ChannelAccuracy& each : result.stated) {
+    EXPECT_EQ(each.bias, 0.0);
+    EXPECT_EQ(each.gain, 0.0);
+  }
+}
+
 TEST_F(ConfigTest, ProtectionOfAMessage) {
   const ConfigResult result =
       load(with("protection", "Flags = { counter = \"ExperimentActive\", counter_max = 2 }\n"));
