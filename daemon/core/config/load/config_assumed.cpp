@@ -35,19 +35,37 @@ void assume_constants(const TomlNode& root, const std::vector<std::string>& mode
   }
 }
 
-void assume_accuracy(Role role, bool decides, SensorText& sensor, Config& config) {
+// A key of a sensor that [sensors] leaves out, and what is usual in its place.
+struct LeftOut {
+  std::string key;
+  double usual;
+  std::optional<double> SensorText::*text;
+  double estimator::ChannelAccuracy::*value;
+};
+
+std::vector<LeftOut> left_out(Role role, const SensorText& sensor) {
   const std::optional<estimator::Sensor> channel = sensor_of(role);
-  if (!channel) return;
-  const estimator::ChannelAccuracy& typical = estimator::typical_accuracy(*channel).accuracy;
+  if (!channel) return {};
   const std::string key = key_of("sensors", role_name(role));
-  const auto value = [&](std::optional<double>& stated, double usual, std::string_view name) {
-    if (stated) return;
-    stated = usual;
-    config.assumed.push_back(key_of(key, name));
+  const estimator::ChannelAccuracy& typical = estimator::typical_accuracy(*channel).accuracy;
+  std::vector<LeftOut> out;
+  if (!sensor.bias) {
+    out.push_back({key_of(key, bias_key(role_dimension(role))), typical.bias, &SensorText::bias,
+                   &estimator::ChannelAccuracy::bias});
+  }
+  if (!sensor.gain) {
+    out.push_back(
+        {key_of(key, "gain"), typical.gain, &SensorText::gain, &estimator::ChannelAccuracy::gain});
+  }
+  return out;
+}
+
+void assume_accuracy(Role role, bool decides, SensorText& sensor, Config& config) {
+  for (const LeftOut& each : left_out(role, sensor)) {
+    sensor.*each.text = each.usual;
+    config.assumed.push_back(each.key);
     config.friction_is_assumed |= decides;
-  };
-  value(sensor.bias, typical.bias, bias_key(role_dimension(role)));
-  value(sensor.gain, typical.gain, "gain");
+  }
 }
 
 }  // namespace
@@ -75,18 +93,10 @@ void assume_beside(const SensorTexts& sensors, ConfigResult& result) {
   if (!states_any) return;
   for (std::size_t i = 0; i < sensors.size(); ++i) {
     const Role role = static_cast<Role>(i);
-    const std::optional<estimator::Sensor> sensor = sensor_of(role);
-    if (!sensor) continue;
-    const estimator::ChannelAccuracy& typical = estimator::typical_accuracy(*sensor).accuracy;
-    const std::string key = key_of("sensors", role_name(role));
-    const auto value = [&](const std::optional<double>& stated, double usual, std::string_view name,
-                           double& out) {
-      if (stated) return;
-      out = usual;
-      result.assumed.push_back({role, key_of(key, name), usual});
-    };
-    value(sensors[i].bias, typical.bias, bias_key(role_dimension(role)), result.stated[i].bias);
-    value(sensors[i].gain, typical.gain, "gain", result.stated[i].gain);
+    for (const LeftOut& each : left_out(role, sensors[i])) {
+      result.stated[i].*each.value = each.usual;
+      result.assumed.push_back({role, each.key, each.usual});
+    }
   }
 }
 
