@@ -898,6 +898,7 @@ double find_effects(Engine& engine, Naming& out, const std::function<bool()>& st
 }  // namespace
 
 void forget_names(Engine& engine, Naming& naming) {
+  engine.bound_scatter(default_scatter().most);
   engine.accept(engine.refine_from(naming.sharp.state, {}, kSettling));
   engine.update_noise();
   naming.accepted.clear();

@@ -264,13 +264,15 @@ Steps steps_of(const SignalTable& table) {
   return Steps::kFine;
 }
 
+bool is_no_belts(double mu_max) { return mu_max < kMuLeast; }
+
 void check_fitted_friction(const std::map<std::string, Interval>& machine, Implausible& doubts) {
   const Interval& mu_max = machine.at("mu_max");
   const auto slips = [&](const char* name) {
     const auto found = machine.find(name);
     return found != machine.end() && found->second.low > kPeakSlipMost_share;
   };
-  if (mu_max.high >= kMuLeast && !slips("peak_slip_overdrive") && !slips("peak_slip_low")) return;
+  if (!is_no_belts(mu_max.high) && !slips("peak_slip_overdrive") && !slips("peak_slip_low")) return;
   doubts.notes.push_back("friction comes to its peak at " + text_of(mu_max.value) +
                          " or far beyond the slip of belts: unit or scale of the pressure or the "
                          "torque, or secondary_piston_area_m2 of [variator]?");

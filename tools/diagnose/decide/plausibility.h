@@ -30,6 +30,8 @@ void check_torques(const std::vector<ExperimentData>& runs, Implausible& doubts)
 // By what was measured alone: the fitted mu_max may lie far beyond what the data reached.
 void check_friction(const std::vector<ExperimentData>& runs,
                     const estimator::VariatorParameters& variator, Implausible& doubts);
+// Friction at its peak that is less than any belt has.
+bool is_no_belts(double mu_max);
 // By the fit of the machine's constants.
 void check_fitted_friction(const std::map<std::string, Interval>& machine, Implausible& doubts);
 

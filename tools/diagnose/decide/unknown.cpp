@@ -164,7 +164,7 @@ GroupScores::GroupScores(const Engine& engine, const VariedIndex& index)
   engine.add_curve_bounds(engine.state(), parameters_, summaries_);
   std::iota(base_.begin(), base_.end(), 0);
   base_prior_ = engine.prior(parameters_, engine.state());
-  none_ = fit_linear(summaries_, base_, base_prior_, default_scatter(), 15);
+  none_ = fit_linear(summaries_, base_, base_prior_, engine.first_scatter(), 15);
 }
 
 GroupColumns GroupScores::group(std::size_t v, std::size_t injection) const {
@@ -244,9 +244,11 @@ std::optional<UnknownGroup> GroupScores::score(std::size_t v, std::size_t inject
   out.chi2 = chi2_of_f(wald / 3.0, 3.0, degrees);
   out.accepted_chi2 = accepted_chi2(fit);
   if (out.chi2 > kLooked && out.gain > kLooked && out.size > 1.0) {
-    if (!none_left_out_) none_left_out_ = left_out_density(summaries_, base_, base_prior_);
+    if (!none_left_out_)
+      none_left_out_ = left_out_density(summaries_, base_, base_prior_, engine_.first_scatter());
     out.left_out_gain =
-        left_out_density(summaries_, columns.columns, columns.prior) - none_left_out_.value_or(0.0);
+        left_out_density(summaries_, columns.columns, columns.prior, engine_.first_scatter()) -
+        none_left_out_.value_or(0.0);
   }
   return out;
 }

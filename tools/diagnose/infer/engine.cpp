@@ -376,7 +376,8 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model,
   return out;
 }
 
-Engine::Engine(Campaign campaign, int jobs) : jobs_(jobs), campaign_(std::move(campaign)) {
+Engine::Engine(Campaign campaign, int jobs, Losses losses)
+    : jobs_(jobs), losses_(losses), campaign_(std::move(campaign)) {
   for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
     if (campaign_.runs[e].valid_count > 0) used_.push_back(static_cast<int>(e));
   }
@@ -683,8 +684,14 @@ void Engine::update_noise() {
   });
   add_curve_bounds(state_, summary_parameters_, summaries_);
   const std::vector<int> parameters = with_nuisances(accepted_);
-  base_ = fit_linear(summaries_, columns_of(parameters), prior(parameters, state_),
-                     default_scatter(), 25);
+  base_ =
+      fit_linear(summaries_, columns_of(parameters), prior(parameters, state_), first_scatter_, 25);
+}
+
+void Engine::bound_scatter(const RandomVector& most) {
+  first_scatter_.most = most;
+  first_scatter_.variance = default_scatter().variance.min(most);
+  base_.scatter = {base_.scatter.variance.min(most), most};
 }
 
 double Engine::degrees(double with_scatter, double without_scatter) const {
@@ -895,7 +902,12 @@ void Engine::move(const std::vector<int>& parameters, const VectorXd& step, doub
       // machine's own, and what it explains would be no gain.
       constexpr std::array kBounded{kLossPerkN_Nm, kSecondaryLossPerkN_Nm, kSecondaryTorqueGain,
                                     kPressureBias_Pa};
-      if (std::find(kBounded.begin(), kBounded.end(), parameters[j]) != kBounded.end()) {
+      constexpr std::array kLosses{kLossConstant_Nm, kLossPerSpeed_Nms, kSecondaryLoss_Nm,
+                                   kSecondaryLossPerSpeed_Nms};
+      const auto is_among = [&](const auto& these) {
+        return std::find(these.begin(), these.end(), parameters[j]) != these.end();
+      };
+      if (is_among(kBounded) || (losses_ == Losses::kUsual && is_among(kLosses))) {
         const NuisanceRow& row = campaign_.nuisances[static_cast<std::size_t>(parameters[j])];
         value = std::clamp(value, row.nominal - kReach * row.tolerance,
                            row.nominal + kReach * row.tolerance);
@@ -919,7 +931,9 @@ Hypothesis Engine::refine_from(const ModelState& from, const std::vector<int>& s
                                int iterations, double worth) const {
   std::vector<double> question{static_cast<double>(noise_version_), static_cast<double>(iterations),
                                static_cast<double>(accepted_.size())};
-  question.insert(question.end(), base_.scatter.variance.begin(), base_.scatter.variance.end());
+  for (const RandomVector& each : {base_.scatter.variance, base_.scatter.most}) {
+    question.insert(question.end(), each.begin(), each.end());
+  }
   question.insert(question.end(), slots.begin(), slots.end());
   append(from, question);
   return hypotheses_.of(
@@ -1006,7 +1020,8 @@ void Engine::accept(const Hypothesis& hypothesis) {
 double Engine::left_out_gain(int without) const {
   const auto density = [&](const std::vector<Summary>& summaries, const std::vector<int>& set) {
     const std::vector<int> parameters = with_nuisances(set);
-    return left_out_density(summaries, columns_of(parameters), prior(parameters, state_));
+    return left_out_density(summaries, columns_of(parameters), prior(parameters, state_),
+                            first_scatter_);
   };
   std::vector<int> fewer = accepted_;
   std::erase(fewer, without);
@@ -1016,7 +1031,8 @@ double Engine::left_out_gain(int without) const {
 std::vector<double> Engine::left_out_gains() const {
   const auto densities = [&](const std::vector<Summary>& summaries, const std::vector<int>& set) {
     const std::vector<int> parameters = with_nuisances(set);
-    return left_out_densities(summaries, columns_of(parameters), prior(parameters, state_));
+    return left_out_densities(summaries, columns_of(parameters), prior(parameters, state_),
+                              first_scatter_);
   };
   std::vector<double> out = densities(summaries_, accepted_);
   const std::vector<double> without = densities(summaries_without(accepted_), {});

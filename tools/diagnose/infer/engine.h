@@ -62,10 +62,14 @@ struct Optimum {
   bool given_up = false;
 };
 
+// What is lost whatever the clamp force. Where all ramps are alike, tens of Nm of it with hardly
+// any friction, or a few with what belts have, fit about as well: then no more than variators lose.
+enum class Losses { kAsFitted, kUsual };
+
 class Engine {
  public:
   // jobs: threads; the same result for any number.
-  explicit Engine(Campaign campaign, int jobs = 1);
+  explicit Engine(Campaign campaign, int jobs = 1, Losses losses = Losses::kAsFitted);
 
   int jobs() const { return jobs_; }
   const Campaign& campaign() const { return campaign_; }
@@ -76,6 +80,10 @@ class Engine {
   const Whitening& whitening() const { return whitening_; }
   const std::vector<int>& active_nuisances() const { return nuisances_; }
   const Scatter& scatter() const { return base_.scatter; }
+  // Where fits of the scatter begin, and what none of them goes beyond.
+  const Scatter& first_scatter() const { return first_scatter_; }
+  // From the next fit on no kind of scatter is more than that variance.
+  void bound_scatter(const RandomVector& most);
   // Of each experiment with valid samples: by how much it differs from the others.
   std::vector<RandomVector> offsets() const;
 
@@ -166,6 +174,7 @@ class Engine {
                       double worth) const;
 
   int jobs_;
+  Losses losses_;
   Campaign campaign_;
   std::vector<int> used_;
   std::vector<Campaign> coarse_;  // the same with more noise, falling
@@ -175,6 +184,7 @@ class Engine {
   std::vector<int> accepted_;
   std::vector<int> nuisances_;
   Whitening whitening_;
+  Scatter first_scatter_ = default_scatter();
   std::vector<int> summary_parameters_;
   std::vector<FarSize> far_sizes_;  // their columns stand behind those of the parameters
   std::vector<Summary> summaries_;

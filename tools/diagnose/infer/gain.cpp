@@ -215,7 +215,7 @@ LeftOut leave_one_out(const Engine& engine, const Campaign& campaign, const Whit
   for (const Summary& each : summaries) {
     if (each.samples > 0) used.push_back(each);
   }
-  const Fit all = fit_linear(used, columns, prior, default_scatter(), 10);
+  const Fit all = fit_linear(used, columns, prior, engine.first_scatter(), 10);
   const Scatter& scatter = all.scatter;
   LeftOut out;
   struct Without {

@@ -252,6 +252,7 @@ Scatter default_scatter() {
     const double s = kDefaultScatter[static_cast<std::size_t>(i)];
     out.variance[i] = s * s;
   }
+  out.most = kScatterCap * kScatterCap * out.variance;
   return out;
 }
 
@@ -280,7 +281,7 @@ double scatter_penalty(const RandomVector& variance) {
 }
 
 bool is_beyond_scatter(const Scatter& scatter) {
-  return scatter.variance[kLevel] >= kScatterCap * kScatterCap * default_scatter().variance[kLevel];
+  return scatter.variance[kLevel] >= default_scatter().most[kLevel];
 }
 
 Eigen::Array<bool, kRandomEffects, 1> is_unusual(const Scatter& scatter) {
@@ -595,7 +596,6 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
   const auto n = static_cast<Index>(columns.size());
   const auto runs = summaries.size();
   const Picked picked = pick(summaries, columns);
-  const Scatter usual = default_scatter();
   Scatter scatter = start;
   for (int iteration = 0;; ++iteration) {
     const bool is_last = iteration >= scatter_iterations;
@@ -622,12 +622,13 @@ Fit fit_linear(const std::vector<Summary>& summaries, const std::vector<int>& co
     }
     const double count = std::max(1.0, static_cast<double>(runs));
     scatter.variance = scatter_variance(square / count, static_cast<double>(runs));
-    scatter.variance = scatter.variance.min(kScatterCap * kScatterCap * usual.variance);
+    scatter.variance = scatter.variance.min(scatter.most);
   }
 }
 
 std::vector<double> left_out_densities(const std::vector<Summary>& summaries,
-                                       const std::vector<int>& columns, const Prior& prior) {
+                                       const std::vector<int>& columns, const Prior& prior,
+                                       const Scatter& start) {
   constexpr int kScatterIterations = 6;
   std::vector<int> picked = columns;
   picked.push_back(static_cast<int>(summaries.empty() ? 0 : summaries[0].aa.rows() - 1));
@@ -642,7 +643,7 @@ std::vector<double> left_out_densities(const std::vector<Summary>& summaries,
   for (std::size_t e = 0; e < summaries.size(); ++e) {
     std::vector<Summary> runs = own;
     runs.erase(runs.begin() + static_cast<std::ptrdiff_t>(e));
-    const Fit others = fit_linear(runs, all_of_them, prior, default_scatter(), kScatterIterations);
+    const Fit others = fit_linear(runs, all_of_them, prior, start, kScatterIterations);
     // The others' posterior as the prior of the one left out; its gain in evidence.
     runs.push_back(own[e]);
     const Fit all = fit_linear(runs, all_of_them, prior, others.scatter, 0);
@@ -654,8 +655,8 @@ std::vector<double> left_out_densities(const std::vector<Summary>& summaries,
 }
 
 double left_out_density(const std::vector<Summary>& summaries, const std::vector<int>& columns,
-                        const Prior& prior) {
-  const std::vector<double> each = left_out_densities(summaries, columns, prior);
+                        const Prior& prior, const Scatter& start) {
+  const std::vector<double> each = left_out_densities(summaries, columns, prior, start);
   return std::accumulate(each.begin(), each.end(), 0.0);
 }
 

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <limits>
 #include <vector>
 
 #include "tools/diagnose/infer/residuals.h"
@@ -63,7 +64,10 @@ Eigen::MatrixXd solved_ldlt(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd
 
 struct Scatter {
   RandomVector variance;
+  // No fit goes beyond.
+  RandomVector most = RandomVector::Constant(std::numeric_limits<double>::infinity());
 };
+// What rigs usually scatter by, and what is an effect and no scatter.
 Scatter default_scatter();
 // Of the friction's level: more than any scatter is, so that its estimate ends at a bound.
 bool is_beyond_scatter(const Scatter& scatter);
@@ -110,10 +114,11 @@ double log_likelihood(const NormalEquations& equations, const Scatter& scatter);
 
 // Log predictive density of each experiment, by a fit to the others; their scatter too.
 std::vector<double> left_out_densities(const std::vector<Summary>& summaries,
-                                       const std::vector<int>& columns, const Prior& prior);
+                                       const std::vector<int>& columns, const Prior& prior,
+                                       const Scatter& start);
 // Their sum.
 double left_out_density(const std::vector<Summary>& summaries, const std::vector<int>& columns,
-                        const Prior& prior);
+                        const Prior& prior, const Scatter& start);
 
 // Information on one column given the others, with the scatter and without: its loss tells how much
 // of the evidence lies between experiments.

@@ -12,6 +12,7 @@
 #include "tools/diagnose/decide/criticism.h"
 #include "tools/diagnose/decide/learn.h"
 #include "tools/diagnose/decide/namer.h"
+#include "tools/diagnose/decide/needed_scatter.h"
 #include "tools/diagnose/decide/plausibility.h"
 #include "tools/diagnose/decide/rivals.h"
 #include "tools/diagnose/decide/thresholds.h"
@@ -87,9 +88,11 @@ class Run {
     check_friction(runs, request_.model.variator, implausible_);
     note_assumed(runs);
     progress(0.1, "fit");
-    Engine engine(make_campaign(std::move(runs), request_.model, request_.accuracies),
-                  request_.jobs);
+    const Campaign campaign = make_campaign(std::move(runs), request_.model, request_.accuracies);
+    Engine engine(campaign, request_.jobs);
     Naming naming = name_effects(engine, stop());
+    if (is_no_belts(fitted_mu_max(naming)) && !stop()())
+      name_with_usual_losses(campaign, engine, naming);
     progress(0.6, "tests");
     const Learning learning = criticise_and_learn(engine, naming);
     progress(0.8, "gain");
@@ -175,6 +178,18 @@ class Run {
                       [](const ExperimentData& run) { return run.valid_count > 0; }));
   }
 
+  static double fitted_mu_max(const Naming& naming) {
+    return std::exp(naming.hypothesis.state.nuisance[kLnMuMax]);
+  }
+  // Where that leaves friction that belts have.
+  void name_with_usual_losses(const Campaign& campaign, Engine& engine, Naming& naming) const {
+    Engine usual(campaign, request_.jobs, Losses::kUsual);
+    Naming other = name_effects(usual, stop());
+    if (stop()() || is_no_belts(fitted_mu_max(other))) return;
+    engine = std::move(usual);
+    naming = std::move(other);
+  }
+
   // Where names leave something, the whole naming anew beside them: the first pass weighs a second
   // effect against the first one's evidence, which is in the machine now. Not where the tests pass:
   // there a second name is what the first one's equation has wrong.
@@ -188,12 +203,26 @@ class Run {
     }
   }
 
+  // Scatter that the data do not need goes first: it hides what they need.
+  Criticism criticise_with_needed_scatter(Engine& engine, Naming& naming) {
+    Criticism out = criticise(engine, steps_);
+    // With less of it, what replicates scatter by is less too.
+    for (int round = 0; round < kRoundsMax && !stop()(); ++round) {
+      std::optional<Engine> bounded = without_needless_scatter(engine, out);
+      if (!bounded) break;
+      engine = std::move(*bounded);
+      name_anew(engine, naming, stop());
+      out = criticise(engine, steps_);
+    }
+    return out;
+  }
+
   // What fails the tests is learned where it can be; with it the whole analysis anew, until nothing
   // changes.
   Learning criticise_and_learn(Engine& engine, Naming& naming) {
     Learning out;
     if (stop()()) return out;
-    out.left = criticise(engine, steps_);
+    out.left = criticise_with_needed_scatter(engine, naming);
     name_until_settled(engine, naming, out.left);
     if (out.left.passed()) return out;
     if (engine.accepted().empty()) {
@@ -205,7 +234,7 @@ class Run {
     Naming forgotten = naming;
     forget_names(bare, forgotten);
     Learning alone;
-    alone.left = criticise(bare, steps_);
+    alone.left = criticise_with_needed_scatter(bare, forgotten);
     const Criticism nothing = alone.left;
     if (nothing.passed() && passes_with_fewer(engine, naming, out.left)) return out;
     learn_in_turn(bare, forgotten, alone);

@@ -1,0 +1,101 @@
+// Experiments that differ by more than usual, where few of them tell it and where many do; and
+// ramps that are alike, which say the same of no friction at all. The recordings are the blind
+// generator's.
+#include "tools/diagnose/decide/needed_scatter.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/tools/diagnose/recorded_runs.h"
+#include "tools/diagnose/decide/namer.h"
+#include "tools/diagnose/run/diagnose.h"
+
+namespace beltgrip::diagnose {
+namespace {
+
+// A belt whose level of friction differs by that share from one experiment to the next.
+blind::Trial scattered(double friction, int experiments) {
+  blind::Trial trial;
+  trial.seed = 16;
+  blind::Random random(trial.seed);
+  trial.machine = blind::draw_machine(random);
+  trial.machine.scatter_friction = friction;
+  trial.machine.scatter_torque_Nm = 0.05;
+  trial.machine.scatter_ratio = 1.5e-4;
+  trial.plan = blind::draw_plan(random, trial.machine.setting, experiments);
+  return trial;
+}
+
+Request request_of(const blind::Trial& trial) {
+  Request request;
+  estimator::VariatorParameters variator;
+  variator.primary_inertia_kg_m2 = trial.machine.primary_inertia_kg_m2;
+  request.model = nominal_model(variator);
+  for (const std::string& text : blind::record(trial).csv) {
+    request.experiments.push_back(parse_csv(text, "run.csv"));
+  }
+  return request;
+}
+
+TEST(NeededScatter, WhatFiveExperimentsDoNotProveIsBounded) {
+  Engine engine(campaign_of(scattered(0.012, 5)));
+  name_effects(engine, [] { return false; });
+  const Criticism criticism = criticise(engine, Steps::kFine);
+  ASSERT_FALSE(criticism.test("unusual_friction").passed());
+  const std::optional<Engine> bounded = without_needless_scatter(engine, criticism);
+  ASSERT_TRUE(bounded.has_value());
+  EXPECT_LT(bounded->scatter().variance[0], engine.scatter().variance[0]);
+  const Criticism after = criticise(*bounded, Steps::kFine);
+  EXPECT_TRUE(after.test("unusual_friction").passed());
+  EXPECT_TRUE(after.test("unusual_scatter").passed());
+}
+
+TEST(NeededScatter, WhatTheDataProveStays) {
+  Engine engine(campaign_of(scattered(0.03, 8)));
+  name_effects(engine, [] { return false; });
+  const Criticism criticism = criticise(engine, Steps::kFine);
+  ASSERT_FALSE(criticism.test("unusual_friction").passed());
+  EXPECT_FALSE(without_needless_scatter(engine, criticism).has_value());
+}
+
+TEST(NeededScatter, WhereAllPassNothingIsBounded) {
+  Engine engine(campaign_of(scattered(0.004, 5)));
+  name_effects(engine, [] { return false; });
+  const Criticism criticism = criticise(engine, Steps::kFine);
+  ASSERT_TRUE(criticism.passed());
+  EXPECT_FALSE(without_needless_scatter(engine, criticism).has_value());
+}
+
+TEST(NeededScatter, DecidesTheVerdict) {
+  EXPECT_EQ(diagnose(request_of(scattered(0.012, 5))).diagnosis.verdict, Verdict::kNothingWrong);
+  EXPECT_EQ(diagnose(request_of(scattered(0.03, 8))).diagnosis.verdict, Verdict::kUnexplained);
+}
+
+// Of equal ramps without the torque behind the belt.
+TEST(UsualLosses, AreNoMoreThanVariatorsLose) {
+  blind::Trial trial;
+  trial.seed = 11;
+  blind::Random random(trial.seed);
+  trial.machine = blind::draw_machine(random);
+  trial.machine.setting = blind::Setting::kRigNoOutputTorque;
+  trial.plan = blind::paper_plan(7);
+  Accuracies accuracies{};
+  for (const Role role : {Role::kPrimaryTorque, Role::kEngineTorque}) {
+    accuracies[static_cast<std::size_t>(role)].bias = 1.3;
+    accuracies[static_cast<std::size_t>(role)].gain = 0.05;
+  }
+  const auto sigmas_off = [&](Losses losses) {
+    Engine engine(campaign_of(trial, accuracies), 1, losses);
+    engine.fit_machine();
+    engine.update_noise();
+    engine.accept(engine.refine({}));
+    const NuisanceRow& row = engine.campaign().nuisances[kLossConstant_Nm];
+    return std::abs(engine.state().nuisance[kLossConstant_Nm] - row.nominal) / row.tolerance;
+  };
+  EXPECT_GT(sigmas_off(Losses::kAsFitted), 4.0);
+  EXPECT_LE(sigmas_off(Losses::kUsual), 3.0 + 1e-9);
+}
+
+}  // namespace
+}  // namespace beltgrip::diagnose
