@@ -284,7 +284,9 @@ History Experiment::run() {
     const double ratio = ratio_now(force, belt_before);
     const double capacity = 2.0 * radius * force * mu / kCosTheta;
     const auto belt = [&](double s) {
-      return std::copysign(capacity * curve(m_.law, std::abs(s) / peak_slip_share, fall), s);
+      const double x = std::abs(s) / peak_slip_share;
+      const double wave = 1.0 + fault_("x_friction_form.size") * std::sin(12.0 * x);
+      return std::copysign(capacity * wave * curve(m_.law, x, fall), s);
     };
     double belt_torque = 0.0;
     const double loss = m_.loss_Nm + m_.loss_per_speed_Nms * omega_p +
@@ -588,8 +590,9 @@ const std::vector<std::string>& outside_causes() {
 
 const std::vector<std::string>& further_causes() {
   static const std::vector<std::string> kAll{
-      "x_gain_temperature", "x_gain_speed",   "x_friction_dip",    "x_friction_between",
-      "x_force_ripple",     "x_belt_passage", "x_loss_force_step", "x_ratio_force_step"};
+      "x_gain_temperature", "x_gain_speed",       "x_friction_dip",
+      "x_friction_between", "x_force_ripple",     "x_belt_passage",
+      "x_loss_force_step",  "x_ratio_force_step", "x_friction_form"};
   return kAll;
 }
 

@@ -3,7 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <string_view>
+
+#include "tests/tools/diagnose/recorded_runs.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -61,6 +65,35 @@ TEST(Cells, WhatScatterTakesMustNotHideWhatRepeats) {
   EXPECT_LT(swallowed, 10.0);
   EXPECT_GT(cell.gain(), 100.0);
   EXPECT_EQ(cell.scores.size(), 2U);
+}
+
+// The largest gain over the time, on ramps.
+double most_over_time(const blind::Planted& planted) {
+  blind::Trial trial;
+  trial.seed = 9;
+  blind::Random random(trial.seed);
+  trial.plan = blind::draw_plan(random, trial.machine.setting, 8);
+  for (blind::PlannedRun& run : trial.plan) run.profile = blind::Profile::kRamps;
+  trial.planted = {planted};
+  Engine engine(campaign_of(trial));
+  engine.fit_machine();
+  engine.update_noise();
+  engine.accept(engine.refine({}));
+  engine.update_noise();
+  double most = 0.0;
+  for (const Cell& cell : score_cells(engine)) {
+    const bool is_time = std::string_view(cell.abscissa.variable->name) == "time";
+    if (is_time) most = std::max(most, cell.gain());
+  }
+  return most;
+}
+
+TEST(CellsOverTime, AreNotWhatAnotherFormOfFrictionDoes) {
+  EXPECT_LT(most_over_time({"x_friction_form", {{"size", 0.02}}, ""}), 1.0);
+}
+
+TEST(CellsOverTime, AreWhatChangesFromSecondToSecond) {
+  EXPECT_GT(most_over_time({"warm_up_drift", {{"per_start", 0.1}}, ""}), 1e3);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <string_view>
 
 #include "tools/diagnose/infer/cell_columns.h"
@@ -79,6 +80,51 @@ bool is_rounding(const HalfStep& half, const Cell& cell) {
   return cell.injection->injection == Injection::kTorqueGain && size < half.share;
 }
 
+// Any form that friction over slip may have beside the family's: a function of the slip over that
+// at the peak. None where no sample counts.
+std::optional<Abscissa> form_of_friction(const Campaign& campaign, const CellBase& base) {
+  constexpr std::size_t kTail = 100;  // of all, the outermost
+  Abscissa out;
+  out.x.resize(campaign.runs.size());
+  std::vector<double> all;
+  for (std::size_t i = 0; i < base.runs.size(); ++i) {
+    const auto run = static_cast<std::size_t>(base.runs[i]);
+    const Eigen::ArrayXd& foot = base.at[i].foot;
+    out.x[run] = foot;
+    for (Eigen::Index k = 0; k < foot.size(); ++k) {
+      if (campaign.runs[run].valid[static_cast<std::size_t>(k)]) all.push_back(foot[k]);
+    }
+  }
+  if (all.empty()) return {};
+  std::sort(all.begin(), all.end());
+  out.low = all[all.size() / kTail];
+  out.high = all[all.size() - 1 - all.size() / kTail];
+  if (!(out.high > out.low)) return {};
+  for (Eigen::ArrayXd& x : out.x) {
+    x = ((x - out.low) / (out.high - out.low)).max(0.0).min(1.0);
+  }
+  return out;
+}
+
+// A ramp goes up the curve in time: what another form of friction explains as well follows the
+// slip, not the time.
+void drop_time_by_form(const Engine& engine, CellBase& base, std::vector<Cell>& cells) {
+  const auto is_time = [](const Cell& cell) {
+    return std::string_view(cell.abscissa.variable->name) == "time";
+  };
+  if (std::none_of(cells.begin(), cells.end(), is_time)) return;
+  const std::optional<Abscissa> slip = form_of_friction(engine.campaign(), base);
+  if (!slip) return;
+  const InjectionRow& friction =
+      *std::find_if(kInjections.begin(), kInjections.end(),
+                    [](const InjectionRow& row) { return row.injection == Injection::kFriction; });
+  Cell form;
+  form.scores = scores_of(cell_columns(engine, base, *slip, friction), base, KnotVector::Zero());
+  judge_cell(form);
+  std::erase_if(cells,
+                [&](const Cell& cell) { return is_time(cell) && form.gain() >= cell.gain(); });
+}
+
 }  // namespace
 
 std::vector<Cell> score_cells(const Engine& engine) {
@@ -103,6 +149,7 @@ std::vector<Cell> score_cells(const Engine& engine) {
       out.push_back(std::move(cell));
     }
   }
+  drop_time_by_form(engine, base, out);
   std::sort(out.begin(), out.end(),
             [](const Cell& a, const Cell& b) { return a.gain() > b.gain(); });
   return out;
