@@ -336,10 +336,10 @@ bool is_curve(const Campaign& campaign, const UnknownGroup& group) {
 std::optional<UnknownGroup> better_group(const Engine& engine, const Hypothesis& best, double gain,
                                          double threshold) {
   const double certainty = *std::min_element(best.chi2.begin(), best.chi2.end());
-  for (const UnknownGroup& group : score_groups(engine)) {  // by gain, falling
+  for (UnknownGroup& group : score_groups(engine)) {  // by gain, falling
+    group.limit = std::max(threshold, certainty);
     if (group.gain < gain + 2.0 * (kGroupDegrees - 1) + threshold + kShareOfFirst * gain) break;
-    if (group.chi2 < std::max(threshold, certainty) || group.size < 1.0 ||
-        group.left_out_gain <= kLeftOutMin) {
+    if (group.chi2 < group.limit || group.size < 1.0 || group.left_out_gain <= kLeftOutMin) {
       continue;
     }
     if (!is_curve(engine.campaign(), group) && !is_own(engine, best.slots, group)) return group;
@@ -949,6 +949,7 @@ Naming name_effects(Engine& engine, const std::function<bool()>& stop) {
     });
     if (left == groups.end()) return out;
     out.unknown = *left;
+    out.unknown->limit = bound;
     const std::vector<int> set = engine.accepted();
     std::vector<int> kept;
     for (std::size_t i = 0; i < set.size(); ++i) {

@@ -29,6 +29,7 @@ struct Accepted {
 struct UnknownGroup {
   std::string acts_on, depends_on;
   double chi2 = 0.0;                  // equivalent chi-square(1)
+  double limit = 0.0;                 // above which that counts
   double gain = 0.0;                  // of twice the log likelihood
   double share = 0.0;                 // of the residual's energy
   double size = 0.0;                  // rms over the samples, in sizes that begin to matter

@@ -489,6 +489,7 @@ class Run {
     if (!criticism.passed()) {
       out().unexplained = what_is_left(criticism, engine.campaign().has_balance);
     } else if (naming.unknown) {
+      out().left["group"] = {naming.unknown->chi2, naming.unknown->limit};
       out().unexplained =
           Unexplained{naming.unknown->acts_on, {naming.unknown->depends_on}, naming.unknown->share};
     } else if (!named && !naming.accepted.empty()) {
