@@ -10,6 +10,7 @@
 #include "tools/diagnose/decide/learn.h"
 #include "tools/diagnose/decide/namer.h"
 #include "tools/diagnose/infer/index_variables.h"
+#include "tools/diagnose/report/finding_words.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -166,6 +167,9 @@ TEST(Scatter, OfTheFrictionThatBeltsHaveIsNoFinding) {
     Engine engine(campaign_of(trial));
     name_effects(engine, [] { return false; });
     const Criticism criticism = criticise(engine, Steps::kFine);
+    for (const JudgedTest& each : criticism.tests) {
+      EXPECT_FALSE(words_of_test(each.name).empty()) << each.name;
+    }
     return criticism.test("scatter_friction").passed() &&
            criticism.test("unusual_friction").passed();
   };

@@ -81,7 +81,7 @@ SpectralLine swing(const Campaign& campaign) {
   return {"torque", hump.frequency_Hz, hump.excess, hump.share};
 }
 
-double decades(double p) { return -std::log10(std::max(p, 1e-300)); }
+double decades(double p) { return std::max(0.0, -std::log10(std::max(p, 1e-300))); }
 
 }  // namespace
 

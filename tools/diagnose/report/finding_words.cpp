@@ -1,6 +1,7 @@
 #include "tools/diagnose/report/finding_words.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <iterator>
@@ -147,6 +148,34 @@ std::string words_of(std::string_view effect, std::string_view parameter) {
     if (words.ends_with(end)) words.remove_suffix(end.size());
   }
   return std::string(words);
+}
+
+std::string_view words_of_test(std::string_view test) {
+  struct TestWords {
+    std::string_view test, words;
+  };
+  static constexpr std::array kAll{
+      TestWords{"law_cell", "a step, kink or bump over a recorded variable, twice the log odds"},
+      TestWords{"smooth_cell", "a smooth function of a recorded variable, twice the log odds"},
+      TestWords{"own_shape", "another course over what a finding follows, twice the log odds"},
+      TestWords{"group", "functions of a recorded variable beside the findings, chi-square"},
+      TestWords{"line", "a line in what each sample says of friction, ratio or torque, sigmas"},
+      TestWords{"slow_line", "a swing between 0.2 and 0.7 Hz, sigmas"},
+      TestWords{"channel_line", "a line in a torque as it was sampled, times the level about it"},
+      TestWords{"torque_swing", "a shaft that swings, sigmas"},
+      TestWords{"belt_passage", "a line at the belt's passage, sigmas"},
+      TestWords{"whiteness", "samples that follow from those before, decades of chance"},
+      TestWords{"scatter_friction",
+                "friction that differs between experiments, times the expected"},
+      TestWords{"scatter_ratio", "a ratio that differs between experiments, times the expected"},
+      TestWords{"scatter_torque",
+                "a torque's zero that differs between experiments, times the expected"},
+      TestWords{"unusual_scatter", "friction or a torque's zero that differs, times the usual"},
+      TestWords{"unusual_ratio", "a ratio that differs between experiments, times the usual"},
+      TestWords{"unusual_friction", "friction that differs between experiments, times the usual"}};
+  const auto found = std::find_if(kAll.begin(), kAll.end(),
+                                  [&](const TestWords& each) { return each.test == test; });
+  return found == kAll.end() ? std::string_view() : found->words;
 }
 
 Display display_of(std::string_view what) {

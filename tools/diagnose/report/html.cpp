@@ -154,8 +154,7 @@ void add_tests(report::HtmlPage& page, const Diagnosis& d) {
            ? "none fails (" + least + ")"
            : std::to_string(failed) + " of " + std::to_string(all.count) +
                  " fail beyond what chance does among so many in 0.1 % of healthy campaigns") +
-      ". The verdict rests on the tests of what the findings leave, whose limits healthy campaigns "
-      "set. An empty cell: these data cannot show it there.");
+      ". The verdict does not rest on them. An empty cell: these data cannot show it there.");
   Rows rows;
   for (auto& [test, row] : cells) {
     const bool plain = test == "whiteness" || test.starts_with("order_spectrum");
@@ -164,6 +163,24 @@ void add_tests(report::HtmlPage& page, const Diagnosis& d) {
     rows.push_back(std::move(row));
   }
   page.table(head, rows);
+}
+
+// The tests that the verdict rests on, those that fail first.
+void add_left(report::HtmlPage& page, const Diagnosis& d) {
+  if (d.left.empty()) return;
+  page.heading("Tests of what is left");
+  Rows fail, pass;
+  for (const auto& [test, left] : d.left) {
+    const bool fails = left.value > left.limit;
+    (fails ? fail : pass)
+        .push_back({std::string(words_of_test(test)), fails ? "fails" : "passes",
+                    short_number(left.value), short_number(left.limit)});
+  }
+  page.paragraph((fail.empty() ? "None" : std::to_string(fail.size())) + " of " +
+                 std::to_string(d.left.size()) +
+                 " fail with what was found in the model. The verdict rests on these.");
+  fail.insert(fail.end(), pass.begin(), pass.end());
+  page.table({"looked for", "", "value", "limit"}, fail);
 }
 
 void add_errors(report::HtmlPage& page, const Diagnosis& d) {
@@ -263,13 +280,11 @@ std::string html_text(const Diagnosis& d, const Plots& plots, const PageFacts& f
         "experiments could not have shown is listed below.");
   }
   for (const Finding& finding : d.findings) page.paragraph(sentence(finding));
-  if (d.unexplained) {
-    page.paragraph("Unexplained: " + sentence(*d.unexplained) + ".");
-  }
   if (d.next_experiment) page.paragraph("Next experiment: " + d.next_experiment->text + ".");
   page.paragraph("In a plot the mouse draws the part to be seen, a double click shows all of it.");
   add_findings(page, d, plots.findings);
   add_learned(page, d);
+  add_left(page, d);
   add_errors(page, d);
   add_tables(page, d);
   const auto draw = [&](const char* heading, const std::vector<report::Chart>& charts) {
