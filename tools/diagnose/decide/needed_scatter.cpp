@@ -12,7 +12,9 @@
 namespace beltgrip::diagnose {
 namespace {
 
-constexpr int kSteps = 20;  // chosen: of a fit that is compared
+// Chosen: of a fit that is compared. A fifth less or more: the same verdicts in eleven campaigns of
+// other make that come here.
+constexpr int kSteps = 20;
 
 struct Kind {
   std::string_view over_base;  // its test against the base
