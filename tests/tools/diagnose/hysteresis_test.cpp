@@ -23,20 +23,22 @@ blind::Trial trial_of(std::uint64_t machine, std::uint64_t before) {
   return trial;
 }
 
-TEST(Hysteresis, IsFoundInItsSizeWhateverWentBefore) {
+// By what went before.
+class Hysteresis : public testing::TestWithParam<std::uint64_t> {};
+
+TEST_P(Hysteresis, IsFoundInItsSize) {
   const char* const kRole[] = {"raised", "", "lowered"};
-  for (std::uint64_t before = 0; before < 3; ++before) {
-    SCOPED_TRACE(kRole[before]);
-    Engine engine(campaign_of(trial_of(1, before)));
-    const Naming naming = name_effects(engine, [] { return false; });
-    ASSERT_EQ(naming.accepted.size(), 1U);
-    const Accepted& found = naming.accepted.front();
-    const Slot& slot = engine.campaign().slots[static_cast<std::size_t>(found.slot)];
-    EXPECT_EQ(slot.row->id, "clamp_hysteresis");
-    EXPECT_EQ(slot.role, kRole[before]);
-    EXPECT_NEAR(naming.hypothesis.state.effects[found.slot], kForce_N, 0.03 * kForce_N);
-  }
+  Engine engine(campaign_of(trial_of(1, GetParam())));
+  const Naming naming = name_effects(engine, [] { return false; });
+  ASSERT_EQ(naming.accepted.size(), 1U);
+  const Accepted& found = naming.accepted.front();
+  const Slot& slot = engine.campaign().slots[static_cast<std::size_t>(found.slot)];
+  EXPECT_EQ(slot.row->id, "clamp_hysteresis");
+  EXPECT_EQ(slot.role, kRole[GetParam()]);
+  EXPECT_NEAR(naming.hypothesis.state.effects[found.slot], kForce_N, 0.03 * kForce_N);
 }
+
+INSTANTIATE_TEST_SUITE_P(WhateverWentBefore, Hysteresis, testing::Range<std::uint64_t>(0, 3));
 
 }  // namespace
 }  // namespace beltgrip::diagnose
