@@ -1,5 +1,8 @@
 #include "estimator/statistics/distributions.h"
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <unsupported/Eigen/SpecialFunctions>
 
 namespace beltgrip::estimator {
@@ -35,6 +38,15 @@ double f_p(double f, double numerator_degrees, double denominator_degrees) {
 double chi2_p(double chi2, int degrees) {
   if (degrees <= 0 || !(chi2 > 0.0)) return 1.0;
   return Eigen::numext::igammac(0.5 * degrees, 0.5 * chi2);
+}
+
+double chi2_decades(double chi2, int degrees) {
+  constexpr double kRight = 1e-250;  // of a double: below it loses digits
+  if (const double p = chi2_p(chi2, degrees); p > kRight) return std::max(0.0, -std::log10(p));
+  // The first terms of the incomplete gamma function far out (DLMF 8.11.2).
+  const double a = 0.5 * degrees, x = 0.5 * chi2;
+  const double series = 1.0 + (a - 1.0) / x * (1.0 + (a - 2.0) / x);
+  return (x - (a - 1.0) * std::log(x) + std::lgamma(a) - std::log(series)) / std::numbers::ln10;
 }
 
 }  // namespace beltgrip::estimator

@@ -12,5 +12,7 @@ double student_quantile(double probability, double degrees);
 // Probability of at least f with these degrees of freedom (> 0); of at least chi2.
 double f_p(double f, double numerator_degrees, double denominator_degrees);
 double chi2_p(double chi2, int degrees);
+// -log10 of that, also where it is too small for a number. Never negative.
+double chi2_decades(double chi2, int degrees);
 
 }  // namespace beltgrip::estimator

@@ -51,5 +51,17 @@ TEST(ChiSquare, AsInTheTables) {
   EXPECT_GT(chi2_p(400.0, 10), 0.0);
 }
 
+TEST(ChiSquare, DecadesGoOnWhereTheProbabilityIsTooSmallForANumber) {
+  EXPECT_NEAR(chi2_decades(18.307038, 10), -std::log10(0.05), 1e-5);
+  EXPECT_EQ(chi2_decades(0.0, 4), 0.0);
+  // With two degrees of freedom it is exp(-chi2 / 2).
+  for (const double chi2 : {100.0, 1000.0, 1300.0, 2000.0, 40000.0}) {
+    EXPECT_NEAR(chi2_decades(chi2, 2), 0.5 * chi2 / std::log(10.0), 1e-9 * chi2) << chi2;
+  }
+  // With four exp(-chi2 / 2) (1 + chi2 / 2).
+  EXPECT_NEAR(chi2_decades(3000.0, 4), (1500.0 - std::log(1501.0)) / std::log(10.0), 1e-6);
+  EXPECT_GT(chi2_decades(1151.0, 10), chi2_decades(1150.0, 10));
+}
+
 }  // namespace
 }  // namespace beltgrip::estimator

@@ -166,7 +166,7 @@ TEST(Scatter, OfTheFrictionThatBeltsHaveIsNoFinding) {
     trial.plan = blind::draw_plan(random, trial.machine.setting, 8);
     Engine engine(campaign_of(trial));
     name_effects(engine, [] { return false; });
-    const Criticism criticism = criticise(engine, Steps::kFine);
+    const Criticism criticism = criticise(engine);
     for (const JudgedTest& each : criticism.tests) {
       EXPECT_FALSE(words_of_test(each.name).empty()) << each.name;
     }

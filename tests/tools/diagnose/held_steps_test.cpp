@@ -63,7 +63,7 @@ TEST(HeldSteps, AreNoFrictionThatDiffersBetweenExperiments) {
   const Naming naming = name_effects(engine, [] { return false; });
   EXPECT_TRUE(naming.accepted.empty());
   EXPECT_FALSE(naming.unknown);
-  for (const JudgedTest& each : criticise(engine, Steps::kLeak).tests) {
+  for (const JudgedTest& each : criticise(engine).tests) {
     EXPECT_TRUE(each.passed()) << each.name << ' ' << each.value << " of " << each.limit;
   }
 }

@@ -34,6 +34,16 @@ TEST(ExcessLeft, ATrifleIsNotAll) {
   EXPECT_NEAR(excess_left(before, after), 0.04, 1e-9);
 }
 
+// A course that is left is as red as the whole; alone it decides.
+TEST(ExcessLeft, OfWhitenessCountsOnlyAlone) {
+  const Criticism both = tests({{"law_cell", 135.0, 35.0}, {"whiteness", 309.0, 9.0}});
+  EXPECT_DOUBLE_EQ(excess_left(both, tests({{"law_cell", 55.0, 35.0}, {"whiteness", 308.0, 9.0}})),
+                   0.2);
+  const Criticism alone = tests({{"law_cell", 5.0, 35.0}, {"whiteness", 309.0, 9.0}});
+  EXPECT_DOUBLE_EQ(excess_left(alone, tests({{"law_cell", 5.0, 35.0}, {"whiteness", 159.0, 9.0}})),
+                   0.5);
+}
+
 TEST(ExcessLeft, IsNoneWhereNothingFailed) {
   const Criticism fine = tests({{"law_cell", 3.0, 35.0}});
   EXPECT_EQ(excess_left(fine, tests({{"law_cell", 99.0, 35.0}})), 0.0);
@@ -65,7 +75,7 @@ TEST(LesserScatter, ElsewhereDoesNotSpeakAgainstAGreaterFunction) {
 TEST(Learn, ANeedlessFunctionIsNotLookedFor) {
   Engine engine{Campaign{}};
   const Criticism fine = tests({{"law_cell", 3.0, 35.0}, {"smooth_cell", 3.0, 35.0}});
-  const Learning learning = learn(engine, fine, Steps::kFine, [] { return false; });
+  const Learning learning = learn(engine, fine, [] { return false; });
   EXPECT_TRUE(learning.terms.empty());
   EXPECT_TRUE(learning.needs_levels.empty());
 }

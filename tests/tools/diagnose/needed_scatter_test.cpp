@@ -41,12 +41,12 @@ Request request_of(const blind::Trial& trial) {
 TEST(NeededScatter, WhatFiveExperimentsDoNotProveIsBounded) {
   Engine engine(campaign_of(scattered(0.012, 5)));
   name_effects(engine, [] { return false; });
-  const Criticism criticism = criticise(engine, Steps::kFine);
+  const Criticism criticism = criticise(engine);
   ASSERT_FALSE(criticism.test("unusual_friction").passed());
   const std::optional<Engine> bounded = without_needless_scatter(engine, criticism);
   ASSERT_TRUE(bounded.has_value());
   EXPECT_LT(bounded->scatter().variance[0], engine.scatter().variance[0]);
-  const Criticism after = criticise(*bounded, Steps::kFine);
+  const Criticism after = criticise(*bounded);
   EXPECT_TRUE(after.test("unusual_friction").passed());
   EXPECT_TRUE(after.test("unusual_scatter").passed());
 }
@@ -54,7 +54,7 @@ TEST(NeededScatter, WhatFiveExperimentsDoNotProveIsBounded) {
 TEST(NeededScatter, WhatTheDataProveStays) {
   Engine engine(campaign_of(scattered(0.03, 8)));
   name_effects(engine, [] { return false; });
-  const Criticism criticism = criticise(engine, Steps::kFine);
+  const Criticism criticism = criticise(engine);
   ASSERT_FALSE(criticism.test("unusual_friction").passed());
   EXPECT_FALSE(without_needless_scatter(engine, criticism).has_value());
 }
@@ -62,7 +62,7 @@ TEST(NeededScatter, WhatTheDataProveStays) {
 TEST(NeededScatter, WhereAllPassNothingIsBounded) {
   Engine engine(campaign_of(scattered(0.004, 5)));
   name_effects(engine, [] { return false; });
-  const Criticism criticism = criticise(engine, Steps::kFine);
+  const Criticism criticism = criticise(engine);
   ASSERT_TRUE(criticism.passed());
   EXPECT_FALSE(without_needless_scatter(engine, criticism).has_value());
 }

@@ -114,39 +114,5 @@ TEST(CheckSameMachine, TwoRatiosAreTwoMachines) {
   EXPECT_NE(doubts.notes.front().find("cannot be of one machine"), std::string::npos);
 }
 
-// A channel that rests, with noise of 1 of 400, in steps; held: each value twice.
-Steps steps_at(double step_kPa, bool held, Role role = Role::kSecondaryPressure) {
-  SignalTable table;
-  Channel& pressure = table[role];
-  double noise_kPa = 0.0;
-  for (int i = 0; i < 2000; ++i) {
-    if (!held || i % 2 == 0) {
-      noise_kPa = 0.0;  // of twelve uniform ones: about normal
-      for (int k = 0; k < 12; ++k) {
-        const double x = std::sin(12.9898 * (12 * i + k)) * 43758.5453;
-        noise_kPa += x - std::floor(x) - 0.5;
-      }
-    }
-    pressure.t_s.push_back(0.01 * i);
-    pressure.value.push_back(1e3 * step_kPa * std::round((400.0 + noise_kPa) / step_kPa));
-  }
-  return steps_of(table);
-}
-
-TEST(StepsOf, AreThoseBeyondTheNoise) {
-  EXPECT_EQ(steps_at(0.1, false), Steps::kFine);
-  EXPECT_EQ(steps_at(1.0, false), Steps::kFine);
-  EXPECT_EQ(steps_at(2.2, false), Steps::kLeak);
-  EXPECT_EQ(steps_at(5.0, false), Steps::kLeak);
-  EXPECT_EQ(steps_at(0.1, true), Steps::kFine);  // repeated, not rounded
-}
-
-// A line where it sweeps.
-TEST(StepsOf, OfASpeedLeaveLines) {
-  EXPECT_EQ(steps_at(1.0, false, Role::kPrimarySpeed), Steps::kFine);
-  EXPECT_EQ(steps_at(5.0, false, Role::kPrimarySpeed), Steps::kLeak);
-  EXPECT_EQ(steps_at(5.0, false, Role::kSecondarySpeed), Steps::kLeak);
-}
-
 }  // namespace
 }  // namespace beltgrip::diagnose

@@ -28,7 +28,7 @@ blind::Trial planted(const std::string& cause, double size) {
 Criticism criticised(Campaign campaign) {
   Engine engine(std::move(campaign));
   name_effects(engine, [] { return false; });
-  return criticise(engine, Steps::kFine);
+  return criticise(engine);
 }
 
 bool follows_pressure(const Cell& cell) {

@@ -24,8 +24,8 @@ void demote_order(std::vector<Cell>& cells) {
                         [&](const Cell& cell) { return !is_order(cell); });
 }
 
-// Of the residuals that wander by as much as matters.
-double least_whiteness(const Engine& engine) {
+// Of the residuals that wander by as much as matters, in decades of chance.
+double redness(const Engine& engine) {
   const auto by_kind = wander(engine, engine.state());
   const auto wanders = [&](const std::string& acts_on) {
     const ResidualKind kind = acts_on == "torque"        ? kBalanceResidual
@@ -33,11 +33,11 @@ double least_whiteness(const Engine& engine) {
                                                          : kFrictionResidual;
     return by_kind[static_cast<std::size_t>(kind)] > thresholds::kWander;
   };
-  double least = 1.0;
+  double most = 0.0;
   for (const ResidualTest& each : test_residuals(engine, engine.state())) {
-    if (each.name == "whiteness" && wanders(each.acts_on)) least = std::min(least, each.p);
+    if (each.name == "whiteness" && wanders(each.acts_on)) most = std::max(most, each.decades);
   }
-  return least;
+  return most;
 }
 
 // The line at the belt's passage, of the speed and the order that show it best, in sigmas; Hz:
@@ -81,8 +81,6 @@ SpectralLine swing(const Campaign& campaign) {
   return {"torque", hump.frequency_Hz, hump.excess, hump.share};
 }
 
-double decades(double p) { return std::max(0.0, -std::log10(std::max(p, 1e-300))); }
-
 }  // namespace
 
 double scatter_limit(double usual_most, std::size_t experiments) {
@@ -125,13 +123,12 @@ const JudgedTest& Criticism::test(const std::string& name) const {
                        [&](const JudgedTest& each) { return each.name == name; });
 }
 
-Criticism criticise(const Engine& engine, Steps steps) {
+Criticism criticise(const Engine& engine) {
   Criticism out;
   out.cells = score_cells(engine);
   demote_order(out.cells);
-  const bool fine = steps == Steps::kFine;
   out.line = strongest_line(engine.campaign(), engine.state());
-  if (fine) out.slow_line = slow_line(engine);
+  out.slow_line = slow_line(engine);
   out.channel_line = channel_line(engine.campaign());
   out.swing = swing(engine.campaign());
   out.base = scatter_base(engine);
@@ -158,12 +155,12 @@ Criticism criticise(const Engine& engine, Steps steps) {
       {"law_cell", law, kLawCell},
       {"smooth_cell", smooth, kSmoothCell},
       {"own_shape", out.own ? out.own->gain() : 0.0, kOwnShape},
-      {"line", fine ? out.line.excess : 0.0, kLine},
+      {"line", out.line.excess, kLine},
       {"slow_line", out.slow_line.excess, kSlowLine},
       {"channel_line", out.channel_line.excess, kChannelLine},
-      {"torque_swing", fine ? out.swing.excess : 0.0, kSwing},
+      {"torque_swing", out.swing.excess, kSwing},
       {"belt_passage", belt_line(engine.campaign(), out.belt_Hz), kBeltLine},
-      {"whiteness", fine ? decades(least_whiteness(engine)) : 0.0, decades(kWhiteness)},
+      {"whiteness", redness(engine), -std::log10(kWhiteness)},
       {"scatter_friction", ratio.friction, limit(kScatterFriction, kUsualMostFriction)},
       {"scatter_ratio", ratio.ratio, limit(kScatterRatio, kUsualMostRatio)},
       {"scatter_torque", ratio.torque, limit(kScatterTorque, kUsualMostTorque)},

@@ -37,9 +37,8 @@ double scatter_limit(double usual_most, std::size_t experiments);
 // What they may scatter by over a base that so many degrees of freedom tell: both are estimates.
 double replicate_limit(std::size_t experiments, double degrees);
 
-// At the engine's state. Where channels move in steps, these leave lines and slow courses of their
-// own: those tests are left out.
-Criticism criticise(const Engine& engine, Steps steps);
+// At the engine's state.
+Criticism criticise(const Engine& engine);
 
 // A function of what a named effect follows, beside it; the one with the largest gain. Where that
 // is there still, the cause follows the same and is another. Null: no effect is named that follows

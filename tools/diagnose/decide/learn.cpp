@@ -126,14 +126,13 @@ struct Trial {
 };
 
 // Nothing where the function is not kept.
-std::optional<Trial> tried(const Engine& engine, const Criticism& before, const Cell& cell,
-                           Steps steps) {
+std::optional<Trial> tried(const Engine& engine, const Criticism& before, const Cell& cell) {
   Trial out{engine, {}, {}, 0.0};
   drop_superseded(out.engine, cell);
   out.learned.fit = fit_learned(out.engine, *cell.injection, cell.abscissa);
   const LearnedFit& fit = out.learned.fit;
   if (fit.left_out_gain < thresholds::kLeftOutLevels || !is_possible(fit)) return {};
-  out.after = criticise(out.engine, steps);
+  out.after = criticise(out.engine);
   out.excess = excess_left(before, out.after,
                            lesser_scatter(before, scatter_of(cell.injection->injection),
                                           cell.gain(), engine.used().size()));
@@ -199,9 +198,18 @@ std::vector<std::string> lesser_scatter(const Criticism& criticism, std::string_
 
 double excess_left(const Criticism& before, const Criticism& after,
                    const std::vector<std::string>& apart) {
-  double most = 0.0;
+  std::vector<JudgedTest> failed;
   for (const JudgedTest& each : before.tests) {
     if (each.passed() || std::find(apart.begin(), apart.end(), each.name) != apart.end()) continue;
+    failed.push_back(each);
+  }
+  // It says how regular a course is, and not how large: a tenth of one follows from itself as the
+  // whole does.
+  if (failed.size() > 1) {
+    std::erase_if(failed, [](const JudgedTest& each) { return each.name == "whiteness"; });
+  }
+  double most = 0.0;
+  for (const JudgedTest& each : failed) {
     const JudgedTest& now = after.test(each.name);
     // What hardly failed is healed by chance, or not.
     const double failed_by = std::max(each.value - each.limit, thresholds::kTrifle * each.limit);
@@ -210,8 +218,7 @@ double excess_left(const Criticism& before, const Criticism& after,
   return most;
 }
 
-Learning learn(Engine& engine, const Criticism& failed, Steps steps,
-               const std::function<bool()>& stop) {
+Learning learn(Engine& engine, const Criticism& failed, const std::function<bool()>& stop) {
   Learning out;
   out.left = failed;
   for (std::size_t round = 0; round < thresholds::kTermsMax && !out.left.passed(); ++round) {
@@ -219,7 +226,7 @@ Learning learn(Engine& engine, const Criticism& failed, Steps steps,
     std::optional<Trial> best;
     for (const Cell* cell : candidates(before, engine.campaign().has_balance, out)) {
       if (stop()) return out;
-      std::optional<Trial> trial = tried(engine, before, *cell, steps);
+      std::optional<Trial> trial = tried(engine, before, *cell);
       if (trial && (!best || trial->excess < best->excess)) best = std::move(trial);
       if (best && best->after.passed()) break;
     }

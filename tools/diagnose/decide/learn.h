@@ -29,8 +29,7 @@ struct Learning {
 std::string role_of(const Campaign& campaign, const IndexVariable& variable);
 
 // failed: of the engine's present state. What is not kept leaves no trace in the engine.
-Learning learn(Engine& engine, const Criticism& failed, Steps steps,
-               const std::function<bool()>& stop);
+Learning learn(Engine& engine, const Criticism& failed, const std::function<bool()>& stop);
 
 // Laws within odds of 20 to 1 of the best, that first.
 std::vector<LawEvidence> possible_laws(const LearnedFit& fit);

@@ -23,8 +23,6 @@ constexpr double kPressureMost_Pa = 200e5;   // three times what variators have
 constexpr double kTorqueTold_Nm = 10.0;
 constexpr double kPowerLeast = 0.3;  // out over in: no variator loses or gains as much
 constexpr double kCopyNoise = 0.3;   // rms of the difference over that of the noise
-// Chosen, times the least change: one that is usually larger comes in many steps.
-constexpr double kFewSteps = 2.5;
 
 std::string text_of(double value) {
   char buffer[32];
@@ -239,29 +237,6 @@ void check_friction(const std::vector<ExperimentData>& runs,
                          " bar, which no belt drive has: unit or scale of the pressure or the "
                          "torque, or secondary_piston_area_m2 of [variator]?");
   doubts.impossible = Unexplained{"friction", {"secondary_pressure", "torque"}, 1.0};
-}
-
-Steps steps_of(const SignalTable& table) {
-  // Derived: at a step of 1.6 sigmas of the noise, from where on means of many samples keep
-  // something of the steps.
-  constexpr double kLeakHeld = 0.41;
-  constexpr std::size_t kSamplesMin = 100;  // chosen: the share is then known to 0.05
-  for (const Role role : {Role::kSecondaryPressure, Role::kPrimaryTorque, Role::kEngineTorque,
-                          Role::kSecondaryTorque, Role::kPrimarySpeed, Role::kSecondarySpeed}) {
-    const std::vector<double>& value = table[role].value;
-    if (value.size() < kSamplesMin) continue;
-    std::vector<double> changes;
-    for (std::size_t i = 1; i < value.size(); ++i) {
-      if (value[i] != value[i - 1]) changes.push_back(std::abs(value[i] - value[i - 1]));
-    }
-    const double held =
-        1.0 - static_cast<double>(changes.size()) / static_cast<double>(value.size() - 1);
-    if (held <= kLeakHeld || changes.empty()) continue;
-    // A channel that is repeated until its next value comes moves by many steps then.
-    const double least = *std::min_element(changes.begin(), changes.end());
-    if (estimator::median(changes) < kFewSteps * least) return Steps::kLeak;
-  }
-  return Steps::kFine;
 }
 
 bool is_no_belts(double mu_max) { return mu_max < kMuLeast; }

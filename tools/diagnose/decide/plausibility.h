@@ -35,9 +35,4 @@ bool is_no_belts(double mu_max);
 // By the fit of the machine's constants.
 void check_fitted_friction(const std::map<std::string, Interval>& machine, Implausible& doubts);
 
-// Steps of pressure, torque and speed against their noise: means smooth fine ones; of those that
-// leak something stays in means.
-enum class Steps { kFine, kLeak };
-Steps steps_of(const SignalTable& table);
-
 }  // namespace beltgrip::diagnose

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "estimator/statistics/order.h"
+#include "tools/diagnose/infer/rounding_swing.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -210,6 +211,19 @@ ArrayXd answer_to(const Campaign& campaign, const Residuals& at, const Look& loo
   return answer.max(-most).min(most);
 }
 
+// Of the swings that rounding may leave, where the fast part is told.
+double power_of(const std::vector<ResidualColumns>& swings, ResidualKind kind, const ArrayXd& fast,
+                const ArrayXd& answer) {
+  double out = 0.0;
+  for (const ResidualColumns& each : swings) {
+    const ArrayXd& column = each[static_cast<std::size_t>(kind)];
+    if (column.size() == 0) continue;
+    const double half = 0.5 * (fast != 0.0).select(column * answer, 0.0).abs().sum();
+    out += half * half;
+  }
+  return out;
+}
+
 }  // namespace
 
 SpectralLine strongest_line(const Campaign& campaign, const ModelState& state) {
@@ -223,6 +237,8 @@ SpectralLine strongest_line(const Campaign& campaign, const ModelState& state) {
     if (run.valid_count < kLineSamplesMin) continue;
     Residuals at = residuals_of(campaign, static_cast<int>(e), state);
     move_to_foot(campaign, static_cast<int>(e), at);
+    const std::vector<ResidualColumns> rounding =
+        rounding_swings(campaign, static_cast<int>(e), at);
     std::array<std::vector<bool>, kResidualKinds> is_driven;
     for (std::size_t l = 0; l < kLooks.size(); ++l) {
       const auto kind = static_cast<std::size_t>(kLooks[l].kind);
@@ -231,12 +247,16 @@ SpectralLine strongest_line(const Campaign& campaign, const ModelState& state) {
       const ArrayXd fast = fast_part(run, at.value[kind], every);
       if (fast.size() == 0) continue;
       const double highest_Hz = std::min(kHighest_Hz, 0.45 / (run.dt_s * every));
-      std::vector<double> own = levelled(
-          spectrum(fast * answer_to(campaign, at, kLooks[l]), run.dt_s, highest_Hz), kLowest_Hz);
+      const ArrayXd answer = answer_to(campaign, at, kLooks[l]);
+      const std::vector<double> power = spectrum(fast * answer, run.dt_s, highest_Hz);
+      std::vector<double> own = levelled(power, kLowest_Hz);
+      const double of_rounding = power_of(rounding, kLooks[l].kind, fast, answer);
+      const std::size_t skipped = power.size() - own.size();
       if (is_driven[kind].empty())
         is_driven[kind] = driven(run, own.size(), kLowest_Hz, highest_Hz);
       for (std::size_t i = 0; i < own.size(); ++i) {
-        if (is_driven[kind][i]) own[i] = std::min(own[i], 1.0);  // as noise has it
+        if (is_driven[kind][i] || power[skipped + i] < of_rounding)
+          own[i] = std::min(own[i], 1.0);  // as noise has it
       }
       Pool& pool = pools[l];
       pool.sum.resize(std::max(pool.sum.size(), own.size()), 0.0);

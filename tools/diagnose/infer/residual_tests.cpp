@@ -92,8 +92,8 @@ struct Autocorrelation {
       }
     }
   }
-  double p() const {
-    if (!(product[0] > 0.0)) return 1.0;
+  ResidualTest test(const char* acts_on) const {
+    if (!(product[0] > 0.0)) return {acts_on, "whiteness"};
     double chi2 = 0.0;
     int degrees = 0;
     for (std::size_t lag = 1; lag < product.size(); ++lag) {
@@ -102,7 +102,8 @@ struct Autocorrelation {
       chi2 += r * r * count[lag];
       ++degrees;
     }
-    return estimator::chi2_p(chi2, degrees);
+    return {acts_on, "whiteness", estimator::chi2_p(chi2, degrees),
+            estimator::chi2_decades(chi2, degrees)};
   }
 };
 
@@ -180,9 +181,8 @@ std::vector<ResidualTest> test_residuals(const Engine& engine, const ModelState&
   constexpr std::array<const char*, kResidualKinds> kActsOn{"friction", "torque", "clamp force"};
   for (std::size_t kind = 0; kind < kResidualKinds; ++kind) {
     if (correlation[kind].count[0] == 0.0) continue;
-    const double p = correlation[kind].p();
-    out.push_back({kActsOn[kind], "whiteness", p});
-    if (kind == kFrictionResidual) out.push_back({"ratio", "whiteness", p});
+    out.push_back(correlation[kind].test(kActsOn[kind]));
+    if (kind == kFrictionResidual) out.push_back(correlation[kind].test("ratio"));
   }
   return out;
 }

@@ -14,6 +14,7 @@ struct ResidualTest {
   std::string acts_on;  // friction, ratio, torque; clamp force for the pressure's tracking
   std::string name;
   double p = 1.0;
+  double decades = 0.0;  // of whiteness: -log10(p)
 };
 
 // Whiteness of each residual; step of friction, ratio and torque with the direction of the clamp

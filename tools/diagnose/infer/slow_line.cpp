@@ -9,6 +9,7 @@
 
 #include "estimator/statistics/order.h"
 #include "tools/diagnose/infer/cell_columns.h"
+#include "tools/diagnose/infer/rounding_swing.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -29,9 +30,30 @@ constexpr std::array kActsOn{Injection::kFriction, Injection::kRatio, Injection:
 
 double hertz(int i) { return (kLevelFrom + i) / kPerHz; }
 
+// The size of a swing, in units of the row, that rounding may leave.
+double size_of_rounding(const Campaign& campaign, int run, const ModelState& state,
+                        const Residuals& at, const InjectionRow& row) {
+  const ResidualColumns unit =
+      propagate(campaign, at, unit_change(state, at, row, ArrayXd::Ones(at.foot.size())));
+  double own = 0.0, squares = 0.0;
+  for (const ArrayXd& each : unit) own += each.square().sum();
+  if (own == 0.0) return 0.0;
+  for (const ResidualColumns& each : rounding_swings(campaign, run, at)) {
+    double common = 0.0;
+    for (std::size_t kind = 0; kind < kResidualKinds; ++kind) {
+      if (each[kind].size() > 0 && unit[kind].size() > 0) {
+        common += (each[kind] * unit[kind]).abs().sum();
+      }
+    }
+    squares += common * common / (own * own);
+  }
+  return std::sqrt(squares);
+}
+
 // By how much twice the log likelihood of one experiment grows with a swing of any size and phase.
 struct Gains {
   std::array<double, kFrequencies> of{};
+  std::array<double, kFrequencies> size{};  // of that swing, in units of the row
 };
 
 Gains gains_of(const Engine& engine, int run, Residuals& at, const InjectionRow& row) {
@@ -59,6 +81,8 @@ Gains gains_of(const Engine& engine, int run, Residuals& at, const InjectionRow&
       const Eigen::Index at_sine = Eigen::Index{2} * i;
       const Eigen::Vector2d score = own.col(Eigen::Index{2} * count).segment<2>(at_sine);
       Eigen::Matrix2d information = own.block<2, 2>(at_sine, at_sine);
+      out.size[static_cast<std::size_t>(first) + static_cast<std::size_t>(i)] =
+          (information.inverse() * score).norm();
       information.diagonal().array() += 1.0;  // of a usual size, and where nothing tells
       out.of[static_cast<std::size_t>(first) + static_cast<std::size_t>(i)] =
           score.dot(information.inverse() * score);
@@ -103,10 +127,14 @@ SpectralLine slow_line(const Engine& engine) {
                kLowest / kPerHz, kLevelTo / kPerHz);
     for (std::size_t p = 0; p < pools.size(); ++p) {
       const Gains own = gains_of(engine, run, at, row_of(kActsOn[p]));
+      const double of_rounding =
+          size_of_rounding(engine.campaign(), run, engine.state(), at, row_of(kActsOn[p]));
       for (int i = 0; i < kFrequencies; ++i) {
         const auto j = static_cast<std::size_t>(i);
-        const bool answers = i >= kLowest - kLevelFrom && is_driven[j + kLevelFrom - kLowest];
-        pools[p].of[j] += answers ? std::min(own.of[j], level_about(own, i)) : own.of[j];
+        const bool is_driven_there =
+            i >= kLowest - kLevelFrom && is_driven[j + kLevelFrom - kLowest];
+        const bool is_told = own.size[j] > of_rounding && !is_driven_there;
+        pools[p].of[j] += is_told ? own.of[j] : std::min(own.of[j], level_about(own, i));
       }
     }
   }

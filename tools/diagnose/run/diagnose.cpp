@@ -56,9 +56,6 @@ class Run {
     answer_.extended = request_.model;
     std::vector<ExperimentData> runs;
     drop_copies(request_.experiments, implausible_);
-    for (const SignalTable& table : request_.experiments) {
-      steps_ = std::max(steps_, steps_of(table));
-    }
     std::vector<const SignalTable*> tables;
     tables.reserve(request_.experiments.size() + request_.held_out.size());
     for (const SignalTable& table : request_.experiments) tables.push_back(&table);
@@ -199,20 +196,20 @@ class Run {
       if (before.empty()) return;
       name_anew(engine, naming, stop());
       if (engine.accepted() == before) return;
-      left = criticise(engine, steps_);
+      left = criticise(engine);
     }
   }
 
   // Scatter that the data do not need goes first: it hides what they need.
   Criticism criticise_with_needed_scatter(Engine& engine, Naming& naming) {
-    Criticism out = criticise(engine, steps_);
+    Criticism out = criticise(engine);
     // With less of it, what replicates scatter by is less too.
     for (int round = 0; round < kRoundsMax && !stop()(); ++round) {
       std::optional<Engine> bounded = without_needless_scatter(engine, out);
       if (!bounded) break;
       engine = std::move(*bounded);
       name_anew(engine, naming, stop());
-      out = criticise(engine, steps_);
+      out = criticise(engine);
     }
     return out;
   }
@@ -259,7 +256,7 @@ class Run {
     while (with_fewer.accepted().size() > 1 && !stop()()) {
       forget_last(with_fewer, fewer, stop());
       if (with_fewer.accepted().empty()) return false;
-      Criticism now = criticise(with_fewer, steps_);
+      Criticism now = criticise(with_fewer);
       if (!now.passed()) continue;
       engine = std::move(with_fewer);
       naming = std::move(fewer);
@@ -283,7 +280,7 @@ class Run {
     const bool sensible =
         !implausible_.impossible && used_runs(engine.campaign()) >= kLearningRunsMin;
     for (int round = 0; round < kRoundsMax && sensible && !out.left.passed(); ++round) {
-      Learning more = learn(engine, out.left, steps_, stop());
+      Learning more = learn(engine, out.left, stop());
       out.needs_levels = more.needs_levels;
       if (more.terms.empty()) break;
       out.left = std::move(more.left);
@@ -293,7 +290,7 @@ class Run {
       if (stop()() || engine.accepted() == before) break;
       // Other effects: what was learned beside the old ones is learned beside these.
       relearn(engine, out);
-      out.left = criticise(engine, steps_);
+      out.left = criticise(engine);
     }
   }
 
@@ -478,11 +475,6 @@ class Run {
     if (criticism.tests.empty()) {
       out().verdict = Verdict::kNone;
       return;
-    }
-    if (steps_ != Steps::kFine) {
-      out().notes.emplace_back(
-          "a pressure, torque or speed moves in steps beyond its noise: lines and slow courses are "
-          "not judged");
     }
     out().scatter_from_replicates = criticism.base.from_replicates;
     for (const JudgedTest& test : criticism.tests) out().left[test.name] = {test.value, test.limit};
@@ -759,9 +751,6 @@ class Run {
     }
     const auto floors = noise_floors(campaign, naming.nominal.state);
     std::vector<ResidualTest> tests = test_residuals(engine, naming.nominal.state);
-    if (steps_ != Steps::kFine) {  // steps are not white, whatever the model
-      std::erase_if(tests, [](const ResidualTest& test) { return test.name == "whiteness"; });
-    }
     for (const UnknownGroup& group : naming.nominal_groups) {
       tests.push_back({group.acts_on, group.depends_on, estimator::chi2_p(group.chi2, 1)});
     }
@@ -935,7 +924,6 @@ class Run {
   Request request_;
   Answer answer_;
   Implausible implausible_;
-  Steps steps_ = Steps::kFine;
   Eigen::VectorXd mu_height_;  // change of ln mu_max per column of the fit
   LeftOpen open_;              // of mu_max; empty where other errors are larger
   Sensors sensors_;            // by what is fitted and what is held out
