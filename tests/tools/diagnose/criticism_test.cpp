@@ -101,6 +101,12 @@ TEST(RepeatsWithin, WhatFollowsAVariableThatChangesInEachExperiment) {
   EXPECT_FALSE(repeats_within(failing({"law_cell"}, {between, within})));
   EXPECT_FALSE(repeats_within(failing({"scatter_friction"}, {within})));  // it does not stand out
   EXPECT_FALSE(repeats_within(failing({"law_cell"})));
+  // Experiments of other lengths: the time has another mean in each, and passes all the same.
+  Cell time = cell(Injection::kTorque, "time", 900.0, 0.2, 0.9);
+  time.abscissa.x.assign(2, Eigen::ArrayXd::LinSpaced(5, 0.0, 0.6));
+  EXPECT_TRUE(repeats_within(failing({"law_cell"}, {time})));
+  time.abscissa.x.assign(2, Eigen::ArrayXd::LinSpaced(5, 0.2, 0.3));
+  EXPECT_FALSE(repeats_within(failing({"law_cell"}, {time})));
 }
 
 // The same scatter is left with and without a name. It is what the name was made of where all that

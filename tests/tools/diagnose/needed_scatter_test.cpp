@@ -69,7 +69,35 @@ TEST(NeededScatter, WhereAllPassNothingIsBounded) {
 
 TEST(NeededScatter, DecidesTheVerdict) {
   EXPECT_EQ(diagnose(request_of(scattered(0.012, 5))).diagnosis.verdict, Verdict::kNothingWrong);
-  EXPECT_EQ(diagnose(request_of(scattered(0.03, 8))).diagnosis.verdict, Verdict::kUnexplained);
+  const Diagnosis differs = diagnose(request_of(scattered(0.03, 8))).diagnosis;
+  EXPECT_EQ(differs.verdict, Verdict::kUnexplained);
+  EXPECT_TRUE(differs.learned.empty());  // what follows nothing is no function of anything
+}
+
+// What the data prove is no scatter of a healthy machine stands in its residuals all the same.
+TEST(WithinHealthyScatter, LeavesWhatDiffersToTheResiduals) {
+  Engine engine(campaign_of(scattered(0.03, 8)));
+  name_effects(engine, [] { return false; });
+  const Criticism criticism = criticise(engine);
+  const std::optional<Engine> bounded = within_healthy_scatter(engine, criticism);
+  ASSERT_TRUE(bounded.has_value());
+  EXPECT_LT(bounded->scatter().variance[0], engine.scatter().variance[0]);
+  EXPECT_GT(score_cells(*bounded).front().gain(), 2.0 * criticism.cells.front().gain());
+}
+
+// A drag that grows as the oil gets colder, of which the zeros of the torques take the most.
+TEST(WithinHealthyScatter, LetsAFunctionBeFoundThatTheScatterTakes) {
+  blind::Trial trial;
+  trial.seed = 6;
+  blind::Random random(trial.seed);
+  trial.machine = blind::draw_machine(random);
+  trial.plan = blind::draw_plan(random, trial.machine.setting, 12);
+  trial.planted = {blind::draw_outside(random, "x_loss_temperature", 3.0)};
+  const Diagnosis found = diagnose(request_of(trial)).diagnosis;
+  EXPECT_EQ(found.verdict, Verdict::kExplained);
+  ASSERT_EQ(found.learned.size(), 1U);
+  EXPECT_EQ(found.learned.front().acts_on, "torque");
+  EXPECT_EQ(found.learned.front().depends_on, std::vector<std::string>{"oil_temperature"});
 }
 
 // Of equal ramps without the torque behind the belt.

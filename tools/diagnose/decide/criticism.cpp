@@ -174,8 +174,8 @@ Criticism criticise(const Engine& engine) {
 namespace {
 
 // What is followed differs between experiments rather than within each of them.
+constexpr double kBetween = 0.5;  // chosen, of the span: what their means cover at least
 bool differs_between(const Abscissa& abscissa) {
-  constexpr double kBetween = 0.5;  // chosen, of the span: what their means cover at least
   double least = abscissa.high, most = abscissa.low;
   for (std::size_t e = 0; e < abscissa.x.size(); ++e) {
     if (abscissa.x[e].size() == 0) continue;
@@ -185,12 +185,20 @@ bool differs_between(const Abscissa& abscissa) {
   return most - least >= kBetween * (abscissa.high - abscissa.low);
 }
 
+// As much as that within one experiment or another.
+bool changes_within(const Abscissa& abscissa) {
+  return std::any_of(abscissa.x.begin(), abscissa.x.end(), [&](const Eigen::ArrayXd& x) {
+    return x.size() > 0 && x.maxCoeff() - x.minCoeff() >= kBetween;
+  });
+}
+
 }  // namespace
 
 bool repeats_within(const Criticism& criticism) {
   return !criticism.cells.empty() &&
          (!criticism.test("law_cell").passed() || !criticism.test("smooth_cell").passed()) &&
-         !differs_between(criticism.cells.front().abscissa);
+         (!differs_between(criticism.cells.front().abscissa) ||
+          changes_within(criticism.cells.front().abscissa));
 }
 
 bool may_be_scatter(const Cell& cell, const Criticism& criticism, bool has_balance) {

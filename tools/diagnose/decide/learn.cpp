@@ -5,6 +5,7 @@
 #include <optional>
 #include <string_view>
 
+#include "tools/diagnose/decide/needed_scatter.h"
 #include "tools/diagnose/decide/thresholds.h"
 
 namespace beltgrip::diagnose {
@@ -40,6 +41,21 @@ std::vector<const Cell*> candidates(const Criticism& failed, bool has_balance, L
       return other->abscissa.variable == cell.abscissa.variable;
     });
     if (!again) tried.push_back(&cell);
+  }
+  return tried;
+}
+
+// Where the experiments scatter by more than healthy ones, also what stands out with no more than
+// that: the scatter takes a function of what differs between them for its own.
+std::vector<const Cell*> candidates_of(const Criticism& failed, const Criticism& unscattered,
+                                       const Campaign& campaign, Learning& out) {
+  std::vector<const Cell*> tried = candidates(failed, campaign.has_balance, out);
+  for (const Cell* cell : candidates(unscattered, campaign.has_balance, out)) {
+    const bool again = std::any_of(tried.begin(), tried.end(), [&](const Cell* other) {
+      return other->abscissa.variable == cell->abscissa.variable &&
+             other->injection == cell->injection;
+    });
+    if (!again) tried.push_back(cell);
   }
   return tried;
 }
@@ -223,8 +239,16 @@ Learning learn(Engine& engine, const Criticism& failed, const std::function<bool
   out.left = failed;
   for (std::size_t round = 0; round < thresholds::kTermsMax && !out.left.passed(); ++round) {
     const Criticism before = out.left;
+    Criticism unscattered = before;
+    unscattered.cells.clear();
+    // What repeats within experiments and goes with the function is more than they differ by.
+    if (repeats_within(before)) {
+      if (const auto bounded = within_healthy_scatter(engine, before)) {
+        unscattered.cells = score_cells(*bounded);
+      }
+    }
     std::optional<Trial> best;
-    for (const Cell* cell : candidates(before, engine.campaign().has_balance, out)) {
+    for (const Cell* cell : candidates_of(before, unscattered, engine.campaign(), out)) {
       if (stop()) return out;
       std::optional<Trial> trial = tried(engine, before, *cell);
       if (trial && (!best || trial->excess < best->excess)) best = std::move(trial);

@@ -65,15 +65,34 @@ double marginal(const Hypothesis& fit) {
          0.5 * fit.fit.covariance.ldlt().vectorD().array().max(1e-300).log().sum();
 }
 
-}  // namespace
+struct Bounded {
+  Engine engine;      // not yet at what was fitted
+  Hypothesis within;  // of the effects that are accepted
+};
 
-std::optional<Engine> without_needless_scatter(const Engine& engine, const Criticism& criticism) {
+std::optional<Bounded> bounded_fit(const Engine& engine, const Criticism& criticism) {
   const std::optional<RandomVector> most = bounds(engine, criticism);
   if (!most || !(*most < engine.scatter().variance).any()) return {};
-  Engine bounded = engine;
-  bounded.bound_scatter(*most);
+  Bounded out{engine, {}};
+  out.engine.bound_scatter(*most);
+  out.within = out.engine.refine(engine.accepted(), kSteps);
+  return out;
+}
+
+}  // namespace
+
+std::optional<Engine> within_healthy_scatter(const Engine& engine, const Criticism& criticism) {
+  std::optional<Bounded> out = bounded_fit(engine, criticism);
+  if (!out) return {};
+  out->engine.accept(std::move(out->within));
+  return std::move(out->engine);
+}
+
+std::optional<Engine> without_needless_scatter(const Engine& engine, const Criticism& criticism) {
+  std::optional<Bounded> fit = bounded_fit(engine, criticism);
+  if (!fit) return {};
+  auto& [bounded, within] = *fit;
   const std::vector<int>& slots = engine.accepted();
-  const Hypothesis within = bounded.refine(slots, kSteps);
   const double beyond = std::max(marginal(engine.refine(slots, kSteps)),
                                  marginal(engine.refine_from(within.state, slots, kSteps)));
   // Of one variance at its bound: half of the chances are below.
@@ -83,7 +102,7 @@ std::optional<Engine> without_needless_scatter(const Engine& engine, const Criti
   bounded.update_noise();
   bounded.accept(bounded.refine(slots, kSteps));
   bounded.update_noise();
-  return bounded;
+  return std::move(bounded);
 }
 
 }  // namespace beltgrip::diagnose

@@ -14,4 +14,8 @@ namespace beltgrip::diagnose {
 // as well; else, and where none fails, nothing.
 std::optional<Engine> without_needless_scatter(const Engine& engine, const Criticism& criticism);
 
+// The same whether the data need more or not: what repeats stands in its residuals, and no scatter
+// takes it.
+std::optional<Engine> within_healthy_scatter(const Engine& engine, const Criticism& criticism);
+
 }  // namespace beltgrip::diagnose
