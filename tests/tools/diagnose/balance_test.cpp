@@ -157,6 +157,21 @@ TEST(Balance, NoShaftHasLessInertiaThanNone) {
   EXPECT_NEAR(moved_by(-2.0 * kInertia_kgm2), -kInertia_kgm2, 1e-12);
 }
 
+TEST(Balance, NoShaftBehindTheBeltHasLessThanNoneEither) {
+  const estimator::VariatorParameters variator;
+  const Engine engine(make_campaign({prepare(pulse(variator), variator)}, nominal_model(variator)));
+  const std::vector<int> inertia{kSecondaryInertia_kgm2};
+  const double nominal_kg_m2 = engine.state().nuisance[kSecondaryInertia_kgm2];
+  const auto moved_by = [&](double size_kg_m2) {
+    ModelState state = engine.state();
+    const double step = size_kg_m2 / engine.scale(kSecondaryInertia_kgm2);
+    engine.move(inertia, Eigen::VectorXd::Constant(1, step), 1.0, state);
+    return state.nuisance[kSecondaryInertia_kgm2];
+  };
+  EXPECT_NEAR(moved_by(0.4), nominal_kg_m2 + 0.4, 1e-12);
+  EXPECT_EQ(moved_by(-2.0), 0.0);
+}
+
 // By the more accurate one less: of stated 3 and 4 % a gain is the primary's by 9 in 25.
 TEST(Balance, TheGainIsThePrimarysByItsShareOfTheVariance) {
   estimator::VariatorParameters variator;

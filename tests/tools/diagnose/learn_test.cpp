@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 namespace beltgrip::diagnose {
 namespace {
 
@@ -69,6 +71,20 @@ TEST(LesserScatter, ElsewhereDoesNotSpeakAgainstAGreaterFunction) {
                                  {"scatter_ratio", 1.0, 3.3}});
   EXPECT_GT(excess_left(before, after), 1.0);
   EXPECT_LT(excess_left(before, after, {"scatter_torque"}), 0.0 + 1e-12);
+}
+
+// The gain of a torque is never off by more than a quarter, whatever stands beside it.
+TEST(IsPossible, WithinWhatMachinesAreOffBy) {
+  LearnedFit fit;
+  fit.cell.injection = &*std::find_if(
+      kInjections.begin(), kInjections.end(),
+      [](const InjectionRow& row) { return row.injection == Injection::kTorqueGain; });
+  fit.term.count = 2;
+  fit.term.value[0] = 0.02;
+  fit.term.value[1] = -0.24;
+  EXPECT_TRUE(is_possible(fit));
+  fit.term.value[1] = -0.26;
+  EXPECT_FALSE(is_possible(fit));
 }
 
 // Nothing fails: nothing is learned, whatever the cells look like.

@@ -60,14 +60,6 @@ std::vector<const Cell*> candidates_of(const Criticism& failed, const Criticism&
   return tried;
 }
 
-bool is_possible(const LearnedFit& fit) {
-  const auto point = static_cast<std::size_t>(fit.cell.injection->injection);
-  const double most = *std::max_element(
-      fit.term.value.begin(), fit.term.value.begin() + static_cast<std::ptrdiff_t>(fit.term.count),
-      [](double a, double b) { return std::abs(a) < std::abs(b); });
-  return std::abs(most) < kLearnedBound[point];
-}
-
 std::vector<std::string> aliases_of(const Campaign& campaign, const Criticism& failed,
                                     const Cell& best) {
   std::vector<std::string> out;
@@ -158,6 +150,14 @@ std::optional<Trial> tried(const Engine& engine, const Criticism& before, const 
 }
 
 }  // namespace
+
+bool is_possible(const LearnedFit& fit) {
+  const auto point = static_cast<std::size_t>(fit.cell.injection->injection);
+  const double most = *std::max_element(
+      fit.term.value.begin(), fit.term.value.begin() + static_cast<std::ptrdiff_t>(fit.term.count),
+      [](double a, double b) { return std::abs(a) < std::abs(b); });
+  return std::abs(most) < kLearnedBound[point];
+}
 
 std::string role_of(const Campaign& campaign, const IndexVariable& variable) {
   if (std::string_view(variable.name) != "torque") return variable.name;

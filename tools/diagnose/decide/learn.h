@@ -28,6 +28,9 @@ struct Learning {
 // The role of a model file that an index variable is; the torque is the one that is recorded.
 std::string role_of(const Campaign& campaign, const IndexVariable& variable);
 
+// False where it is larger than any machine is off by.
+bool is_possible(const LearnedFit& fit);
+
 // failed: of the engine's present state. What is not kept leaves no trace in the engine.
 Learning learn(Engine& engine, const Criticism& failed, const std::function<bool()>& stop);
 

@@ -82,6 +82,6 @@ inline constexpr double kNearBest = 0.5;
 // each.
 inline constexpr std::size_t kTermsMax = 2, kTermsTried = 3;
 // No machine is off by more: Nm, share, N, share, share; the bounds of the effects that act there.
-inline constexpr double kLearnedBound[] = {20.0, 0.5, 3000.0, 0.08, 0.6};
+inline constexpr double kLearnedBound[] = {20.0, 0.25, 3000.0, 0.08, 0.6};
 
 }  // namespace beltgrip::diagnose::thresholds

@@ -898,6 +898,7 @@ void Engine::move(const std::vector<int>& parameters, const VectorXd& step, doub
     } else if (parameters[j] < kNuisanceCount) {
       double& value = state.nuisance[parameters[j]];
       value += by;
+      if (parameters[j] == kSecondaryInertia_kgm2) value = std::max(value, 0.0);
       // The data hold it far better than the usual values do: without a bound any drag would be the
       // machine's own, and what it explains would be no gain.
       constexpr std::array kBounded{kLossPerkN_Nm, kSecondaryLossPerkN_Nm, kSecondaryTorqueGain,

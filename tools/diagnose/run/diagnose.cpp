@@ -285,11 +285,21 @@ class Run {
       if (more.terms.empty()) break;
       out.left = std::move(more.left);
       for (Learned& each : more.terms) out.terms.push_back(std::move(each));
-      const std::vector<int> before = engine.accepted();
+      const Engine before = engine;
+      const Naming names_before = naming;
+      const std::vector<Learned> terms_before = out.terms;
       name_anew(engine, naming, stop());
-      if (stop()() || engine.accepted() == before) break;
-      // Other effects: what was learned beside the old ones is learned beside these.
+      if (stop()() || engine.accepted() == before.accepted()) break;
+      // Other effects: what was learned beside the old ones is learned beside these. A name that
+      // makes a function of what no machine has is none: each gives what the other takes.
       relearn(engine, out);
+      if (!std::all_of(out.terms.begin(), out.terms.end(),
+                       [](const Learned& each) { return is_possible(each.fit); })) {
+        engine = before;
+        naming = names_before;
+        out.terms = terms_before;
+        break;
+      }
       out.left = criticise(engine);
     }
   }
