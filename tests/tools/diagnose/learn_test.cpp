@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "tools/diagnose/infer/gain.h"
+
 namespace beltgrip::diagnose {
 namespace {
 
@@ -87,11 +89,22 @@ TEST(IsPossible, WithinWhatMachinesAreOffBy) {
   EXPECT_FALSE(is_possible(fit));
 }
 
+// Beyond chance, by a tenth, and beyond what the sensors' noise is anyway.
+TEST(IsClearlyWorse, ByMoreThanATenthBeyondChanceAndNoise) {
+  const BeforeAfter worse{.before = 0.08, .after = 3.1, .low = -4.3, .high = -1.7};
+  EXPECT_TRUE(is_clearly_worse(worse, 0.12));
+  EXPECT_FALSE(is_clearly_worse(worse, 3.0));
+  EXPECT_FALSE(is_clearly_worse({.before = 0.08, .after = 3.1, .low = -4.3, .high = 0.1}, 0.12));
+  EXPECT_FALSE(is_clearly_worse({.before = 0.4, .after = 0.43, .low = -0.05, .high = -0.01}, 0.12));
+  EXPECT_FALSE(is_clearly_worse({.before = 0.4, .after = 0.1, .low = 0.2, .high = 0.4}, 0.12));
+}
+
 // Nothing fails: nothing is learned, whatever the cells look like.
 TEST(Learn, ANeedlessFunctionIsNotLookedFor) {
   Engine engine{Campaign{}};
   const Criticism fine = tests({{"law_cell", 3.0, 35.0}, {"smooth_cell", 3.0, 35.0}});
-  const Learning learning = learn(engine, fine, [] { return false; });
+  const Learning learning = learn(
+      engine, fine, [] { return false; }, [](const Engine&, const LearnedFit&) { return true; });
   EXPECT_TRUE(learning.terms.empty());
   EXPECT_TRUE(learning.needs_levels.empty());
 }

@@ -134,12 +134,14 @@ struct Trial {
 };
 
 // Nothing where the function is not kept.
-std::optional<Trial> tried(const Engine& engine, const Criticism& before, const Cell& cell) {
+std::optional<Trial> tried(const Engine& engine, const Criticism& before, const Cell& cell,
+                           const std::function<bool(const Engine&, const LearnedFit&)>& holds) {
   Trial out{engine, {}, {}, 0.0};
   drop_superseded(out.engine, cell);
   out.learned.fit = fit_learned(out.engine, *cell.injection, cell.abscissa);
   const LearnedFit& fit = out.learned.fit;
   if (fit.left_out_gain < thresholds::kLeftOutLevels || !is_possible(fit)) return {};
+  if (!holds(out.engine, fit)) return {};
   out.after = criticise(out.engine);
   out.excess = excess_left(before, out.after,
                            lesser_scatter(before, scatter_of(cell.injection->injection),
@@ -234,7 +236,8 @@ double excess_left(const Criticism& before, const Criticism& after,
   return most;
 }
 
-Learning learn(Engine& engine, const Criticism& failed, const std::function<bool()>& stop) {
+Learning learn(Engine& engine, const Criticism& failed, const std::function<bool()>& stop,
+               const std::function<bool(const Engine&, const LearnedFit&)>& holds) {
   Learning out;
   out.left = failed;
   for (std::size_t round = 0; round < thresholds::kTermsMax && !out.left.passed(); ++round) {
@@ -250,7 +253,7 @@ Learning learn(Engine& engine, const Criticism& failed, const std::function<bool
     std::optional<Trial> best;
     for (const Cell* cell : candidates_of(before, unscattered, engine.campaign(), out)) {
       if (stop()) return out;
-      std::optional<Trial> trial = tried(engine, before, *cell);
+      std::optional<Trial> trial = tried(engine, before, *cell, holds);
       if (trial && (!best || trial->excess < best->excess)) best = std::move(trial);
       if (best && best->after.passed()) break;
     }

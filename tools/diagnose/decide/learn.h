@@ -32,7 +32,9 @@ std::string role_of(const Campaign& campaign, const IndexVariable& variable);
 bool is_possible(const LearnedFit& fit);
 
 // failed: of the engine's present state. What is not kept leaves no trace in the engine.
-Learning learn(Engine& engine, const Criticism& failed, const std::function<bool()>& stop);
+// holds: of a function in the engine, beyond what the tests say of it.
+Learning learn(Engine& engine, const Criticism& failed, const std::function<bool()>& stop,
+               const std::function<bool(const Engine&, const LearnedFit&)>& holds);
 
 // Laws within odds of 20 to 1 of the best, that first.
 std::vector<LawEvidence> possible_laws(const LearnedFit& fit);

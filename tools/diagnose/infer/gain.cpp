@@ -183,13 +183,17 @@ bool Gain::better() const {
   });
 }
 
-bool Gain::worse(const std::map<std::string, double>& noise_floor) const {
+bool is_clearly_worse(const BeforeAfter& change, double noise_floor) {
   constexpr double kWorse = 1.1;
+  return change.high < 0.0 && change.after > kWorse * std::max(change.before, noise_floor);
+}
+
+bool Gain::worse(const std::map<std::string, double>& noise_floor) const {
   return std::any_of(signals.begin(), signals.end(), [&](const auto& each) {
     const auto& [name, signal] = each;
     const auto floor = noise_floor.find(name);
     const double level = floor == noise_floor.end() ? 0.0 : floor->second;
-    return signal.high < 0.0 && signal.after > kWorse * std::max(signal.before, level);
+    return is_clearly_worse(signal, level);
   });
 }
 

@@ -39,6 +39,9 @@ ForwardErrors forward_errors(const Campaign& campaign, int run, const ModelState
 std::map<std::string, SimulatedSignal> simulated_signals(const Campaign& campaign,
                                                          const ModelState& nominal);
 
+// Beyond chance, by a tenth and beyond its noise.
+bool is_clearly_worse(const BeforeAfter& change, double noise_floor);
+
 struct Gain {
   std::map<std::string, BeforeAfter> signals;
   std::map<std::string, BeforeAfter> forward;
@@ -47,7 +50,7 @@ struct Gain {
   // One signal is predicted better, beyond chance and by more than a trifle; or clearly so, and all
   // at once beyond chance.
   bool better() const;
-  // One signal is predicted clearly worse: beyond chance, by a tenth and beyond its noise.
+  // One signal is predicted clearly worse.
   bool worse(const std::map<std::string, double>& noise_floor) const;
 };
 

@@ -280,7 +280,9 @@ class Run {
     const bool sensible =
         !implausible_.impossible && used_runs(engine.campaign()) >= kLearningRunsMin;
     for (int round = 0; round < kRoundsMax && sensible && !out.left.passed(); ++round) {
-      Learning more = learn(engine, out.left, stop());
+      Learning more = learn(
+          engine, out.left, stop(),
+          [&](const Engine& with, const LearnedFit& fit) { return predicts(with, naming, fit); });
       out.needs_levels = more.needs_levels;
       if (more.terms.empty()) break;
       out.left = std::move(more.left);
@@ -438,7 +440,11 @@ class Run {
       }
       found.gain = gain.signals;
       if (gain.mu_max) found.gain["mu_max"] = change_of(*gain.mu_max);
-      fill_left_out_values(left_out_gain(engine, naming.nominal, fit.folds, fit.is_inner), found);
+      const Gain at_left_out = left_out_gain(engine, naming.nominal, fit.folds, fit.is_inner);
+      if (const auto shown = shown_by(at_left_out, found.acts_on)) {
+        found.metric = shown->metric;
+        found.at_left_out_values = shown->change;
+      }
       out().learned.push_back(std::move(found));
     }
   }
@@ -447,20 +453,29 @@ class Run {
     return {error.before, error.after, error.low, error.high};
   }
 
-  // Of what the cause acts on: mu_max, or the signal that shows it; else what there is.
-  static void fill_left_out_values(const Gain& gain, LearnedFinding& found) {
-    const bool is_friction = found.acts_on == "friction" || found.acts_on == "clamp_force";
-    if (is_friction && gain.mu_max) {
-      found.metric = "mu_max";
-      found.at_left_out_values = change_of(*gain.mu_max);
-      return;
-    }
-    const bool is_torque = found.acts_on == "torque" || found.acts_on == "torque_gain";
+  // What a cause is to be seen by: mu_max, or the signal that shows it; else what there is.
+  struct Shown {
+    std::string metric;
+    BeforeAfter change;
+  };
+  static std::optional<Shown> shown_by(const Gain& gain, std::string_view acts_on) {
+    const bool is_friction = acts_on == "friction" || acts_on == "clamp_force";
+    if (is_friction && gain.mu_max) return Shown{"mu_max", change_of(*gain.mu_max)};
+    const bool is_torque = acts_on == "torque" || acts_on == "torque_gain";
     const auto shown = gain.signals.find(is_torque ? "secondary_torque" : "secondary_speed");
     const auto used = shown != gain.signals.end() ? shown : gain.signals.begin();
-    if (used == gain.signals.end()) return;
-    found.metric = used->first;
-    found.at_left_out_values = used->second;
+    if (used == gain.signals.end()) return {};
+    return Shown{used->first, used->second};
+  }
+
+  // A function that predicts what was left out of its fit clearly worse than none is none.
+  static bool predicts(const Engine& engine, const Naming& naming, const LearnedFit& fit) {
+    const auto shown = shown_by(left_out_gain(engine, naming.nominal, fit.folds, fit.is_inner),
+                                fit.cell.injection->acts_on);
+    if (!shown) return true;
+    std::map<std::string, double> floors = noise_floors(engine.campaign(), naming.nominal.state);
+    floors["mu_max"] = thresholds::kMuMaxTrifle;
+    return !is_clearly_worse(shown->change, floors[shown->metric]);
   }
 
   void store_learned() {
