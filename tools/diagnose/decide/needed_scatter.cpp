@@ -84,7 +84,7 @@ std::optional<Bounded> bounded_fit(const Engine& engine, const Criticism& critic
 std::optional<Engine> within_healthy_scatter(const Engine& engine, const Criticism& criticism) {
   std::optional<Bounded> out = bounded_fit(engine, criticism);
   if (!out) return {};
-  out->engine.accept(std::move(out->within));
+  out->engine.accept(out->within);
   return std::move(out->engine);
 }
 
