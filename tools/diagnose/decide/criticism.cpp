@@ -173,8 +173,11 @@ Criticism criticise(const Engine& engine) {
 
 namespace {
 
+// Chosen, of the span: what the means of the experiments cover at least, or one of them. Not
+// varied.
+constexpr double kBetween = 0.5;
+
 // What is followed differs between experiments rather than within each of them.
-constexpr double kBetween = 0.5;  // chosen, of the span: what their means cover at least
 bool differs_between(const Abscissa& abscissa) {
   double least = abscissa.high, most = abscissa.low;
   for (std::size_t e = 0; e < abscissa.x.size(); ++e) {
