@@ -41,7 +41,9 @@ double chi2_p(double chi2, int degrees) {
 }
 
 double chi2_decades(double chi2, int degrees) {
-  constexpr double kRight = 1e-250;  // of a double: below it loses digits
+  // Derived: a double loses digits below 1e-308, and from 1e-100 on what the series leaves out is
+  // less than 1e-5 of it, so that any number between gives the same.
+  constexpr double kRight = 1e-250;
   if (const double p = chi2_p(chi2, degrees); p > kRight) return std::max(0.0, -std::log10(p));
   // The first terms of the incomplete gamma function far out (DLMF 8.11.2).
   const double a = 0.5 * degrees, x = 0.5 * chi2;
