@@ -22,7 +22,7 @@ class Relink:
         """`copy` as the build compiles the source `name`, without its warnings. Its errors; '': done."""
         if str(ROOT / name) not in self.commands:
             sys.exit(f"{self.build}: {name} is compiled together with others; "
-                     "configure with -DBELTGRIP_TOGETHER=OFF")
+                     "configure with -DBELTGRIP_TOGETHER=nothing")
         line = self.commands[str(ROOT / name)][:]
         line[line.index("-o") + 1] = str(target)
         line[line.index("-c") + 1] = str(copy)
