@@ -6,13 +6,13 @@ namespace beltgrip::daemon {
 
 namespace {
 // Chosen: a belt whose peak lies at 2 % slips so fast at 85 % of its friction.
-constexpr double kNearShare = 0.25;
+constexpr double kNearRateShare = 0.25;
 constexpr double kHoldShare = 0.7;  // of the slip rate: the ramp slows down over this much
 constexpr double kHoldRate_N_per_s = 600.0;
 }  // namespace
 
 bool peak_is_far(const RampLaw& law, double mu_star, double slip_rate_1_s) noexcept {
-  return mu_star < law.mu_far && slip_rate_1_s < kNearShare * law.slip_rate_1_s;
+  return mu_star < law.mu_far && slip_rate_1_s < kNearRateShare * law.slip_rate_1_s;
 }
 
 double ramp_near_N_per_s(const RampLaw& law, double mu_star, double slip_rate_1_s) noexcept {

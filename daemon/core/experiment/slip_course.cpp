@@ -7,7 +7,7 @@
 namespace beltgrip::daemon {
 
 namespace {
-constexpr Duration kSlipMean = 15 * kMillisecond;
+constexpr Duration kRecent = 15 * kMillisecond;
 constexpr double kWhole = 0.8;          // of kRateOver: a rate is known
 constexpr double kSquares = 100.0;      // half a second at 200 Hz
 constexpr double kSquaresLeast = 20.0;  // before these a deviation is not known
@@ -43,7 +43,7 @@ void SlipCourse::step(MonoTime t, double ratio) noexcept {
     sum_x += slip_share;
     sum_tt += at_s * at_s;
     sum_tx += at_s * slip_share;
-    if (before > kSlipMean) continue;
+    if (before > kRecent) continue;
     recent += slip_share;
     recent_n += 1.0;
   }

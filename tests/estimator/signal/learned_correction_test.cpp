@@ -10,7 +10,7 @@
 namespace beltgrip::estimator {
 namespace {
 
-constexpr double kRate_hz = 200.0;
+constexpr double kSampleRate_hz = 200.0;
 
 // From 1 to 3 units over 40 to 80.
 LearnedTerm rising(LearnedPoint point, LearnedVariable variable, double unit) {
@@ -41,7 +41,7 @@ LearnedConditions oil(double degC) {
 
 VariatorSample corrected(LearnedPoint point, double unit, double oil_degC) {
   const LearnedTerm term = rising(point, LearnedVariable::kOilTemperature, unit);
-  InputCorrection correction({}, {}, kRate_hz, {&term, 1});
+  InputCorrection correction({}, {}, kSampleRate_hz, {&term, 1});
   return correction.correct(sample(), oil(oil_degC));
 }
 
@@ -87,7 +87,7 @@ TEST(LearnedCorrection, RefusesBeyondTheBox) {
 TEST(LearnedCorrection, FollowsWhatTheSampleHas) {
   LearnedTerm term = rising(LearnedPoint::kTorque, LearnedVariable::kPrimarySpeed, 1.0);
   term.knot = {50.0, 100.0, 150.0};
-  InputCorrection correction({}, {}, kRate_hz, {&term, 1});
+  InputCorrection correction({}, {}, kSampleRate_hz, {&term, 1});
   EXPECT_NEAR(correction.correct(sample()).torque_Nm, 48.0, 1e-9);
   VariatorSample fast = sample();
   fast.omega_p_rad_s = 151.0;
@@ -100,7 +100,7 @@ TEST(LearnedCorrection, FollowsWhatTheSampleHas) {
 
   term.variable = LearnedVariable::kSecondaryPressure;
   term.knot = {1e5, 2e5, 3e5};
-  InputCorrection over_pressure({}, {}, kRate_hz, {&term, 1});
+  InputCorrection over_pressure({}, {}, kSampleRate_hz, {&term, 1});
   EXPECT_NEAR(over_pressure.correct(sample()).torque_Nm, 48.0, 1e-9);
   VariatorSample light = sample();
   light.secondary_pressure_Pa = 0.9e5;

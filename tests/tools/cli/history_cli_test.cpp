@@ -157,8 +157,8 @@ TEST_F(History, ShowsWhatWasCarriedWithoutSlip) {
     std::istringstream in(result.out);
     nlohmann::json found;
     for (std::string line; std::getline(in, line);) {
-      const auto json = nlohmann::json::parse(line);
-      if (json.at("type") == "carried") found = json;
+      const auto event = nlohmann::json::parse(line);
+      if (event.at("type") == "carried") found = event;
     }
     return found;
   };

@@ -27,7 +27,7 @@ namespace beltgrip::test {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr Milliseconds kLimit{60000};
+constexpr Milliseconds kHostileLimit{60000};
 
 std::string repeated(const std::string& text, int count) {
   std::string out;
@@ -62,7 +62,7 @@ TEST_P(DeepToml, IsOneLineAndStatus78) {
       {program_path(), "simulate", "--model", deep},
       {program_path(), "simulate", "--scenario", "demo", "--model", deep}};
   for (const auto& command : commands) {
-    const RunResult result = run(command, kLimit);
+    const RunResult result = run(command, kHostileLimit);
     EXPECT_EQ(result.status, 78) << command[1] << ": " << result.err;
     EXPECT_NE(result.err.find("deep.toml:2: "), std::string::npos) << result.err;
     EXPECT_LE(lines(result.err), 2) << result.err;
@@ -83,18 +83,18 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST_F(Hostile, ADeepFileDoesNotEndARunningDaemon) {
   Process process({program_path("beltgripd"), "--config", config(), "--log-level", "debug"});
-  ASSERT_TRUE(process.wait_for_error(" samples, ", kLimit)) << process.err();
+  ASSERT_TRUE(process.wait_for_error(" samples, ", kHostileLimit)) << process.err();
   place.write("beltgrip.toml", "a" + repeated(".a", 30000) + " = 1\n");
   process.signal(SIGHUP);
-  EXPECT_TRUE(process.wait_for_error("reload refused", kLimit)) << process.err();
+  EXPECT_TRUE(process.wait_for_error("reload refused", kHostileLimit)) << process.err();
   process.signal(SIGTERM);
-  EXPECT_EQ(process.wait(kLimit), 0) << process.err();
+  EXPECT_EQ(process.wait(kHostileLimit), 0) << process.err();
 }
 
 // Nobody will ever write to it, and the helper thread has more to do than to wait.
 TEST_F(Hostile, AReloadOutOfAPipeIsRefusedAndTheDaemonGoesOn) {
   Process process({program_path("beltgripd"), "--config", config(), "--log-level", "debug"});
-  ASSERT_TRUE(process.wait_for_error(" samples, ", kLimit)) << process.err();
+  ASSERT_TRUE(process.wait_for_error(" samples, ", kHostileLimit)) << process.err();
   fs::remove(config());
   ASSERT_EQ(mkfifo(config().c_str(), 0600), 0);
   process.signal(SIGHUP);
@@ -105,9 +105,9 @@ TEST_F(Hostile, AReloadOutOfAPipeIsRefusedAndTheDaemonGoesOn) {
   fs::remove(config());
   place.write("beltgrip.toml", kVehicleToml);
   process.signal(SIGHUP);
-  EXPECT_TRUE(process.wait_for_error("is in force", kLimit)) << process.err();
+  EXPECT_TRUE(process.wait_for_error("is in force", kHostileLimit)) << process.err();
   process.signal(SIGTERM);
-  EXPECT_EQ(process.wait(kLimit), 0) << process.err();
+  EXPECT_EQ(process.wait(kHostileLimit), 0) << process.err();
 }
 
 // What stands in quotes and comments has no depth.
@@ -346,9 +346,9 @@ TEST_F(Stop, ByCtrlCKeepsWhatAFileGaveUntilThen) {
                      {program_path(), "replay", "--config", place.path("drive/beltgrip.toml")});
     arguments.insert(arguments.end(), {"--json", place.path("out.json")});
     Process process(arguments);
-    EXPECT_TRUE(process.wait_for_output("completed, overrun", kLimit)) << process.err();
+    EXPECT_TRUE(process.wait_for_output("completed, overrun", kHostileLimit)) << process.err();
     process.signal(SIGINT);
-    EXPECT_EQ(process.wait(kLimit), 128 + SIGINT) << process.err();
+    EXPECT_EQ(process.wait(kHostileLimit), 128 + SIGINT) << process.err();
     EXPECT_NE(process.err().find("stopped: what was read until then is used"), std::string::npos);
     return process.err();
   };
@@ -371,7 +371,7 @@ TEST_F(Stop, ByCtrlCKeepsWhatAFileGaveUntilThen) {
     Process process(arguments);
     EXPECT_FALSE(process.wait(Milliseconds(1000)).has_value()) << process.err();
     process.signal(SIGINT);
-    EXPECT_EQ(process.wait(kLimit), 128 + SIGINT) << process.err();
+    EXPECT_EQ(process.wait(kHostileLimit), 128 + SIGINT) << process.err();
     EXPECT_NE(process.err().find("stopped: what was read until then is used"), std::string::npos)
         << process.err();
     return process.out();
@@ -390,7 +390,7 @@ TEST_F(Stop, ByCtrlCKeepsTheDriveUntilThen) {
                    "run.duration_s=100000", "--out-dir", folder});
   EXPECT_FALSE(process.wait(Milliseconds(1000)).has_value()) << process.err();
   process.signal(SIGINT);
-  EXPECT_EQ(process.wait(kLimit), 128 + SIGINT) << process.err();
+  EXPECT_EQ(process.wait(kHostileLimit), 128 + SIGINT) << process.err();
   EXPECT_NE(process.err().find("stopped: the drive ends there"), std::string::npos)
       << process.err();
   const RunResult checked =
@@ -428,7 +428,7 @@ TEST_F(Stop, EndsEveryToolWhoseOutputNobodyTakes) {
 
 TEST_F(Stop, EndsWhatRunsInRealTime) {
   Process demo({program_path(), "run-demo"});
-  ASSERT_TRUE(demo.wait_for_output("idle", kLimit)) << demo.out();
+  ASSERT_TRUE(demo.wait_for_output("idle", kHostileLimit)) << demo.out();
   expect_ends(demo, "run-demo");
   // Nobody else can be on it.
   const RunResult monitor = beltgrip({"monitor", "inproc:x"});
@@ -471,7 +471,7 @@ TEST_P(Answer, ThatIsNotTheDaemonsIsStatus65) {
       static_cast<void>(!write(client, GetParam().data(), GetParam().size()));
       close(client);
     });
-    const RunResult result = run({program_path(), "status", "--socket", path}, kLimit);
+    const RunResult result = run({program_path(), "status", "--socket", path}, kHostileLimit);
     EXPECT_EQ(result.status, 65) << result.err;
     EXPECT_EQ(lines(result.err), 1) << result.err;
     EXPECT_EQ(result.err.find('\x1b'), std::string::npos) << result.err;
@@ -645,11 +645,11 @@ TEST_F(Hostile, NoTextOfOthersSteersTheTerminal) {
   }
   for (const std::string& each :
        {place.path("key.toml"), place.path("wrong.toml"), bad, config()}) {
-    const RunResult result = run({program_path("beltgripd"), "--config", each}, kLimit);
+    const RunResult result = run({program_path("beltgripd"), "--config", each}, kHostileLimit);
     EXPECT_NE(result.status, 0);
     EXPECT_FALSE(steers(result.err)) << testing::PrintToString(result.err);
   }
-  EXPECT_FALSE(steers(run({program_path("beltgripd"), "--" + evil}, kLimit).err));
+  EXPECT_FALSE(steers(run({program_path("beltgripd"), "--" + evil}, kHostileLimit).err));
 }
 
 }  // namespace

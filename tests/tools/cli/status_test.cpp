@@ -17,7 +17,7 @@
 namespace beltgrip::test {
 namespace {
 
-constexpr Milliseconds kLimit{20'000};
+constexpr Milliseconds kStatusLimit{20'000};
 
 // Gives one answer to each of the first clients, the last of them to all that follow unless it is
 // empty: then nobody listens any more.
@@ -106,8 +106,8 @@ TEST_F(StatusCommand, SaysWhatWasCarriedWithoutSlip) {
   bounds[0].force_N_s = 100.0;
   bounds[0].used_N_s = 6.0;
   bounds[3].refused_mu_star = 0.4;
-  const std::string json = daemon::status_json({}, daemon::MonoTime{}, observed(), bounds);
-  const Server server(place_.path("status.sock"), {json});
+  const std::string text = daemon::status_json({}, daemon::MonoTime{}, observed(), bounds);
+  const Server server(place_.path("status.sock"), {text});
   const std::string words = beltgrip(command({})).out;
   EXPECT_NE(
       words.find("drive, overdrive mu_max at least 0.0700, carried without slip at 64 Nm, 5000 "
@@ -178,9 +178,9 @@ TEST_F(StatusCommand, FollowsChangesAndWaitsForWhoIsGone) {
   std::vector<std::string> words = command({"--follow", "--interval", "0.1"});
   words.insert(words.begin(), program_path());
   Process follows(words);
-  EXPECT_TRUE(follows.wait_for_error("waiting", kLimit)) << follows.err();
+  EXPECT_TRUE(follows.wait_for_error("waiting", kStatusLimit)) << follows.err();
   follows.signal(SIGINT);
-  EXPECT_EQ(follows.wait(kLimit), 0);
+  EXPECT_EQ(follows.wait(kStatusLimit), 0);
   EXPECT_EQ(lines(follows.out()), 2) << "one for each change: " << follows.out();
   EXPECT_NE(follows.out().find("last result: none yet"), std::string::npos) << follows.out();
   EXPECT_NE(follows.out().find("mu_max 0.0925"), std::string::npos) << follows.out();
@@ -192,10 +192,10 @@ TEST_F(StatusCommand, FollowsAsJsonLines) {
   std::vector<std::string> words = command({"--follow", "--json", "--interval", "0.1"});
   words.insert(words.begin(), program_path());
   Process follows(words);
-  EXPECT_TRUE(
-      follows.wait_until([](const Process& process) { return lines(process.out()) >= 3; }, kLimit));
+  EXPECT_TRUE(follows.wait_until([](const Process& process) { return lines(process.out()) >= 3; },
+                                 kStatusLimit));
   follows.signal(SIGTERM);
-  EXPECT_EQ(follows.wait(kLimit), 0) << follows.err();
+  EXPECT_EQ(follows.wait(kStatusLimit), 0) << follows.err();
   std::istringstream in(follows.out());
   for (std::string line; std::getline(in, line);) {
     EXPECT_EQ(nlohmann::json::parse(line).at("interface"), "can0");

@@ -14,7 +14,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-class Draw {
+class RandomDraw {
  public:
   MatrixXd matrix(Index rows, Index columns) {
     return MatrixXd::NullaryExpr(rows, columns, [&] { return normal_(random_); });
@@ -27,7 +27,7 @@ class Draw {
 };
 
 TEST(ColumnWork, ProductsAreTheLibrarysAndTheSameBitsByAnyRegisters) {
-  Draw draw;
+  RandomDraw draw;
   for (int i = 0; i < 300; ++i) {
     const Index rows = draw.count(40);
     const MatrixXd whole = draw.matrix(rows, draw.count(14) + 1);
@@ -42,7 +42,7 @@ TEST(ColumnWork, ProductsAreTheLibrarysAndTheSameBitsByAnyRegisters) {
 }
 
 TEST(ColumnWork, PredictsEachFromTheSixBefore) {
-  Draw draw;
+  RandomDraw draw;
   const MatrixXd in = draw.matrix(57, 1), weight = draw.matrix(57, 1), a = draw.matrix(6, 1);
   const PredictionFilter filter{a.data(), 0.7};
   MatrixXd out(51, 1);

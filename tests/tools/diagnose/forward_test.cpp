@@ -17,10 +17,10 @@ using Course = std::function<double(double t_s)>;
 
 constexpr double kEnd_s = 12.0;
 constexpr double kMuMax = 0.1, kPeakSlipLow = 0.03, kPeakSlipOverdrive = 0.02;
-constexpr double kDeformationPerN = 1e-6, kLoss_Nm = 0.5, kLossPerSpeed_Nms = 5e-3,
+constexpr double kDeformationPerN = 1e-6, kLoss_Nm = 0.5, kTrueLossPerSpeed_Nms = 5e-3,
                  kLossPerN_Nm = 0.05e-3;
 constexpr double kDrag_Nm = 0.5, kDragPerSpeed_Nms = 2e-3;  // at the secondary shaft
-constexpr double kSecondaryInertia_kgm2 = 0.1, kPrimaryInertia_kgm2 = 0.18;
+constexpr double kTrueSecondaryInertia_kgm2 = 0.1, kPrimaryInertia_kgm2 = 0.18;
 constexpr double kArea_m2 = 0.0113, kSpring_N = 500.0;
 constexpr double kLow = 0.405, kOverdrive = 2.25;
 constexpr double kRadiusLow_m = 0.0324, kRadiusOverdrive_m = 0.0784;
@@ -32,7 +32,7 @@ void fill(SignalTable& table, Role role, const Course& course) {
   }
 }
 
-Campaign campaign_of(const SignalTable& table) {
+Campaign campaign_with(const SignalTable& table) {
   estimator::VariatorParameters variator;
   variator.primary_inertia_kg_m2 = kPrimaryInertia_kgm2;
   return make_campaign({prepare(table, variator)}, nominal_model(variator));
@@ -123,11 +123,11 @@ double rig_rate(const ExperimentData& data, double t_s, double omega_s) {
   const double slip_share = 1.0 - omega_s / (at(data.omega_p.value, t_s) * ratio);
   const double belt_Nm = capacity_Nm(force_N, kRadiusLow_m) * traction(slip_share, kPeakSlipLow);
   return (belt_Nm / ratio - at(data.torque_s.value, t_s) - kDrag_Nm - kDragPerSpeed_Nms * omega_s) /
-         kSecondaryInertia_kgm2;
+         kTrueSecondaryInertia_kgm2;
 }
 
 TEST(Forward, StiffRigFollowsTheFineIntegrationUpToThePeakAndEndsThere) {
-  const Campaign campaign = campaign_of(rig());
+  const Campaign campaign = campaign_with(rig());
   const ExperimentData& data = campaign.runs[0];
   const Forward forward = run_forward(campaign, 0, nominal_state(campaign));
   const auto begin = static_cast<int>(std::find(forward.grips.begin(), forward.grips.end(), true) -
@@ -156,7 +156,7 @@ TEST(Forward, StiffRigFollowsTheFineIntegrationUpToThePeakAndEndsThere) {
 }
 
 TEST(Forward, PredictsTheTorqueAtTheRigsPrimaryShaft) {
-  const Campaign campaign = campaign_of(rig());
+  const Campaign campaign = campaign_with(rig());
   const ExperimentData& data = campaign.runs[0];
   const Forward forward = run_forward(campaign, 0, nominal_state(campaign));
   const ArrayXd& omega_s = signal(forward, "secondary_speed").simulated;
@@ -168,7 +168,7 @@ TEST(Forward, PredictsTheTorqueAtTheRigsPrimaryShaft) {
     const double ratio = kLow * (1.0 - kDeformationPerN * force_N);
     const double slip_share = 1.0 - omega_s[k] / (data.omega_p.value[k] * ratio);
     const double loss_Nm =
-        kLoss_Nm + kLossPerSpeed_Nms * data.omega_p.value[k] + kLossPerN_Nm * force_N;
+        kLoss_Nm + kTrueLossPerSpeed_Nms * data.omega_p.value[k] + kLossPerN_Nm * force_N;
     EXPECT_NEAR(torque[k],
                 capacity_Nm(force_N, kRadiusLow_m) * traction(slip_share, kPeakSlipLow) + loss_Nm,
                 1e-4);
@@ -187,7 +187,7 @@ TEST(Forward, VehicleFollowsTheFineIntegration) {
   fill(table, Role::kSecondaryPressure, [](double t_s) { return 6e5 - 0.1e5 * t_s; });
   fill(table, Role::kEngineTorque, [](double t_s) { return 55.0 + 10.0 * std::sin(3.0 * t_s); });
   fill(table, Role::kSecondaryTorque, [](double) { return 20.0; });
-  const Campaign campaign = campaign_of(table);
+  const Campaign campaign = campaign_with(table);
   const ExperimentData& data = campaign.runs[0];
   const Forward forward = run_forward(campaign, 0, nominal_state(campaign));
   const int begin = data.stretches[0].begin, end = begin + data.valid_count - 1;
@@ -199,7 +199,7 @@ TEST(Forward, VehicleFollowsTheFineIntegration) {
     const double slip_share = 1.0 - at(data.omega_s.value, t_s) / (omega_p * ratio);
     const double belt_Nm =
         capacity_Nm(force_N, kRadiusOverdrive_m) * traction(slip_share, kPeakSlipOverdrive);
-    const double loss_Nm = kLoss_Nm + kLossPerSpeed_Nms * omega_p + kLossPerN_Nm * force_N;
+    const double loss_Nm = kLoss_Nm + kTrueLossPerSpeed_Nms * omega_p + kLossPerN_Nm * force_N;
     return (at(data.torque.value, t_s) - loss_Nm - belt_Nm) / kPrimaryInertia_kgm2;
   };
   const ArrayXd truth = integrated(rate, simulated[begin], begin, end, 1e-5);
@@ -216,7 +216,7 @@ TEST(Forward, VehicleFollowsTheFineIntegration) {
         capacity_Nm(force_N, kRadiusOverdrive_m) * traction(slip_share, kPeakSlipOverdrive);
     const double acceleration = (data.omega_s.value[k + 1] - data.omega_s.value[k - 1]) / 0.2;
     const double drag_Nm = kDrag_Nm + kDragPerSpeed_Nms * data.omega_s.value[k];
-    EXPECT_NEAR(torque_s[k], belt_Nm / ratio - kSecondaryInertia_kgm2 * acceleration - drag_Nm,
+    EXPECT_NEAR(torque_s[k], belt_Nm / ratio - kTrueSecondaryInertia_kgm2 * acceleration - drag_Nm,
                 0.05)
         << k;
   }
@@ -226,7 +226,7 @@ TEST(Forward, VehicleFollowsTheFineIntegration) {
 TEST(Forward, RigWithoutSecondaryTorqueCarriesThePrimaryOne) {
   SignalTable table = rig(0.01, 1.0);
   table[Role::kSecondaryTorque] = {};
-  const Campaign campaign = campaign_of(table);
+  const Campaign campaign = campaign_with(table);
   const ExperimentData& data = campaign.runs[0];
   const Forward forward = run_forward(campaign, 0, nominal_state(campaign));
   ASSERT_EQ(forward.signals.size(), 2U);  // the torque is no prediction here
@@ -239,7 +239,7 @@ TEST(Forward, RigWithoutSecondaryTorqueCarriesThePrimaryOne) {
     const double slip_share = 1.0 - omega_s[k] / (data.omega_p.value[k] * ratio);
     if (slip_share > 0.7 * kPeakSlipLow) continue;  // about to run away: no longer at rest
     const double carried_Nm =
-        17.0 - kLoss_Nm - kLossPerSpeed_Nms * data.omega_p.value[k] - kLossPerN_Nm * force_N;
+        17.0 - kLoss_Nm - kTrueLossPerSpeed_Nms * data.omega_p.value[k] - kLossPerN_Nm * force_N;
     EXPECT_NEAR(capacity_Nm(force_N, kRadiusLow_m) * traction(slip_share, kPeakSlipLow), carried_Nm,
                 0.1)
         << k;
@@ -249,7 +249,7 @@ TEST(Forward, RigWithoutSecondaryTorqueCarriesThePrimaryOne) {
 }
 
 TEST(Forward, WhatTheFreeShaftIsMeasuredToDoDoesNotComeThrough) {
-  const Campaign one = campaign_of(rig(0.01)), other = campaign_of(rig(0.014));
+  const Campaign one = campaign_with(rig(0.01)), other = campaign_with(rig(0.014));
   // A radius that tilts with the torque and friction that changes with slip energy: both depend on
   // what is predicted.
   ModelState state = nominal_state(one);
@@ -270,7 +270,7 @@ TEST(Forward, WhatTheFreeShaftIsMeasuredToDoDoesNotComeThrough) {
 }
 
 TEST(Forward, SensorsStandBetweenTheMachineAndItsReading) {
-  const Campaign campaign = campaign_of(rig(0.01, 1.0));
+  const Campaign campaign = campaign_with(rig(0.01, 1.0));
   const ModelState plain = nominal_state(campaign);
   ModelState scaled = plain, late = plain, gained = plain;
   effect(campaign, scaled, "speed_scale.secondary") = 4e-3;

@@ -12,7 +12,7 @@ namespace beltgrip::diagnose {
 namespace {
 
 // Over 40 to 100; each knot is measured by itself.
-LearnedFit measured(double precision, auto&& value) {
+LearnedFit measured_fit(double precision, auto&& value) {
   LearnedFit out;
   out.cell.injection = kInjections.data();
   out.cell.abscissa.low = 40.0;
@@ -34,7 +34,7 @@ std::vector<std::string> names(const std::vector<LawEvidence>& laws) {
 }
 
 TEST(Laws, AStepStandsAlone) {
-  const auto fit = measured(400.0, [](double x) { return x > 71.0 ? 1.0 : 0.0; });
+  const auto fit = measured_fit(400.0, [](double x) { return x > 71.0 ? 1.0 : 0.0; });
   const auto laws = possible_laws(fit);
   ASSERT_EQ(names(laws), std::vector<std::string>{"step"});
   ASSERT_EQ(named_law(fit, laws), &laws.front());
@@ -42,7 +42,7 @@ TEST(Laws, AStepStandsAlone) {
 }
 
 TEST(Laws, ALineIsFoundAndNothingFarFromIt) {
-  const auto fit = measured(400.0, [](double x) { return (x - 70.0) / 15.0; });
+  const auto fit = measured_fit(400.0, [](double x) { return (x - 70.0) / 15.0; });
   const auto found = names(possible_laws(fit));
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found.front(), "linear");
@@ -52,7 +52,7 @@ TEST(Laws, ALineIsFoundAndNothingFarFromIt) {
 
 // Where hardly anything is known many laws will do, and none is named.
 TEST(Laws, FewDataLeaveAClass) {
-  const auto fit = measured(2.0, [](double x) { return (x - 70.0) / 30.0; });
+  const auto fit = measured_fit(2.0, [](double x) { return (x - 70.0) / 30.0; });
   const auto laws = possible_laws(fit);
   EXPECT_GT(laws.size(), 3U);
   EXPECT_EQ(named_law(fit, laws), nullptr);
@@ -60,7 +60,7 @@ TEST(Laws, FewDataLeaveAClass) {
 
 // A law that stands alone but predicts what was left out worse than the free function is no law.
 TEST(Laws, OneThatPredictsWorseIsNotNamed) {
-  auto fit = measured(400.0, [](double x) { return x > 71.0 ? 1.0 : 0.0; });
+  auto fit = measured_fit(400.0, [](double x) { return x > 71.0 ? 1.0 : 0.0; });
   fit.left_out_gain = 1.5;
   EXPECT_EQ(named_law(fit, possible_laws(fit)), nullptr);
 }

@@ -11,7 +11,7 @@
 namespace beltgrip::diagnose {
 namespace {
 
-std::string error_of(const std::string& text) {
+std::string file_error_of(const std::string& text) {
   try {
     parse_model(text, "m.toml", nominal_model({}));
   } catch (const ModelError& error) {
@@ -55,20 +55,21 @@ TEST(ModelFile, WhatWasLearnedReadsBack) {
 
 TEST(ModelFile, WhatIsWrongWithALearnedTermIsNamed) {
   const std::string good = "[learned.a]\nacts_on = \"torque\"\ndepends_on = [\"primary_speed\"]\n";
-  EXPECT_EQ(error_of(good + "knots = [1, 2]\nvalues = [0, 1.5]\n"), "no error");
-  EXPECT_EQ(error_of("[learned.a]\nacts_on = \"oil\"\n"),
+  EXPECT_EQ(file_error_of(good + "knots = [1, 2]\nvalues = [0, 1.5]\n"), "no error");
+  EXPECT_EQ(file_error_of("[learned.a]\nacts_on = \"oil\"\n"),
             "m.toml:2: learned.a.acts_on: found \"oil\", expected one of torque, torque_gain, "
             "clamp_force, ratio or friction");
-  EXPECT_EQ(error_of(good + "knots = [2, 1]\nvalues = [0, 1]\n"),
+  EXPECT_EQ(file_error_of(good + "knots = [2, 1]\nvalues = [0, 1]\n"),
             "m.toml:4: learned.a.knots: found 2 numbers, expected 2 to 64 numbers, each above the "
             "last");
-  EXPECT_EQ(error_of(good + "knots = [1, 2]\nvalues = [0]\n"),
+  EXPECT_EQ(file_error_of(good + "knots = [1, 2]\nvalues = [0]\n"),
             "m.toml:5: learned.a.values: found 1 numbers, expected 2, one for each knot");
-  EXPECT_EQ(error_of(good + "knots = [1, 2]\nvalues = [0, 1]\ncovariance = [[1, 2]]\n"),
+  EXPECT_EQ(file_error_of(good + "knots = [1, 2]\nvalues = [0, 1]\ncovariance = [[1, 2]]\n"),
             "m.toml:6: learned.a.covariance: found 2 numbers, expected 2 rows of 2");
-  EXPECT_EQ(error_of(good + "knots = [1, 2]\nvalues = [0, 1]\nbox = { primary_speed = [2, 1] }\n"),
-            "m.toml:6: learned.a.box.primary_speed: found an array, expected [lowest, highest]");
-  EXPECT_EQ(error_of(good + "knot = [1, 2]\n"),
+  EXPECT_EQ(
+      file_error_of(good + "knots = [1, 2]\nvalues = [0, 1]\nbox = { primary_speed = [2, 1] }\n"),
+      "m.toml:6: learned.a.box.primary_speed: found an array, expected [lowest, highest]");
+  EXPECT_EQ(file_error_of(good + "knot = [1, 2]\n"),
             "m.toml:4: learned.a.knot: found an unknown key, expected acts_on, depends_on, knots, "
             "values, covariance, box or law; nearest is \"knots\"");
 }
@@ -109,16 +110,16 @@ TEST(ModelFile, ARoleSaysWhichInstanceIsMeant) {
 }
 
 TEST(ModelFile, ErrorsNameFileLineAndKey) {
-  EXPECT_EQ(error_of("[effects.magic]\nsize = 1\n"),
+  EXPECT_EQ(file_error_of("[effects.magic]\nsize = 1\n"),
             "m.toml:1: effects.magic: found an unknown effect, expected the name of an effect");
-  EXPECT_EQ(error_of("[effects.wear]\nsteps = 1\n"),
+  EXPECT_EQ(file_error_of("[effects.wear]\nsteps = 1\n"),
             "m.toml:2: effects.wear.steps: found an unknown key, expected step, at or "
             "per_experiment; nearest is \"step\"");
-  EXPECT_EQ(error_of("[variator]\nratio_low = \"a\"\n"),
+  EXPECT_EQ(file_error_of("[variator]\nratio_low = \"a\"\n"),
             "m.toml:2: variator.ratio_low: found \"a\", expected a number from 0.1 to 10");
-  EXPECT_EQ(error_of("[variator]\nratio_low = 99.0\n"),
+  EXPECT_EQ(file_error_of("[variator]\nratio_low = 99.0\n"),
             "m.toml:2: variator.ratio_low: found 99, expected a number from 0.1 to 10");
-  EXPECT_EQ(error_of("[driveline]\ncomand_gain = 1\n")
+  EXPECT_EQ(file_error_of("[driveline]\ncomand_gain = 1\n")
                 .find("m.toml:2: driveline.comand_gain: found an unknown key, expected "
                       "deformation_per_kN, "),
             0U);

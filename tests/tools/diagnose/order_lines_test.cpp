@@ -43,7 +43,7 @@ TEST(OrderLine, AmplitudeIsThatOfTheSensorAtEverySpeed) {
 }
 
 // Uniform, -1 to 1, the same on every machine.
-class Noise {
+class UniformNoise {
  public:
   double operator()() { return static_cast<double>(generator_()) / 2147483648.0 - 1.0; }
 
@@ -57,7 +57,7 @@ TEST(OrderLine, IsNotLookedForWhereItFoldsBackToZero) {
   constexpr double kPeriod_s = 0.02, kAmplitude = 5e-4;
   const auto line_at = [&](double mean_Hz, double amplitude) {
     Channel speed;
-    Noise noise;
+    UniformNoise noise;
     constexpr double kSwing = 0.066, kSwing_rad_s = 2.0 * std::numbers::pi * 0.23;
     const double mean_rad_s = 2.0 * std::numbers::pi * mean_Hz;
     for (int i = 0; i < 3000; ++i) {
@@ -88,7 +88,7 @@ TEST(BeltLines, ShowThePassageAndNotTheShaft) {
   constexpr double kOmega_rad_s = 105.0, kOrder = 0.7007, kAmplitude = 1e-3;
   const auto most_at = [&](double order) {
     Channel speed;
-    Noise noise;
+    UniformNoise noise;
     for (int i = 0; i < 6000; ++i) {
       const double t = 0.01 * i;
       speed.t_s.push_back(t);
@@ -108,7 +108,7 @@ TEST(BeltLines, ShowThePassageAndNotTheShaft) {
 TEST(NarrowLine, StandsOverNoiseAndNotOverASlope) {
   const auto channel_of = [](double amplitude) {
     Channel out;
-    Noise noise;
+    UniformNoise noise;
     double slow = 0.0;
     for (int i = 0; i < 12000; ++i) {
       const double t = 0.005 * i;
@@ -130,7 +130,7 @@ TEST(NarrowLine, StandsOverNoiseAndNotOverASlope) {
 TEST(Hump, OfAShaftThatSwingsAndNotOfASlope) {
   const auto channel_of = [](double strength) {
     Channel out;
-    Noise noise;
+    UniformNoise noise;
     const double turn = 2.0 * std::numbers::pi * 3.0 * 0.01, keep = std::exp(-0.06 * turn);
     double slow = 0.0, swing = 0.0, before = 0.0;
     for (int i = 0; i < 40000; ++i) {
