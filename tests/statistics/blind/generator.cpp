@@ -116,6 +116,7 @@ class Experiment {
  private:
   double friction_level(double t_s, double force_N, double omega_p, double omega_s,
                         double energy_J);
+  double deformation(double force_kN) const;
   double ratio_now(double force_N, double torque_Nm) const;
 
   const Trial& trial_;
@@ -160,13 +161,17 @@ double Experiment::friction_level(double t_s, double force_N, double omega_p, do
 // From 0 to 1 about 6 kN, most of it within 1 kN.
 double sets_in(double force_kN) { return 0.5 * (1.0 + std::tanh((force_kN - 6.0) / 0.5)); }
 
+double Experiment::deformation(double force_kN) const {
+  return (m_.deformation_per_kN + fault_("pulley_deformation.per_kN")) * force_kN +
+         fault_("pulley_deformation.per_kN2") * force_kN * force_kN;
+}
+
 double Experiment::ratio_now(double force_N, double torque_Nm) const {
   const bool low = trial_.plan[static_cast<std::size_t>(index_)].low;
   const double kN = force_N * 1e-3;
   double ratio = low ? 0.405 * (1.0 + m_.ratio_error_low) : 2.25 * (1.0 + m_.ratio_error_overdrive);
   ratio *= 1.0 + fault_(low ? "end_stop_ratio.low" : "end_stop_ratio.overdrive") + seat_;
-  ratio *= 1.0 - (m_.deformation_per_kN + fault_("pulley_deformation.per_kN")) * kN -
-           fault_("pulley_deformation.per_kN2") * kN * kN;
+  ratio *= 1.0 - deformation(kN);
   ratio *= 1.0 - fault_("radius_tilt.per_Nm") * torque_Nm;
   ratio *= 1.0 + fault_("x_ratio_temperature.size") * (temperature_C_ - 80.0) / 50.0;
   ratio *= 1.0 + fault_("x_ratio_force_step.size") * sets_in(kN);
@@ -194,7 +199,7 @@ History Experiment::run() {
   History h;
   double force_wanted_N = 1.9 * held_N;
   double omega_p = plan.speed_rad_s, omega_s = omega_p * nominal_ratio * 0.995;
-  double slip_share = 0.0, energy_J = 0.0, acting_Pa = -1.0, play_N = 0.0;
+  double slip_share = 0.0, energy_J = 0.0, acting_Pa = -1.0, play_N = 0.0, swing_Pa = 0.0;
   double angle_p = random_.uniform(0.0, 6.28), angle_s = random_.uniform(0.0, 6.28);
   double belt_before = plan.torque_Nm;
   double hold_s = 3.0;
@@ -249,7 +254,13 @@ History Experiment::run() {
     }
     torque_now_Nm_ = torque;
     // Pressure and force.
-    const double pressure_wanted = std::max(2e4, (force_wanted_N - kSpring_N) / kArea_m2);
+    if (m_.pressure_swings_Pa > 0.0) {
+      constexpr double kOver_s = 0.3;
+      swing_Pa += -swing_Pa * kStep_s / kOver_s +
+                  m_.pressure_swings_Pa * std::sqrt(2.0 * kStep_s / kOver_s) * random_.normal();
+    }
+    const double pressure_wanted =
+        std::max(2e4, (force_wanted_N - kSpring_N) / kArea_m2 + swing_Pa);
     command_track.push(pressure_wanted);
     const double tau = fault_("hydraulic_lag.time_constant_s");
     const double in =
@@ -282,6 +293,8 @@ History Experiment::run() {
     // Belt: one implicit step in slip. T_belt = 2 R F mu(slip) / cos(theta).
     const double mu = friction_level(t, force, omega_p, omega_s, energy_J);
     const double ratio = ratio_now(force, belt_before);
+    const double torque_ratio =
+        m_.torque_ratio_stays ? ratio / (1.0 - deformation(force * 1e-3)) : ratio;
     const double capacity = 2.0 * radius * force * mu / kCosTheta;
     const auto belt = [&](double s) {
       const double x = std::abs(s) / peak_slip_share;
@@ -311,7 +324,7 @@ History Experiment::run() {
       const auto residual = [&](double w) {
         return w - omega_s -
                kStep_s / m_.secondary_inertia_kg_m2 *
-                   (belt(1.0 - w / (omega_p * ratio)) / ratio - load_s - drag(w));
+                   (belt(1.0 - w / (omega_p * ratio)) / torque_ratio - load_s - drag(w));
       };
       double low = omega_p * ratio * 0.3, high = omega_p * ratio * 1.9;
       double w = omega_s;
@@ -357,7 +370,8 @@ History Experiment::run() {
       slip_share = 1.0 - omega_s / (omega_p * ratio);
       belt_torque = belt(slip_share);
       torque_p = torque;
-      load_s = belt_torque / ratio - m_.secondary_inertia_kg_m2 * acceleration_s - drag(omega_s);
+      load_s =
+          belt_torque / torque_ratio - m_.secondary_inertia_kg_m2 * acceleration_s - drag(omega_s);
     }
     belt_before = belt_torque;
     energy_J += std::abs(belt_torque * slip_share) * omega_p * kStep_s;
@@ -441,7 +455,7 @@ Recording record(const Trial& trial) {
       const double p = h.pressure.mean(t - fault.skew_s("secondary_pressure"), period) *
                            (1.0 + fault("pressure_gain.gain")) +
                        fault("pressure_offset.offset_Pa") + m.noise_pressure_Pa * noise();
-      append(csv, std::round(p / 1465.0) * 1465.0, ',');  // 12 bits over 6 MPa
+      append(csv, std::round(p / m.pressure_step_Pa) * m.pressure_step_Pa, ',');
       coloured = 0.97 * coloured + 0.03 * 4.0 * noise();
       const double torque =
           h.torque_p.mean(t - fault("torque_delay.delay_s") -

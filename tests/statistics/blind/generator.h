@@ -46,11 +46,14 @@ struct Machine {
   double loss_Nm = 0.5, loss_per_speed_Nms = 4e-3;
   double secondary_loss_Nm = 0.0, secondary_loss_per_speed_Nms = 0.0;  // behind the belt
   double ratio_error_overdrive = 0.0, ratio_error_low = 0.0;
+  bool torque_ratio_stays = false;  // where pulleys give way: speed alone is lost
   double primary_inertia_kg_m2 = 0.18, secondary_inertia_kg_m2 = 0.3;
   // scatter between experiments, one sigma
   double scatter_friction = 3e-3, scatter_ratio = 1.5e-4, scatter_torque_Nm = 0.05;
   // sensors, one sigma per sample
   double noise_speed = 3e-4, noise_pressure_Pa = 1500.0, noise_torque_Nm = 0.25;
+  double pressure_step_Pa = 1465.0;  // 12 bits over 6 MPa
+  double pressure_swings_Pa = 0.0;   // one sigma, of the pressure itself, over a third of a second
   bool heavy_tails = false;
   double sample_rate_hz = 100.0;
   bool has_temperature = true, has_primary_pressure = true;

@@ -9,7 +9,6 @@
 
 #include "tests/tools/diagnose/recorded_runs.h"
 #include "tools/diagnose/decide/namer.h"
-#include "tools/diagnose/run/diagnose.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -25,17 +24,6 @@ blind::Trial scattered(double friction, int experiments) {
   trial.machine.scatter_ratio = 1.5e-4;
   trial.plan = blind::draw_plan(random, trial.machine.setting, experiments);
   return trial;
-}
-
-Request request_of(const blind::Trial& trial) {
-  Request request;
-  estimator::VariatorParameters variator;
-  variator.primary_inertia_kg_m2 = trial.machine.primary_inertia_kg_m2;
-  request.model = nominal_model(variator);
-  for (const std::string& text : blind::record(trial).csv) {
-    request.experiments.push_back(parse_csv(text, "run.csv"));
-  }
-  return request;
 }
 
 TEST(NeededScatter, WhatFiveExperimentsDoNotProveIsBounded) {

@@ -7,6 +7,7 @@
 #include "tests/statistics/blind/generator.h"
 #include "tools/diagnose/data/experiment_data.h"
 #include "tools/diagnose/infer/engine.h"
+#include "tools/diagnose/run/diagnose.h"
 
 namespace beltgrip::diagnose {
 
@@ -19,6 +20,18 @@ inline Campaign campaign_of(const blind::Trial& trial, const Accuracies& accurac
     runs.push_back(prepare(parse_csv(text, "run.csv"), variator));
   }
   return make_campaign(std::move(runs), nominal_model(variator), accuracies);
+}
+
+// The same as the program asks.
+inline Request request_of(const blind::Trial& trial) {
+  Request request;
+  estimator::VariatorParameters variator;
+  variator.primary_inertia_kg_m2 = trial.machine.primary_inertia_kg_m2;
+  request.model = nominal_model(variator);
+  for (const std::string& text : blind::record(trial).csv) {
+    request.experiments.push_back(parse_csv(text, "run.csv"));
+  }
+  return request;
 }
 
 }  // namespace beltgrip::diagnose

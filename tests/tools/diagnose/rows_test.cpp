@@ -120,10 +120,11 @@ TEST(Rows, TheMachineIsWhatItsEquationsSayOfWholeArrays) {
       expect_same(valid(q.capacity), valid(lever_m * force.max(50.0)));
       if (!data.torque_s.present) continue;
       ArrayXd balance = q.belt_torque + data.torque.slow - torque -
-                        q.ratio * (data.torque_s.slow / (1.0 + x[kSecondaryTorqueGain]) +
-                                   x[kSecondaryInertia_kgm2] * data.omega_s.slow_slope +
-                                   (x[kSecondaryLoss_Nm] + x[kSecondaryLossPerSpeed_Nms] * omega_s +
-                                    x[kSecondaryLossPerkN_Nm] * 1e-3 * force));
+                        q.ratio * (1.0 + x[kDeformationLost] * deformation) *
+                            (data.torque_s.slow / (1.0 + x[kSecondaryTorqueGain]) +
+                             x[kSecondaryInertia_kgm2] * data.omega_s.slow_slope +
+                             (x[kSecondaryLoss_Nm] + x[kSecondaryLossPerSpeed_Nms] * omega_s +
+                              x[kSecondaryLossPerkN_Nm] * 1e-3 * force));
       if (data.torque_is_engine) {
         balance += variator.primary_inertia_kg_m2 * (data.omega_p.slope - data.omega_p.slow_slope);
       }

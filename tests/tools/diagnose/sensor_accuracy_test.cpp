@@ -6,6 +6,8 @@
 
 #include "tests/tools/diagnose/recorded_runs.h"
 #include "tools/diagnose/decide/namer.h"
+#include "tools/diagnose/infer/peak.h"
+#include "tools/diagnose/infer/uncertainty.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -110,6 +112,27 @@ double usual_zero(double stated_bias_Nm) {
 TEST(SensorAccuracy, OfATorqueLetsItsZeroScatter) {
   const double usual = usual_zero(0.0);
   EXPECT_NEAR(usual_zero(1.0), std::sqrt(5.0) * usual, 0.1 * usual);
+}
+
+// An error that is hardly what was stated may as well make up for something else: mu_max is not
+// known to what it would be with it.
+TEST(SensorAccuracy, ThatIsHardlyEnoughLeavesMuMaxOpen) {
+  constexpr double kStated_Pa = 20e3;
+  const auto pushed = [&](double offset_Pa) {
+    blind::Trial trial;
+    trial.seed = 7;
+    blind::Random random(trial.seed);
+    trial.plan = blind::draw_plan(random, trial.machine.setting, 10);
+    trial.planted.push_back({"pressure_offset", {{"offset_Pa", offset_Pa}}, {}});
+    Accuracies accuracies{};
+    accuracies[static_cast<std::size_t>(Role::kSecondaryPressure)].bias = kStated_Pa;
+    Engine engine(campaign_of(trial, accuracies));
+    const Naming naming = name_effects(engine, [] { return false; });
+    const FittedPeak peak = fitted_peak(engine, naming.hypothesis, kOverdriveStop);
+    return variance_of_pushed(engine, naming.hypothesis, peak.height);
+  };
+  EXPECT_EQ(pushed(kStated_Pa), 0.0);
+  EXPECT_GT(pushed(2.7 * kStated_Pa), std::pow(0.02, 2.0));
 }
 
 }  // namespace

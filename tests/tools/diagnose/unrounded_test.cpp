@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <numbers>
 
 #include "tests/tools/diagnose/noise.h"
 
@@ -60,6 +61,16 @@ TEST(Unrounded, AMotionThatTurnsIsFoundBetweenItsSteps) {
   const Errors errors = errors_of([](double t_s) { return 20.2 + 3.0 * std::sin(0.8 * t_s); }, 0.1);
   EXPECT_GT(errors.as_read, 0.08);
   EXPECT_LT(errors.unrounded, 0.5 * errors.as_read);
+}
+
+// A swing of the pressure crosses the edge of a step many times while the ramp passes it: it has
+// been held on neither side.
+TEST(Unrounded, ARampThatSwingsAboutItsEdgesIsNotHeldBetweenThem) {
+  constexpr double kSwing_rad_s = 2.0 * std::numbers::pi / 3.0;
+  const Errors errors = errors_of(
+      [](double t_s) { return 30.3 - 0.1 * t_s + 0.2 * std::sin(kSwing_rad_s * t_s); }, 0.04);
+  EXPECT_GT(errors.as_read, 0.2);
+  EXPECT_LT(errors.unrounded, 0.2);
 }
 
 // A corner costs little: no jump is smeared over its neighbours.

@@ -17,7 +17,7 @@ namespace {
 // 21 % more of corners.
 constexpr double kNode_s = 0.1;  // as far apart as the samples of an experiment
 constexpr double kBendAtFirst = 0.01;
-constexpr double kBendLeast = 0.002;     // of a course that is straight but for its corners
+constexpr double kBendLeast = 0.0005;    // of a course that is straight but for its corners
 constexpr double kDegrees = 5.0;         // of Student's t: few bends are corners
 constexpr double kBendsPerMedian = 1.5;  // derived: half of those of 5 degrees are below 0.73
 constexpr int kPasses = 20, kPassesSmooth = 5;
@@ -354,18 +354,7 @@ class Search {
   // has been held. Between two crossings the samples say nothing of it, and it would go there from
   // what is before the hold to what is behind.
   void hold_where_held() {
-    struct Dwell {
-      std::size_t begin, end;
-      long on;
-      std::size_t size() const { return end - begin; }
-    };
-    std::vector<Dwell> all;
-    const std::vector<double>& m = course_.m;
-    for (std::size_t k = 0; k < m.size(); ++k) {
-      const long on = std::lround(m[k] - phase_);
-      if (all.empty() || all.back().on != on) all.push_back({k, k, on});
-      all.back().end = k + 1;
-    }
+    const std::vector<Dwell> all = dwells();
     course_.holds.clear();
     for (std::size_t i = 0; i < all.size(); ++i) {
       const std::size_t before = i > 0 ? all[i - 1].size() : 0;
@@ -382,6 +371,35 @@ class Search {
   double course_at(double t_s) const { return at(course_.m, nodes_.of(t_s)); }
 
  private:
+  // Nodes on one value.
+  struct Dwell {
+    std::size_t begin, end;
+    long on;
+    std::size_t size() const { return end - begin; }
+  };
+  // A course that swings about an edge goes across and back, for no longer than it was on either
+  // side: it dwells there, and has not passed the other value.
+  std::vector<Dwell> dwells() const {
+    std::vector<Dwell> out;
+    const std::vector<double>& m = course_.m;
+    for (std::size_t k = 0; k <= m.size(); ++k) {
+      const bool is_end = k == m.size();
+      const long on = is_end ? 0 : std::lround(m[k] - phase_);
+      if (!is_end && !out.empty() && out.back().on == on) {
+        out.back().end = k + 1;
+        continue;
+      }
+      while (out.size() > 2 && goes_back(out.end()[-3], out.end()[-2], out.end()[-1])) {
+        out.end()[-3].end = out.back().end;
+        out.resize(out.size() - 2);
+      }
+      if (!is_end) out.push_back({k, k + 1, on});
+    }
+    return out;
+  }
+  static bool goes_back(const Dwell& before, const Dwell& there, const Dwell& after) {
+    return before.on == after.on && there.size() <= std::min(before.size(), after.size());
+  }
   // About a node: the course bends there as it does not elsewhere.
   bool is_corner(std::size_t node) const {
     const std::size_t last = std::min(course_.m.size() - 2, node + kCornerNodes + 1);

@@ -61,7 +61,6 @@ constexpr double kReachedMost = 5.0;
 constexpr double kBehind = 8.0;     // of the log likelihood
 constexpr double kSamePlace = 0.1;  // chosen: sigmas
 constexpr int kSettled = 20;        // steps, where all else stays
-constexpr double kReach = 3.0;      // chosen, tolerances: no healthy machine is farther off
 constexpr double kFarReach = 3.0;   // chosen, times: as far the equation is that of a far size
 constexpr double kSizePrior = 3.0;  // one sigma of an effect's size, in usual sizes
 // Chosen, one sigma of what the form of friction over slip at the low end stop differs from that in
@@ -376,7 +375,7 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model,
   return out;
 }
 
-Engine::Engine(Campaign campaign, int jobs, Losses losses)
+Engine::Engine(Campaign campaign, int jobs, Losses losses, TorqueRatio torque_ratio)
     : jobs_(jobs), losses_(losses), campaign_(std::move(campaign)) {
   for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
     if (campaign_.runs[e].valid_count > 0) used_.push_back(static_cast<int>(e));
@@ -398,6 +397,10 @@ Engine::Engine(Campaign campaign, int jobs, Losses losses)
                               i == kSecondaryLossPerSpeed_Nms || i == kSecondaryLossPerkN_Nm;
     if (is_secondary && !campaign_.has_balance) continue;
     if (i == kSecondaryTorqueGain && !campaign_.has_balance) continue;
+    if (i == kDeformationLost &&
+        (torque_ratio == TorqueRatio::kFollows || !campaign_.has_balance)) {
+      continue;
+    }
     if (campaign_.nuisances[static_cast<std::size_t>(i)].tolerance == 0.0) continue;  // is known
     if ((i == kCommandGain || i == kCommandOffset_Pa) && !campaign_.has_tracking) continue;
     nuisances_.push_back(i);
@@ -899,6 +902,7 @@ void Engine::move(const std::vector<int>& parameters, const VectorXd& step, doub
       double& value = state.nuisance[parameters[j]];
       value += by;
       if (parameters[j] == kSecondaryInertia_kgm2) value = std::max(value, 0.0);
+      if (parameters[j] == kDeformationLost) value = std::clamp(value, 0.0, 1.0);
       // The data hold it far better than the usual values do: without a bound any drag would be the
       // machine's own, and what it explains would be no gain.
       constexpr std::array kBounded{kLossPerkN_Nm, kSecondaryLossPerkN_Nm, kSecondaryTorqueGain,

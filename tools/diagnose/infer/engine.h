@@ -65,11 +65,18 @@ struct Optimum {
 // What is lost whatever the clamp force. Where all ramps are alike, tens of Nm of it with hardly
 // any friction, or a few with what belts have, fit about as well: then no more than variators lose.
 enum class Losses { kAsFitted, kUsual };
+// What pulleys that give way do to the ratio of the torques: that it follows the ratio of the
+// speeds is what keeps the power; or as far as the data say it stays, and the belt loses speed as
+// by slip.
+enum class TorqueRatio { kFollows, kMayStay };
 
 class Engine {
  public:
+  // Chosen, tolerances of a constant of the machine: no healthy one is farther off.
+  static constexpr double kReach = 3.0;
   // jobs: threads; the same result for any number.
-  explicit Engine(Campaign campaign, int jobs = 1, Losses losses = Losses::kAsFitted);
+  explicit Engine(Campaign campaign, int jobs = 1, Losses losses = Losses::kAsFitted,
+                  TorqueRatio torque_ratio = TorqueRatio::kFollows);
 
   int jobs() const { return jobs_; }
   const Campaign& campaign() const { return campaign_; }

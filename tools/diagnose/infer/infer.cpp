@@ -120,6 +120,11 @@ ArrayXd less_rests(const std::vector<Whitening::Rest>& rests, ArrayXd rows) {
   return rows;
 }
 
+// Derived: a course that comes into a step and leaves it by the same edge, with its top anywhere in
+// it, bends by two thirds of that. Chosen: samples of a rest that is long enough to.
+constexpr double kBent = 2.0 / 3.0;
+constexpr int kBends = 10;
+
 // Of one experiment, from its random effects' columns, the last of all.
 std::array<std::vector<Whitening::Rest>, kResidualKinds> rests_of(const Campaign& campaign, int run,
                                                                   const RawColumns& raw) {
@@ -162,7 +167,20 @@ std::array<std::vector<Whitening::Rest>, kResidualKinds> rests_of(const Campaign
   if (!rests_throughout(data)) {
     const ArrayXd by = column(kLevel, kFrictionResidual) * per_force *
                        (variator.secondary_piston_area_m2 * data.rounding_pressure_Pa);
-    for (const Rest& rest : data.rests_pressure) add({rest}, kFrictionResidual, by);
+    for (const Rest& rest : data.rests_pressure) {
+      add({rest}, kFrictionResidual, by);
+      const int first = row[static_cast<std::size_t>(rest.begin)];
+      const int end = row[static_cast<std::size_t>(rest.end)];
+      if (by.size() == 0 || end - first < kBends) continue;
+      // Within it it may have gone to one side or there and back: by the first and second Legendre
+      // polynomial.
+      const ArrayXd x = ArrayXd::LinSpaced(end - first, -1.0, 1.0);
+      for (const ArrayXd& form : {ArrayXd(x), ArrayXd(1.5 * x.square() - 0.5)}) {
+        ArrayXd bent = ArrayXd::Zero(by.size());
+        bent.segment(first, end - first) = kBent * form * by.segment(first, end - first);
+        add({rest}, kFrictionResidual, bent);
+      }
+    }
   }
   for (const ResidualKind kind : {kFrictionResidual, kBalanceResidual}) {
     add(data.rests_torque, kind,

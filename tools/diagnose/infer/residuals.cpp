@@ -358,14 +358,14 @@ QuantityChange ratio_change(const Residuals& at, const ArrayXd& ln_ratio) {
 }
 
 QuantityChange deformation_change(const ExperimentData& data, const Residuals& at,
-                                  const ArrayXd& by) {
+                                  double lost_share, const ArrayXd& by) {
   const Quantities& q = at.there;
   const ArrayXd ln_ratio = -by / (1.0 - q.deformation).max(kLeastRadiusShare);
   QuantityChange change;
   change.slip_share = (1.0 - q.slip_share) * ln_ratio;
   if (q.balance.size() > 0) {
-    change.balance =
-        (q.balance - q.belt_torque - data.torque.slow + at.clean_reading_Nm) * ln_ratio;
+    change.balance = (q.balance - q.belt_torque - data.torque.slow + at.clean_reading_Nm) *
+                     (ln_ratio + lost_share * by);
     const BalanceVariance& noise = at.balance_variance;
     change.ln_balance_noise =
         (noise.total > 0.0).select(noise.behind / noise.total * ln_ratio, 0.0);
@@ -375,7 +375,8 @@ QuantityChange deformation_change(const ExperimentData& data, const Residuals& a
 
 // In closed form; nothing: there is none for this parameter.
 std::optional<QuantityChange> known_change(const Campaign& campaign, const ExperimentData& data,
-                                           const Residuals& at, int parameter) {
+                                           const ModelState& state, const Residuals& at,
+                                           int parameter) {
   const int n = data.size();
   switch (parameter) {
     case kLossConstant_Nm:
@@ -392,9 +393,13 @@ std::optional<QuantityChange> known_change(const Campaign& campaign, const Exper
       return ratio_change(at, here);
     }
     case kDeformationPerkN:
-      return deformation_change(data, at, 1e-3 * at.there.force_N);
+      return deformation_change(data, at, state.nuisance[kDeformationLost],
+                                1e-3 * at.there.force_N);
     case kDeformationPerkN2:
-      return deformation_change(data, at, 1e-6 * at.there.force_N.square());
+      return deformation_change(data, at, state.nuisance[kDeformationLost],
+                                1e-6 * at.there.force_N.square());
+    case kDeformationLost:
+      return balance_change(-at.clean_Nm * at.there.deformation);
     case kCommandOffset_Pa: {
       QuantityChange change;
       change.tracking = ArrayXd::Constant(n, -1.0);
@@ -492,7 +497,7 @@ QuantityChange change_by(const Campaign& campaign, int run, const ModelState& st
   }
   // With slip energy at work, whatever moves the slip moves the friction: by differences, below.
   if (!energy_acts(campaign, state)) {
-    if (auto change = known_change(campaign, data, at, parameter)) return std::move(*change);
+    if (auto change = known_change(campaign, data, state, at, parameter)) return std::move(*change);
   }
   return difference(campaign, run, state, at, parameter);
 }

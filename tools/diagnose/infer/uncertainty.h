@@ -50,5 +50,9 @@ double variance_of_halves(const Engine& engine, const std::vector<Score>& scores
 // it: square of what the quantity would differ by, were they the nominal ones.
 double variance_of_bending(const Engine& engine, const Hypothesis& hypothesis,
                            const Eigen::VectorXd& lever);
+// An error of the pressure sensor that is fitted beyond what is usual of it makes up for something
+// that has no name as often as it is one: square of what the quantity would differ by without it.
+double variance_of_pushed(const Engine& engine, const Hypothesis& hypothesis,
+                          const Eigen::VectorXd& lever);
 
 }  // namespace beltgrip::diagnose

@@ -33,7 +33,9 @@ Named to_file(int index, double value) {
 }
 
 // No part of the machine that a model file describes.
-bool is_of_sensor(int index) { return index == kSecondaryTorqueGain || index == kPressureBias_Pa; }
+bool is_beside_file(int index) {
+  return index == kSecondaryTorqueGain || index == kPressureBias_Pa || index == kDeformationLost;
+}
 
 }  // namespace
 
@@ -42,7 +44,7 @@ ModelFile nominal_model(const estimator::VariatorParameters& variator) {
   out.variator = variator;
   const NuisanceTable table = default_nuisances();
   for (int i = 0; i < kNuisanceCount; ++i) {
-    if (is_of_sensor(i)) continue;
+    if (is_beside_file(i)) continue;
     const Named named = to_file(i, table[static_cast<std::size_t>(i)].nominal);
     (daemon::is_friction_key(named.name) ? out.friction : out.driveline)[named.name] = named.value;
   }
@@ -52,7 +54,7 @@ ModelFile nominal_model(const estimator::VariatorParameters& variator) {
 NuisanceTable nuisances_of(const ModelFile& model) {
   NuisanceTable table = default_nuisances();
   for (int i = 0; i < kNuisanceCount; ++i) {
-    if (is_of_sensor(i)) continue;
+    if (is_beside_file(i)) continue;
     auto& row = table[static_cast<std::size_t>(i)];
     const std::string name = to_file(i, row.nominal).name;
     const auto& section = daemon::is_friction_key(name) ? model.friction : model.driveline;
@@ -79,7 +81,7 @@ NuisanceTable nuisances_of(const ModelFile& model) {
 
 void store_machine(const Eigen::VectorXd& nuisance, ModelFile& model) {
   for (int i = 0; i < kNuisanceCount; ++i) {
-    if (is_of_sensor(i)) continue;
+    if (is_beside_file(i)) continue;
     const Named named = to_file(i, nuisance[i]);
     (daemon::is_friction_key(named.name) ? model.friction : model.driveline)[named.name] =
         named.value;

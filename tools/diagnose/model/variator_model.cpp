@@ -53,6 +53,7 @@ NuisanceTable default_nuisances() {
       // That it does so in proportion is a lumped form: a tenth of what it is at 5 kN, of pulleys
       // that give way by 1 %, one of an effect's usual size.
       {"deformation_per_kN2", 0.0, 2e-5, 1e-7},
+      {"deformation_lost_share", 0.0, 0.5, 1e-3},
       {"loss_constant_Nm", 0.5, 0.6, 1e-2},
       {"loss_per_rad_s_Nm", 5e-3, 4e-3, 1e-4},
       // A variator loses 1 to 4 Nm, more with more clamp: beside the two above up to 3 Nm at 10 kN.
@@ -314,13 +315,16 @@ class Passes {
   ArrayXd balance(const Context& c, const ArrayXd& ratio) const {
     const double inertia_kg_m2 = nuisance_[kSecondaryInertia_kgm2];
     const double gain = 1.0 + nuisance_[kSecondaryTorqueGain];
+    const double lost = nuisance_[kDeformationLost];
     ArrayXd out(n_);
     for_rows(n_, [=, belt_Nm = c.belt_torque.data(), slow_Nm = run_.torque.slow.data(),
                   read_Nm = read_.torque_Nm.data(), slow_s_Nm = run_.torque_s.slow.data(),
                   slope_s = c.slope_s.data(), loss_s_Nm = c.secondary_loss_Nm.data(),
-                  at = ratio.data(), to = out.data()](Row k) BELTGRIP_INLINE {
+                  deformation = c.deformation.data(), at = ratio.data(),
+                  to = out.data()](Row k) BELTGRIP_INLINE {
       const double behind_Nm = slow_s_Nm[k] / gain + inertia_kg_m2 * slope_s[k] + loss_s_Nm[k];
-      to[k] = belt_Nm[k] + slow_Nm[k] - read_Nm[k] - at[k] * behind_Nm;
+      to[k] =
+          belt_Nm[k] + slow_Nm[k] - read_Nm[k] - at[k] * (1.0 + lost * deformation[k]) * behind_Nm;
     });
     if (run_.torque_is_engine) {
       out += c.primary_inertia_kg_m2 * (run_.omega_p.slope - run_.omega_p.slow_slope);

@@ -41,6 +41,7 @@ enum Nuisance : int {
   kEndOfShapes = kShapeLow + kShapeKnots - 1,
   kDeformationPerkN,
   kDeformationPerkN2,
+  kDeformationLost,  // share of it that takes speed as slip does, and leaves the torques' ratio
   kLossConstant_Nm,
   kLossPerSpeed_Nms,
   kLossPerkN_Nm,
