@@ -2,6 +2,8 @@
 // machines, and the data tell. The recordings are the blind generator's.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/tools/diagnose/recorded_runs.h"
 
 namespace beltgrip::diagnose {
@@ -24,6 +26,9 @@ TEST(TorqueRatio, ThatStaysIsNoFunctionOfThePressure) {
   EXPECT_EQ(answer.verdict, Verdict::kNothingWrong);
   ASSERT_TRUE(answer.machine.contains("deformation_lost_share"));
   EXPECT_GT(answer.machine.at("deformation_lost_share").value, 0.7);
+  EXPECT_TRUE(std::any_of(answer.notes.begin(), answer.notes.end(), [](const std::string& note) {
+    return note.starts_with("the ratio of the torques does not follow pulleys");
+  }));
 }
 
 TEST(TorqueRatio, ThatFollowsIsTheUsualOne) {

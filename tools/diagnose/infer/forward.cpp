@@ -243,7 +243,8 @@ Forward run_forward(const Campaign& campaign, int run, const ModelState& state) 
     const Quantities q = quantities(campaign, simulated, run, state);
     add("secondary_torque", data.torque_s.value,
         (1.0 + state.nuisance[kSecondaryTorqueGain]) *
-            (last.belt_torque / q.ratio -
+            (last.belt_torque /
+                 (q.ratio * (1.0 + state.nuisance[kDeformationLost] * q.deformation)) -
              state.nuisance[kSecondaryInertia_kgm2] * data.omega_s.slow_slope -
              q.secondary_loss_Nm));
   }

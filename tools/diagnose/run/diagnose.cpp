@@ -377,6 +377,7 @@ class Run {
       out().notes.emplace_back("stopped before the end: what is not named here may be there");
     }
     fill_machine(engine, naming);
+    note_torque_ratio();
     check_fitted_friction(out().machine, implausible_);
     note_implausible();
     fill_baseline(engine, naming);
@@ -591,6 +592,14 @@ class Run {
     }
     widen_mu_max(variance + variance_of_halves(engine, naming.last_screen, mu_height_) +
                  variance_of_bending(engine, naming.hypothesis, mu_height_));
+  }
+
+  void note_torque_ratio() {
+    const auto share = out().machine.find("deformation_lost_share");
+    if (share == out().machine.end()) return;
+    out().notes.push_back(
+        "the ratio of the torques does not follow pulleys that give way: a share of " +
+        text_of(share->second.value) + " of it takes speed alone, as slip does");
   }
 
   void no_mu_max(const std::string& why) {
