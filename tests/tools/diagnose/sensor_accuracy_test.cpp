@@ -62,7 +62,7 @@ struct Offset {
   double as_machine_Pa = 0.0;
 };
 
-Offset offset(double offset_Pa, double stated_Pa) {
+Engine with_offset(double offset_Pa, double stated_Pa) {
   blind::Trial trial;
   trial.seed = 7;
   blind::Random random(trial.seed);
@@ -70,7 +70,11 @@ Offset offset(double offset_Pa, double stated_Pa) {
   trial.planted.push_back({"pressure_offset", {{"offset_Pa", offset_Pa}}, {}});
   Accuracies accuracies{};
   accuracies[static_cast<std::size_t>(Role::kSecondaryPressure)].bias = stated_Pa;
-  Engine engine(campaign_of(trial, accuracies));
+  return Engine(campaign_of(trial, accuracies));
+}
+
+Offset offset(double offset_Pa, double stated_Pa) {
+  Engine engine = with_offset(offset_Pa, stated_Pa);
   const Naming naming = name_effects(engine, [] { return false; });
   Offset out;
   out.as_machine_Pa = naming.hypothesis.state.nuisance[kPressureBias_Pa];
@@ -119,14 +123,7 @@ TEST(SensorAccuracy, OfATorqueLetsItsZeroScatter) {
 TEST(SensorAccuracy, ThatIsHardlyEnoughLeavesMuMaxOpen) {
   constexpr double kStated_Pa = 20e3;
   const auto pushed = [&](double offset_Pa) {
-    blind::Trial trial;
-    trial.seed = 7;
-    blind::Random random(trial.seed);
-    trial.plan = blind::draw_plan(random, trial.machine.setting, 10);
-    trial.planted.push_back({"pressure_offset", {{"offset_Pa", offset_Pa}}, {}});
-    Accuracies accuracies{};
-    accuracies[static_cast<std::size_t>(Role::kSecondaryPressure)].bias = kStated_Pa;
-    Engine engine(campaign_of(trial, accuracies));
+    Engine engine = with_offset(offset_Pa, kStated_Pa);
     const Naming naming = name_effects(engine, [] { return false; });
     const FittedPeak peak = fitted_peak(engine, naming.hypothesis, kOverdriveStop);
     return variance_of_pushed(engine, naming.hypothesis, peak.height);
