@@ -53,6 +53,7 @@ NuisanceTable default_nuisances() {
       // That it does so in proportion is a lumped form: a tenth of what it is at 5 kN, of pulleys
       // that give way by 1 %, one of an effect's usual size.
       {"deformation_per_kN2", 0.0, 2e-5, 1e-7},
+      // Chosen: from all that follows to all that stays are two of these.
       {"deformation_lost_share", 0.0, 0.5, 1e-3},
       {"loss_constant_Nm", 0.5, 0.6, 1e-2},
       {"loss_per_rad_s_Nm", 5e-3, 4e-3, 1e-4},
