@@ -5,7 +5,8 @@
 namespace beltgrip::daemon {
 
 namespace {
-// Chosen: a belt whose peak lies at 2 % slips so fast at 85 % of its friction.
+// Chosen: a belt whose peak lies at 2 % slips so fast at 85 % of its friction. A fifth less or
+// more: not run.
 constexpr double kNearRateShare = 0.25;
 constexpr double kHoldShare = 0.7;  // of the slip rate: the ramp slows down over this much
 constexpr double kHoldRate_N_per_s = 600.0;

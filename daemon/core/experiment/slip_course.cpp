@@ -7,6 +7,7 @@
 namespace beltgrip::daemon {
 
 namespace {
+// Chosen: three periods at 200 Hz. A fifth less or more: not run.
 constexpr Duration kRecent = 15 * kMillisecond;
 constexpr double kWhole = 0.8;          // of kRateOver: a rate is known
 constexpr double kSquares = 100.0;      // half a second at 200 Hz

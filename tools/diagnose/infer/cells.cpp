@@ -82,7 +82,7 @@ bool is_rounding(const HalfStep& half, const Cell& cell) {
 
 // Of one sigma of the rounding. Measured, six healthy campaigns of other make whose pressure swings
 // between steps of 40 kPa, as no course that passes them says: 0.23 to 0.39. A fifth less or more:
-// see tools/DIAGNOSE.md.
+// the same verdicts in 16 campaigns.
 constexpr double kSwingsLeft = 0.3;
 
 // Squared, in sigmas, of all samples: what swings of a pressure that rests on its steps leave in

@@ -72,7 +72,8 @@ enum class TorqueRatio { kFollows, kMayStay };
 
 class Engine {
  public:
-  // Chosen, tolerances of a constant of the machine: no healthy one is farther off.
+  // Chosen, tolerances of a constant of the machine: no healthy one is farther off. As what asks
+  // for usual losses it decided once, by nine; as a bound a fifth less or more: not run.
   static constexpr double kReach = 3.0;
   // jobs: threads; the same result for any number.
   explicit Engine(Campaign campaign, int jobs = 1, Losses losses = Losses::kAsFitted,

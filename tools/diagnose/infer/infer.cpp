@@ -121,7 +121,8 @@ ArrayXd less_rests(const std::vector<Whitening::Rest>& rests, ArrayXd rows) {
 }
 
 // Derived: a course that comes into a step and leaves it by the same edge, with its top anywhere in
-// it, bends by two thirds of that. Chosen: samples of a rest that is long enough to.
+// it, bends by two thirds of that. Chosen: samples of a rest that is long enough to. Of 16
+// campaigns of other make a fifth less of either lets one alarm again (54, 43), a fifth more none.
 constexpr double kBent = 2.0 / 3.0;
 constexpr int kBends = 10;
 
