@@ -317,9 +317,8 @@ TEST(UnbalancedTorque, IsNotWhatTheInertiaBehindTheBeltTakes) {
   EXPECT_LT(power_at_the_swing(true, false), 3.0);
 }
 
-// A logger reads the channels of a row in turn.
-TEST(Age, IsTheTimeBetweenSamplesInOneRowToo) {
-  EXPECT_NEAR(age_of_secondary_speed_s(0.0, 1), 0.01, 1e-9);
+TEST(Age, IsNoneInOneRowUnlessValuesAreRepeated) {
+  EXPECT_EQ(age_of_secondary_speed_s(0.0, 1), 0.0);
   EXPECT_NEAR(age_of_secondary_speed_s(0.0, 5), 0.01, 1e-9);
   EXPECT_NEAR(age_of_secondary_speed_s(0.003, 1), 0.01, 1e-9);
 }

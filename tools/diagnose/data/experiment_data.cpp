@@ -462,6 +462,18 @@ Role torque_role(const ExperimentData& data) {
   return data.torque_is_engine ? Role::kEngineTorque : Role::kPrimaryTorque;
 }
 
+// A value that is sent by itself may have waited for as long as the time between two of them. What
+// stands in one row with another channel was read with it, unless most values only repeat the last.
+double age_s(const Channel& channel, const Channel& beside) {
+  const double period_s = median_period_s(channel);
+  if (channel.t_s != beside.t_s) return period_s;
+  std::size_t repeats = 0;
+  for (std::size_t i = 1; i < channel.value.size(); ++i) {
+    repeats += channel.value[i] == channel.value[i - 1];
+  }
+  return 2 * repeats > channel.value.size() ? period_s : 0.0;
+}
+
 // What slip and torque are held against: an error of the pressure that lasts is one of friction,
 // and of what follows its rate. The other channels' steps are passed sooner than the clamp moves,
 // and their noise carries them over.
@@ -479,9 +491,9 @@ void put_on_grid(const SignalTable& table, const Roundings& roundings, double st
   const auto on_grid = [&](Role role) {
     GridSignal out = to_grid(before_rounding(role, table[role], of_role(roundings, role)), start_s,
                              n, data.dt_s);
-    // It may have waited for as long as the time between two of them, in one row with others too:
-    // a logger reads its channels in turn.
-    out.age_s = median_period_s(table[role]);
+    out.age_s =
+        age_s(table[role],
+              table[role == Role::kPrimarySpeed ? Role::kSecondarySpeed : Role::kPrimarySpeed]);
     add_slow(out, data.dt_s);
     return out;
   };
