@@ -558,6 +558,21 @@ TEST_F(Diagnose, ConstantSignalsNameNothing) {
   expect_silence(of({table, table, table}));
 }
 
+// A role that is there is not called missing.
+TEST_F(Diagnose, TwoRowsAreTooFewSamples) {
+  auto recording = record(rig(1));
+  std::string& table = recording.csv.front();
+  std::size_t end = 0;
+  for (int line = 0; line < 3; ++line) end = table.find('\n', end) + 1;
+  table.resize(end);
+  const RunResult result = run(write({table}));
+  EXPECT_EQ(result.status, 65);
+  EXPECT_NE(result.err.find("not used: too few samples without gaps of primary_speed, "),
+            std::string::npos)
+      << result.err;
+  EXPECT_EQ(result.err.find("not used: no "), std::string::npos) << result.err;
+}
+
 TEST_F(Diagnose, AMissingRoleIsNamed) {
   auto recording = record(rig(3));
   for (std::string& table : recording.csv) {

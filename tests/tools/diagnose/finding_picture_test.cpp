@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/tools/diagnose/recorded_runs.h"
@@ -72,6 +73,63 @@ TEST(FindingPicture, IsTheEquationWhereTheCurveIsFlat) {
   for (std::size_t i = 0; i < law.x.size(); ++i) {
     const double force_N = kCoefficient_N_s2 * law.x[i] * law.x[i];
     EXPECT_NEAR(law.y[i], force_N, 0.1 * force_N) << law.x[i];
+  }
+}
+
+// A channel that comes late is off by as much as it changes meanwhile.
+TEST(FindingPicture, OfALateChannelIsOverItsRate) {
+  blind::Trial trial;
+  trial.seed = 12;
+  blind::Random random(trial.seed);
+  trial.plan = blind::draw_plan(random, trial.machine.setting, 6);
+  Engine engine(campaign_of(trial));
+  engine.fit_machine();
+  // The last comes early.
+  constexpr double kDelay_s = 0.05, kPiston_m2 = 0.0113;
+  double slowest_rad_s = 1e9, fastest_rad_s = 0.0;  // of both shafts
+  for (const ExperimentData& run : engine.campaign().runs) {
+    for (int k = 0; k < run.size(); ++k) {
+      if (!run.valid[static_cast<std::size_t>(k)]) continue;
+      slowest_rad_s = std::min({slowest_rad_s, run.omega_p.value[k], run.omega_s.value[k]});
+      fastest_rad_s = std::max({fastest_rad_s, run.omega_p.value[k], run.omega_s.value[k]});
+    }
+  }
+  struct Late {
+    std::string_view role;
+    const char *title, *x_label;
+    double low, high;  // of what is shown, per unit of the rate
+    double delay_s = kDelay_s;
+  };
+  constexpr double kForce_N = 1e5 * kPiston_m2 * kDelay_s, kRatio = 1e3 * kDelay_s;
+  for (const Late& late :
+       {Late{"secondary_pressure", "a channel that comes late: secondary_pressure",
+             "rate of the secondary pressure, bar/s", 0.9 * kForce_N, 1.1 * kForce_N},
+        Late{"secondary_speed", "a channel that comes late: secondary_speed",
+             "acceleration of the secondary shaft, rad/s2", -kRatio / slowest_rad_s,
+             -kRatio / fastest_rad_s},
+        Late{"primary_speed", "a channel that comes early: primary_speed",
+             "acceleration of the primary shaft, rad/s2", -kRatio / slowest_rad_s,
+             -kRatio / fastest_rad_s, -kDelay_s}}) {
+    ModelState state = engine.state();
+    const std::vector<Slot>& slots = engine.campaign().slots;
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+      if (slots[i].row->id == "channel_skew" && slots[i].role == late.role) {
+        state.effects[static_cast<Eigen::Index>(i)] = late.delay_s;
+      }
+    }
+    const std::vector<report::Chart> charts = pictures_of(engine.campaign(), state, {});
+    ASSERT_EQ(charts.size(), 1U) << late.role;
+    EXPECT_EQ(charts[0].title, late.title);
+    EXPECT_EQ(charts[0].x_label, late.x_label);
+    const report::Series& law = charts[0].series[0];
+    ASSERT_GT(law.x.size(), 10U) << late.role;
+    double product = 0.0, square = 0.0;
+    for (std::size_t i = 0; i < law.x.size(); ++i) {
+      product += law.x[i] * law.y[i];
+      square += law.x[i] * law.x[i];
+    }
+    EXPECT_GT(product / square, late.low) << late.role;
+    EXPECT_LT(product / square, late.high) << late.role;
   }
 }
 

@@ -11,7 +11,9 @@ namespace {
 
 TEST(FindingWords, AreThereForEachParameter) {
   for (const EffectRow& row : effect_rows()) {
-    EXPECT_FALSE(words_of(row.id, row.parameter).empty()) << row.id << "." << row.parameter;
+    for (const double size : {1.0, -1.0}) {
+      EXPECT_FALSE(words_of(row.id, row.parameter, size).empty()) << row.id << "." << row.parameter;
+    }
   }
 }
 

@@ -27,6 +27,7 @@ constexpr double kSlipRateCalm_1_s = 0.012;
 constexpr double kRatioTolerance = 0.085;  // ln; around an end stop
 constexpr double kSoftness_1_N = 5e-6;     // and below it, as pulleys give way to the clamp force
 constexpr double kSpeedMin_rad_s = 10.0;
+constexpr std::size_t kSpeedSamplesMin = 10;  // chosen: of fewer no period is known
 constexpr double kForceMin_N = 200.0;
 // Of the clamp force: where its slow copy departs further from it, the pressure moves too fast for
 // what a lag, a shift or play is computed from.
@@ -486,11 +487,23 @@ const Rounding& of_role(const Roundings& roundings, Role role) {
   return roundings[static_cast<std::size_t>(role)];
 }
 
+// What the recording has samples of at all; none on the grid yet.
+void note_what_is_read(const SignalTable& table, ExperimentData& data) {
+  data.torque_is_engine = table[Role::kPrimaryTorque].empty();
+  for (const auto& [signal, role] : {std::pair{&data.omega_p, Role::kPrimarySpeed},
+                                     {&data.omega_s, Role::kSecondarySpeed},
+                                     {&data.pressure, Role::kSecondaryPressure},
+                                     {&data.torque, torque_role(data)}}) {
+    signal->is_read = !table[role].empty();
+  }
+}
+
 void put_on_grid(const SignalTable& table, const Roundings& roundings, double start_s, int n,
                  ExperimentData& data) {
   const auto on_grid = [&](Role role) {
     GridSignal out = to_grid(before_rounding(role, table[role], of_role(roundings, role)), start_s,
                              n, data.dt_s);
+    out.is_read = !table[role].empty();
     out.age_s =
         age_s(table[role],
               table[role == Role::kPrimarySpeed ? Role::kSecondarySpeed : Role::kPrimarySpeed]);
@@ -713,8 +726,13 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
   data.name = table.name;
   data.notes = table.notes;
   const Channel& speed = table[Role::kPrimarySpeed];
-  if (speed.t_s.size() < 10) {
-    data.notes.push_back(table.name + ": no primary_speed");
+  if (speed.t_s.size() < kSpeedSamplesMin) {
+    note_what_is_read(table, data);
+    data.notes.push_back(table.name + (speed.empty()
+                                           ? ": no primary_speed"
+                                           : ": " + std::to_string(speed.t_s.size()) +
+                                                 " samples of primary_speed, expected at least " +
+                                                 std::to_string(kSpeedSamplesMin)));
     return data;
   }
   const double start_s = speed.t_s.front();

@@ -30,7 +30,8 @@ struct GridSignal {
   Eigen::ArrayXd sharp;        // what a shift, lag or play is computed from: the slow copy; of the
   Eigen::ArrayXd sharp_slope;  // pressure one that is not rounded where it turns or steps
   double age_s = 0.0;          // by how much a value may be older than its stamp
-  bool present = false;
+  bool is_read = false;        // the recording has samples of it
+  bool present = false;        // enough of them, without gaps, to stand on the grid
 };
 
 // Neighbouring samples, all of them valid, before and behind which is none.

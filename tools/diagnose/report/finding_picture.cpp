@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "tools/diagnose/model/effects/effect.h"
 #include "tools/diagnose/report/finding_words.h"
@@ -90,6 +91,7 @@ ArrayXd pressure_rate(const ExperimentData& run, int) { return 1e-5 * run.pressu
 ArrayXd torque(const ExperimentData& run, int) { return run.torque.slow; }
 ArrayXd torque_rate(const ExperimentData& run, int) { return run.torque.slow_slope; }
 ArrayXd acceleration(const ExperimentData& run, int) { return run.omega_p.slow_slope; }
+ArrayXd secondary_acceleration(const ExperimentData& run, int) { return run.omega_s.slow_slope; }
 ArrayXd oil(const ExperimentData& run, int) {
   return run.temperature.present ? run.temperature.value : ArrayXd();
 }
@@ -104,7 +106,7 @@ ArrayXd count(const ExperimentData& run, int experiment) {
   return ArrayXd::Constant(run.size(), experiment + 1.0);
 }
 
-constexpr std::array<Variable, 13> kVariables{{
+constexpr std::array<Variable, 14> kVariables{{
     {"primary_speed", "primary speed, rad/s", primary_speed},
     {"secondary_speed", "secondary speed, rad/s", secondary_speed},
     {"secondary_pressure", "secondary pressure, bar", pressure_bar},
@@ -113,6 +115,8 @@ constexpr std::array<Variable, 13> kVariables{{
     {"torque", "torque, Nm", torque},
     {"rate of torque", "rate of the torque, Nm/s", torque_rate},
     {"acceleration of primary_speed", "acceleration of the primary shaft, rad/s2", acceleration},
+    {"acceleration of secondary_speed", "acceleration of the secondary shaft, rad/s2",
+     secondary_acceleration},
     {"primary_pressure", "primary pressure, bar", primary_pressure},
     {"oil_temperature", "oil temperature, degC", oil},
     {"ratio", "speed ratio", speed_ratio},
@@ -120,17 +124,39 @@ constexpr std::array<Variable, 13> kVariables{{
     {"experiment", "experiment", count},
 }};
 
-const Variable* variable_of(const EffectRow& row) {
+// What a channel that comes late or early acts on and follows, of those that are shifted.
+struct Shifted {
+  std::string_view role, acts_on, depends_on;
+};
+constexpr std::array<Shifted, 3> kShifted{{
+    {"primary_speed", "speed", "acceleration of primary_speed"},
+    {"secondary_speed", "speed", "acceleration of secondary_speed"},
+    {"secondary_pressure", "clamp force", "rate of secondary_pressure"},
+}};
+
+// Of a finding, as the table of effects says it or, where that differs by channel, the one above.
+struct Place {
+  std::string_view acts_on, depends_on;
+};
+Place place_of(const Slot& slot) {
+  const auto shifted = std::find_if(kShifted.begin(), kShifted.end(), [&](const Shifted& each) {
+    return slot.row->id == "channel_skew" && each.role == slot.role;
+  });
+  if (shifted != kShifted.end()) return {shifted->acts_on, shifted->depends_on};
+  return {slot.row->acts_on, slot.row->depends_on};
+}
+
+const Variable* variable_of(const Place& place) {
   const auto named = [](std::string_view name) {
     const auto found = std::find_if(kVariables.begin(), kVariables.end(),
                                     [&](const Variable& each) { return each.name == name; });
     return found == kVariables.end() ? nullptr : &*found;
   };
   // What follows nothing is as large everywhere: shown over what it is added to.
-  if (row.depends_on != "nothing") return named(row.depends_on);
-  return named(row.acts_on == "clamp force" ? "secondary_pressure"
-               : row.acts_on == "ratio"     ? "ratio"
-                                            : "torque");
+  if (place.depends_on != "nothing") return named(place.depends_on);
+  return named(place.acts_on == "clamp force" ? "secondary_pressure"
+               : place.acts_on == "ratio"     ? "ratio"
+                                              : "torque");
 }
 
 // One sample of one residual: place, what a unit at the point changes, what the finding changes,
@@ -227,10 +253,11 @@ std::vector<report::Chart> pictures_of(const Campaign& campaign, const ModelStat
   for (std::size_t i = 0; i < campaign.slots.size(); ++i) {
     const Slot& slot = campaign.slots[i];
     if (extended.effects[static_cast<Eigen::Index>(i)] == 0.0) continue;
+    const Place place = place_of(slot);
     const auto point = std::find_if(kActsOn.begin(), kActsOn.end(), [&](const Point& each) {
-      return each.acts_on == slot.row->acts_on;
+      return each.acts_on == place.acts_on;
     });
-    const Variable* variable = variable_of(*slot.row);
+    const Variable* variable = variable_of(place);
     if (point == kActsOn.end() || variable == nullptr) continue;
     const std::vector<Asked> asked =
         asked_by(samples_of(campaign, extended, static_cast<int>(i), *point, *variable));
@@ -249,8 +276,10 @@ std::vector<report::Chart> pictures_of(const Campaign& campaign, const ModelStat
       before.y.push_back(size + left);
       after.y.push_back(left);
     }
-    report::Chart chart{
-        words_of(slot.row->id, slot.row->parameter), variable->label, point->label, {}};
+    std::string title =
+        words_of(slot.row->id, slot.row->parameter, extended.effects[static_cast<Eigen::Index>(i)]);
+    if (slot.row->id == "channel_skew") title += ": " + std::string(slot.role);
+    report::Chart chart{std::move(title), variable->label, point->label, {}};
     if (band) chart.series = {low, high};
     chart.series.insert(chart.series.end(), {law, before, after});
     out.push_back(std::move(chart));

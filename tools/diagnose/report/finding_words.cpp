@@ -140,10 +140,10 @@ std::string size_of(const Interval& size) {
 
 }  // namespace
 
-std::string words_of(std::string_view effect, std::string_view parameter) {
+std::string words_of(std::string_view effect, std::string_view parameter, double size) {
   const Words* const row = row_of(effect, parameter);
   if (row == nullptr) return {};
-  std::string_view words = row->words;
+  std::string_view words = size < 0.0 && !row->opposite.empty() ? row->opposite : row->words;
   for (const std::string_view end : {",", " by", " of", ", by", ", exponent"}) {
     if (words.ends_with(end)) words.remove_suffix(end.size());
   }

@@ -8,8 +8,9 @@
 
 namespace beltgrip::diagnose {
 
-// What one parameter of one effect is, with an article; empty: the table has none.
-std::string words_of(std::string_view effect, std::string_view parameter);
+// What one parameter of one effect is, with an article, of a size of that sign; empty: the table
+// has none.
+std::string words_of(std::string_view effect, std::string_view parameter, double size);
 // What a test of what is left looks for, by its name in JSON; empty: the table has none.
 std::string_view words_of_test(std::string_view test);
 // In what a person is told a signal, an error of it, or what a function acts on: unit, and times

@@ -145,15 +145,17 @@ class Run {
   }
 
   static std::string why_unusable(const ExperimentData& run) {
-    std::string missing;
+    std::string missing, sparse;
     const auto need = [&](const GridSignal& signal, const char* name) {
-      if (!signal.present) missing += (missing.empty() ? "" : ", ") + std::string(name);
+      std::string& list = signal.is_read ? sparse : missing;
+      if (!signal.present) list += (list.empty() ? "" : ", ") + std::string(name);
     };
     need(run.omega_p, "primary_speed");
     need(run.omega_s, "secondary_speed");
     need(run.pressure, "secondary_pressure");
     need(run.torque, "primary_torque or engine_torque");
     if (!missing.empty()) return "not used: no " + missing;
+    if (!sparse.empty()) return "not used: too few samples without gaps of " + sparse;
     int at_stop = 0;
     for (const int stop : run.stop) at_stop += stop != kNoStop;
     if (at_stop == 0) {
