@@ -74,7 +74,7 @@ constexpr std::array<Point, 6> kActsOn{{
     {"clamp force", "clamp force beyond the model's, N", 1.0, of_force},
     {"friction", "friction beyond the model's, %", 1e2, of_friction},
     {"ratio", "ratio beyond the model's, 1/1000", 1e3, of_ratio},
-    {"speed", "secondary over primary speed beyond the model's, 1/1000", 1e3, of_ratio},
+    {"speed", "speed ratio beyond the model's, 1/1000", 1e3, of_ratio},
 }};
 
 // What a finding may follow.
