@@ -49,15 +49,20 @@ TEST(FindingPicture, IsTheCauseOverWhatItFollows) {
   }
 }
 
-// About the peak of friction and behind it a residual says nothing of the size of what is not in
-// the model: the law is the equation there as well.
-TEST(FindingPicture, IsTheEquationWhereTheCurveIsFlat) {
+Engine healthy_machine() {
   blind::Trial trial;
   trial.seed = 12;
   blind::Random random(trial.seed);
   trial.plan = blind::draw_plan(random, trial.machine.setting, 6);
-  Engine engine(campaign_of(trial));
-  engine.fit_machine();
+  Engine out(campaign_of(trial));
+  out.fit_machine();
+  return out;
+}
+
+// About the peak of friction and behind it a residual says nothing of the size of what is not in
+// the model: the law is the equation there as well.
+TEST(FindingPicture, IsTheEquationWhereTheCurveIsFlat) {
+  const Engine engine = healthy_machine();
   constexpr double kCoefficient_N_s2 = 0.001;  // at most 292 N of 2.5 kN: their logs differ
   ModelState state = engine.state();
   const std::vector<Slot>& slots = engine.campaign().slots;
@@ -78,12 +83,7 @@ TEST(FindingPicture, IsTheEquationWhereTheCurveIsFlat) {
 
 // A channel that comes late is off by as much as it changes meanwhile.
 TEST(FindingPicture, OfALateChannelIsOverItsRate) {
-  blind::Trial trial;
-  trial.seed = 12;
-  blind::Random random(trial.seed);
-  trial.plan = blind::draw_plan(random, trial.machine.setting, 6);
-  Engine engine(campaign_of(trial));
-  engine.fit_machine();
+  const Engine engine = healthy_machine();
   // The last comes early.
   constexpr double kDelay_s = 0.05, kPiston_m2 = 0.0113;
   double slowest_rad_s = 1e9, fastest_rad_s = 0.0;  // of both shafts

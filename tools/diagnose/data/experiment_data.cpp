@@ -27,7 +27,8 @@ constexpr double kSlipRateCalm_1_s = 0.012;
 constexpr double kRatioTolerance = 0.085;  // ln; around an end stop
 constexpr double kSoftness_1_N = 5e-6;     // and below it, as pulleys give way to the clamp force
 constexpr double kSpeedMin_rad_s = 10.0;
-constexpr std::size_t kSpeedSamplesMin = 10;  // chosen: of fewer no period is known
+// Chosen: of fewer no period is known. 8 and 12: only a file of so few rows is told otherwise.
+constexpr std::size_t kSpeedSamplesMin = 10;
 constexpr double kForceMin_N = 200.0;
 // Of the clamp force: where its slow copy departs further from it, the pressure moves too fast for
 // what a lag, a shift or play is computed from.
