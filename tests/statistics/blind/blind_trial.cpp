@@ -35,7 +35,9 @@ int slot_of(const diagnose::Campaign& campaign, const Planted& planted, const st
 // Information of the data on every slot, the machine's constants and the scatter taken out.
 Eigen::MatrixXd information(const Engine& engine, const diagnose::Scatter& scatter) {
   const auto nuisances = static_cast<Eigen::Index>(engine.active_nuisances().size());
-  const Eigen::Index all = engine.summaries().front().aa.rows() - 1;
+  // Behind the slots stand columns of sizes far from zero.
+  const auto slots = static_cast<Eigen::Index>(engine.campaign().slots.size());
+  const Eigen::Index all = nuisances + slots;
   Eigen::MatrixXd total = Eigen::MatrixXd::Zero(all, all);
   const Eigen::MatrixXd inverse = (1.0 / scatter.variance).matrix().asDiagonal();
   for (const diagnose::Summary& each : engine.summaries()) {
@@ -43,7 +45,6 @@ Eigen::MatrixXd information(const Engine& engine, const diagnose::Scatter& scatt
     total += each.aa.topLeftCorner(all, all) - ua.transpose() * (each.uu + inverse).llt().solve(ua);
   }
   for (Eigen::Index j = 0; j < nuisances; ++j) total(j, j) += 1.0;
-  const Eigen::Index slots = all - nuisances;
   const Eigen::MatrixXd cross = total.topRightCorner(nuisances, slots);
   return total.bottomRightCorner(slots, slots) -
          cross.transpose() * total.topLeftCorner(nuisances, nuisances).ldlt().solve(cross);
