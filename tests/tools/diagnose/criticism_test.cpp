@@ -43,8 +43,8 @@ Criticism failing(const std::vector<std::string>& names, std::vector<Cell> cells
   out.cells = std::move(cells);
   for (const char* name :
        {"law_cell", "smooth_cell", "own_shape", "line", "slow_line", "channel_line", "torque_swing",
-        "belt_passage", "whiteness", "scatter_friction", "scatter_ratio", "scatter_torque",
-        "unusual_scatter", "unusual_ratio", "unusual_friction"}) {
+        "slip_swing", "belt_passage", "whiteness", "scatter_friction", "scatter_ratio",
+        "scatter_torque", "unusual_scatter", "unusual_ratio", "unusual_friction"}) {
     const bool fails = std::find(names.begin(), names.end(), name) != names.end();
     out.tests.push_back({name, fails ? 10.0 : 0.0, 1.0});
   }
@@ -91,6 +91,15 @@ TEST(TorqueSwing, IsToldAsALine) {
   EXPECT_EQ(told.kind, MisfitKind::kLine);
   EXPECT_EQ(told.acts_on, "torque");
   EXPECT_EQ(told.frequency_Hz, 3.25);
+}
+
+TEST(SwingOfTheSlip, IsToldAsALine) {
+  Criticism left = failing({"slip_swing"});
+  left.slip_swing = {"ratio", 9.75, 10.0, 0.1};
+  const Unexplained told = what_is_left(left, true);
+  EXPECT_EQ(told.kind, MisfitKind::kLine);
+  EXPECT_EQ(told.acts_on, "ratio");
+  EXPECT_EQ(told.frequency_Hz, 9.75);
 }
 
 TEST(RepeatsWithin, WhatFollowsAVariableThatChangesInEachExperiment) {

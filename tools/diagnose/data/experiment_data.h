@@ -11,6 +11,7 @@
 #include "tools/diagnose/data/order_lines.h"
 #include "tools/diagnose/data/rounding.h"
 #include "tools/diagnose/data/signal_table.h"
+#include "tools/diagnose/data/slip_swing.h"
 #include "tools/diagnose/data/spectral_lines.h"
 
 namespace beltgrip::diagnose {
@@ -64,6 +65,7 @@ struct ExperimentData {
   double belt_Hz = 0.0;      // of that, mean
   PooledSpectrum torque_spectrum, torque_s_spectrum;
   PooledSpectrum unbalanced_spectrum;  // of the torque that does not arrive behind the belt
+  SlipSpectra slip_spectra;
   bool torque_is_engine = false;
   std::vector<int> stop;  // EndStopIndex per sample
   // By how much the slip varies within what one sample is the mean of, squared shares: a curve that

@@ -162,24 +162,32 @@ NarrowLine narrow_line(const PooledSpectrum& spectrum) {
   return out;
 }
 
-Hump strongest_hump(const PooledSpectrum& spectrum) {
-  Hump out;
+double power_about(const PooledSpectrum& spectrum, std::size_t bin) {
+  const std::vector<double>& power = spectrum.power;
+  return bin > 0 && bin + 1 < power.size() ? power[bin - 1] + power[bin] + power[bin + 1] : 0.0;
+}
+
+Hump hump_at(const PooledSpectrum& spectrum, std::size_t bin) {
   const std::vector<double>& power = spectrum.power;
   const std::size_t lowest = bin_of(kSwingLowest_Hz);
   const std::size_t around = bin_of(kAround_Hz), own = bin_of(kOwn_Hz);
-  if (spectrum.pieces < kPiecesMin || power.size() < lowest + around) return out;
+  if (spectrum.pieces < kPiecesMin || bin < lowest || bin + around >= power.size()) return {};
+  const double level = std::max(median_of(power, bin > around ? bin - around : 1, bin - own),
+                                median_of(power, bin + own, bin + around));
+  const double mass = power_about(spectrum, bin);
   double whole = 0.0;
-  for (std::size_t i = lowest; i < power.size(); ++i) whole += power[i];
-  for (std::size_t i = lowest; i + around < power.size(); ++i) {
-    const double level = std::max(median_of(power, i > around ? i - around : 1, i - own),
-                                  median_of(power, i + own, i + around));
-    const double mass = power[i - 1] + power[i] + power[i + 1];
-    // Derived: of three neighbours through Hann's window one and a half are independent, and the
-    // level's median is uncertain by half as much as they are.
-    const double excess = (mass / std::max(3.0 * level, 1e-300) - 1.0) * std::sqrt(spectrum.pieces);
-    if (excess <= out.excess) continue;
-    out = {static_cast<double>(i) * PooledSpectrum::kStep_Hz, excess,
-           std::max(0.0, mass - 3.0 * level) / whole};
+  for (std::size_t j = lowest; j < power.size(); ++j) whole += power[j];
+  // Derived: of three neighbours through Hann's window one and a half are independent, and the
+  // level's median is uncertain by half as much as they are.
+  const double excess = (mass / std::max(3.0 * level, 1e-300) - 1.0) * std::sqrt(spectrum.pieces);
+  return {static_cast<double>(bin) * PooledSpectrum::kStep_Hz, excess,
+          std::max(0.0, mass - 3.0 * level) / whole};
+}
+
+Hump strongest_hump(const PooledSpectrum& spectrum) {
+  Hump out;
+  for (std::size_t bin = 0; bin < spectrum.power.size(); ++bin) {
+    if (const Hump here = hump_at(spectrum, bin); here.excess > out.excess) out = here;
   }
   return out;
 }

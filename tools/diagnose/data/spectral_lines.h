@@ -39,5 +39,9 @@ struct Hump {
   double share = 0.0;   // of the power from the lowest frequency that it is looked for at
 };
 Hump strongest_hump(const PooledSpectrum& spectrum);
+// The one about a step of the spectrum; none where there is nothing to tell it from.
+Hump hump_at(const PooledSpectrum& spectrum, std::size_t bin);
+// Of three steps.
+double power_about(const PooledSpectrum& spectrum, std::size_t bin);
 
 }  // namespace beltgrip::diagnose

@@ -81,6 +81,18 @@ SpectralLine swing(const Campaign& campaign) {
   return {"torque", hump.frequency_Hz, hump.excess, hump.share};
 }
 
+SpectralLine swing_of_slip(const Campaign& campaign) {
+  SlipSpectra all;
+  PooledSpectrum torque, torque_s;
+  for (const ExperimentData& run : campaign.runs) {
+    all.add(run.slip_spectra);
+    torque.add(run.torque_spectrum);
+    torque_s.add(run.torque_s_spectrum);
+  }
+  const Hump hump = slip_swing(all, torque, torque_s);
+  return {"ratio", hump.frequency_Hz, hump.excess, hump.share};
+}
+
 }  // namespace
 
 double scatter_limit(double usual_most, std::size_t experiments) {
@@ -131,6 +143,7 @@ Criticism criticise(const Engine& engine) {
   out.slow_line = slow_line(engine);
   out.channel_line = channel_line(engine.campaign());
   out.swing = swing(engine.campaign());
+  out.slip_swing = swing_of_slip(engine.campaign());
   out.base = scatter_base(engine);
   double law = 0.0, smooth = 0.0;
   for (const Cell& cell : out.cells) {
@@ -159,6 +172,7 @@ Criticism criticise(const Engine& engine) {
       {"slow_line", out.slow_line.excess, kSlowLine},
       {"channel_line", out.channel_line.excess, kChannelLine},
       {"torque_swing", out.swing.excess, kSwing},
+      {"slip_swing", out.slip_swing.excess, kSlipSwing},
       {"belt_passage", belt_line(engine.campaign(), out.belt_Hz), kBeltLine},
       {"whiteness", redness(engine), -std::log10(kWhiteness)},
       {"scatter_friction", ratio.friction, limit(kScatterFriction, kUsualMostFriction)},
@@ -234,8 +248,10 @@ Unexplained what_is_left(const Criticism& criticism, bool has_balance) {
     out.is_belt = true;
     return out;
   }
-  if (fails("channel_line") || fails("torque_swing")) {
-    const SpectralLine& line = fails("channel_line") ? criticism.channel_line : criticism.swing;
+  if (fails("channel_line") || fails("torque_swing") || fails("slip_swing")) {
+    const SpectralLine& line = fails("channel_line")   ? criticism.channel_line
+                               : fails("torque_swing") ? criticism.swing
+                                                       : criticism.slip_swing;
     out = {line.acts_on, {}, line.share, MisfitKind::kLine, line.frequency_Hz};
     return out;
   }

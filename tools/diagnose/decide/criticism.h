@@ -23,7 +23,7 @@ struct JudgedTest {
 struct Criticism {
   std::vector<Cell> cells;  // the best first
   std::optional<Cell> own;  // of those that follow the same as a named effect, the best
-  SpectralLine line, slow_line, channel_line, swing;
+  SpectralLine line, slow_line, channel_line, swing, slip_swing;
   double belt_Hz = 0.0;  // of the belt's passage, mean
   ScatterBase base;
   std::vector<JudgedTest> tests;

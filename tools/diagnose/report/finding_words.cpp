@@ -163,6 +163,7 @@ std::string_view words_of_test(std::string_view test) {
       TestWords{"slow_line", "a swing between 0.2 and 0.7 Hz, sigmas"},
       TestWords{"channel_line", "a line in a torque as it was sampled, times the level about it"},
       TestWords{"torque_swing", "a shaft that swings, sigmas"},
+      TestWords{"slip_swing", "a swing of one speed that the other does not make, sigmas"},
       TestWords{"belt_passage", "a line at the belt's passage, sigmas"},
       TestWords{"whiteness", "samples that follow from those before, decades of chance"},
       TestWords{"scatter_friction",
