@@ -36,7 +36,7 @@ Hump hump_of(const Swings& swings) {
             5e5 + swings.pressure_Pa * burst + 500.0 * noise(), 50.0};
   });
   const PooledSpectrum torque = pooled_spectrum(table[Role::kPrimaryTorque], kChannelMost_Hz);
-  return slip_swing(slip_spectra(table), torque, {});
+  return slip_swing(slip_spectra(table, 0.0), torque, {});
 }
 
 TEST(SlipSwing, IsOfOneSpeedAlone) {
@@ -61,6 +61,24 @@ TEST(SlipSwing, IsNoneOfWhatThePressureDrives) {
 // The secondary shaft turns 9.7 times a second.
 TEST(SlipSwing, IsNoRippleOncePerRevolution) {
   EXPECT_EQ(hump_of({.secondary = 5e-4, .ratio = kTurn * kSwing_Hz / kPrimary_rad_s}).excess, 0.0);
+}
+
+// Neither the last digits of a number nor the stairs of a reading without noise, which climb 1.7
+// and 2.4 of their steps a second.
+TEST(SlipSwing, IsNoneOfWhatRoundingLeaves) {
+  constexpr double kStep_rad_s = 0.05, kHeld_Pa = 3e5, kHeld_Nm = 50.0;
+  const auto excess = [](double rise_1_s, double step_rad_s) {
+    const auto read = [&](double omega_rad_s) {
+      return step_rad_s > 0.0 ? step_rad_s * std::round(omega_rad_s / step_rad_s) : omega_rad_s;
+    };
+    const SignalTable table = rig_table(12000, 0.01, [&](double t_s) -> RigSample {
+      return {read(kPrimary_rad_s + 1.7 * rise_1_s * t_s), read(270.0 + 2.4 * rise_1_s * t_s),
+              kHeld_Pa, kHeld_Nm};
+    });
+    return slip_swing(prepare(table, {}).slip_spectra, {}, {}).excess;
+  };
+  EXPECT_LT(excess(0.0, 0.0), thresholds::kSlipSwing);
+  EXPECT_LT(excess(kStep_rad_s, kStep_rad_s), thresholds::kSlipSwing);
 }
 
 // Of a reading of the primary speed that is shaken: nothing of the machine is wrong.

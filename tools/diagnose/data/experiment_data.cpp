@@ -630,7 +630,7 @@ void add_lines(const SignalTable& table, const estimator::VariatorParameters& va
   data.torque_s_spectrum = pooled_spectrum(table[Role::kSecondaryTorque], kChannelMost_Hz);
   data.unbalanced_spectrum =
       pooled_spectrum(unbalanced_torque(table, variator, data.torque_is_engine), kSwingMost_Hz);
-  data.slip_spectra = slip_spectra(table);
+  data.slip_spectra = slip_spectra(table, data.rounding_slip_share);
 }
 
 // Samples at which the pressure or a torque rests on its bound.

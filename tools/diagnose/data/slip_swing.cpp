@@ -18,6 +18,9 @@ constexpr std::size_t kDrivesAround = 2;  // chosen, in PooledSpectrum::kStep_Hz
 // Derived, in power: what both shafts do leaves in their difference what they do within the time
 // between the two readings: of a swing at kSwingMost_Hz a third in amplitude at 4 ms.
 constexpr double kShared = 0.1;
+// Chosen, one sigma of the slip: no two speeds are read better. A fifth less or more decides only
+// where they are read without any noise.
+constexpr double kNoiseLeast_share = 2e-6;
 
 // Where a ripple of the shaft shows at this sample rate.
 double folded_Hz(double omega_rad_s, double rate_Hz) {
@@ -34,7 +37,7 @@ void SlipSpectra::add(const SlipSpectra& other) {
   pressure.add(other.pressure);
 }
 
-SlipSpectra slip_spectra(const SignalTable& table) {
+SlipSpectra slip_spectra(const SignalTable& table, double rounding_share) {
   SlipSpectra out;
   const Channel& primary = table[Role::kPrimarySpeed];
   const Channel& secondary = table[Role::kSecondarySpeed];
@@ -66,6 +69,12 @@ SlipSpectra slip_spectra(const SignalTable& table) {
     }
   }
   if (!slip.empty()) end_stretch();
+  // Derived, of Hann's window: white noise has 3/8 of its variance at each step of a piece, a swing
+  // an eighth for each sample at its own step and a quarter of that on either side.
+  const double samples = 1.0 / (PooledSpectrum::kStep_Hz * period_s);
+  const double least = 0.375 * kNoiseLeast_share * kNoiseLeast_share +
+                       rounding_share * rounding_share * samples / 16.0;
+  for (double& power : out.slip.power) power += least * out.slip.pieces;
   out.pressure = pooled_spectrum(table[Role::kSecondaryPressure], kSwingMost_Hz);
   return out;
 }

@@ -15,7 +15,9 @@ struct SlipSpectra {
 };
 // Where no shaft turns so that its own ripple would lie, folded back or not, among what is looked
 // at: that is a line once per revolution (order_lines.h).
-SlipSpectra slip_spectra(const SignalTable& table);
+// rounding_share: one sigma of what rounding leaves in the slip where the readings rest
+// (ExperimentData); as if all of it were one swing, that much counts as noise everywhere.
+SlipSpectra slip_spectra(const SignalTable& table, double rounding_share);
 
 // The strongest swing that nothing recorded drives.
 Hump slip_swing(const SlipSpectra& spectra, const PooledSpectrum& torque,
