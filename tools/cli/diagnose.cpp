@@ -41,6 +41,7 @@ struct Loaded {
   daemon::Config config;
   diagnose::Accuracies stated;  // of the sensors
   std::vector<daemon::AssumedAccuracy> assumed;
+  estimator::ConstantSet assumed_constants;
 };
 
 Loaded load(const DiagnoseOptions& options) {
@@ -55,7 +56,7 @@ Loaded load(const DiagnoseOptions& options) {
     }
     throw Failure{result.exit_code(), result.errors.back().text};
   }
-  return {*result.config, result.stated, result.assumed};
+  return {*result.config, result.stated, result.assumed, result.left_out};
 }
 
 diagnose::SignalTable read(const std::string& path, const daemon::Config& config) {
@@ -125,7 +126,7 @@ std::string today() { return utc(static_cast<double>(std::time(nullptr))).substr
 
 void run_diagnose(const DiagnoseOptions& options) {
   end_in_good_order();
-  const auto [config, stated, assumed] = load(options);
+  const auto [config, stated, assumed, assumed_constants] = load(options);
   diagnose::Request request;
   daemon::ModelFile before = diagnose::nominal_model(config.variator);
   if (!options.model.empty()) {
@@ -138,6 +139,7 @@ void run_diagnose(const DiagnoseOptions& options) {
   request.model = before;
   request.accuracies = stated;
   request.assumed = assumed;
+  if (options.model.empty()) request.assumed_constants = assumed_constants;
   request.is_model_given = !options.model.empty();
   Inputs inputs(options.logs);
   inputs.add(options.held_out);

@@ -520,6 +520,23 @@ TEST_F(Diagnose, AChannelThatSomeExperimentsLackHidesNothing) {
   EXPECT_NE(notes(result).find("no oil_temperature"), std::string::npos) << notes(result);
 }
 
+// With its value: a finding may be no more than that. Not what these experiments do not rest on,
+// the radius of an end stop that none is at and an inertia behind the torque's sensor.
+TEST_F(Diagnose, WhatTheConfigurationLeavesOutIsListedAsAssumed) {
+  blind::Trial trial = rig(3);
+  for (blind::PlannedRun& each : trial.plan) each.low = false;
+  const auto tables = write(record(trial).csv);
+  place_.write("told.toml",
+               "[variator]\nprimary_radius_overdrive_m = 0.0784\n"
+               "secondary_piston_area_m2 = 0.0113\nsecondary_spring_force_N = 500\n");
+  EXPECT_NE(notes(answer(tables, "told.toml"))
+                .find("assumed, since nobody told: variator.secondary_centrifugal_N_s2 = 0\""),
+            std::string::npos);
+  const std::string told = place_.read("told.toml") + "secondary_centrifugal_N_s2 = 0\n";
+  place_.write("told.toml", told);
+  EXPECT_EQ(notes(answer(tables, "told.toml")).find("nobody told"), std::string::npos);
+}
+
 // Written anew with fewer digits and another time: still no replicate.
 TEST_F(Diagnose, ACopyWithOtherDigitsIsNoReplicate) {
   const auto table = record(rig(1)).csv[0];

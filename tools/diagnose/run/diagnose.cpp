@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/physics/assumed_constants.h"
 #include "estimator/physics/clamp_force.h"
 #include "estimator/statistics/distributions.h"
 #include "estimator/statistics/interval.h"
@@ -118,14 +119,35 @@ class Run {
     if (request_.progress) request_.progress(share, what);
   }
 
-  // What nobody told of a sensor that these data come from.
+  // What nobody told of the machine, or of a sensor, that these data come from.
   void note_assumed(const std::vector<ExperimentData>& runs) {
     std::string all;
+    const auto add = [&](const std::string& key, double value) {
+      all += (all.empty() ? "" : ", ") + key + " = " + text_of(value);
+    };
+    const auto is_used = [&](EndStopIndex stop) {
+      return std::any_of(runs.begin(), runs.end(), [&](const ExperimentData& run) {
+        return std::find(run.stop.begin(), run.stop.end(), stop) != run.stop.end();
+      });
+    };
+    const auto counts = [&](estimator::Constant constant) {
+      if (!estimator::has(request_.assumed_constants, constant)) return false;
+      using enum estimator::Constant;
+      if (constant == kPrimaryInertia) return runs.front().torque_is_engine;
+      if (constant == kRadiusOverdrive) return is_used(kOverdriveStop);
+      if (constant == kRadiusLow) return is_used(kLowStop);
+      return true;
+    };
+    for (std::size_t i = 0; i < estimator::kConstantCount; ++i) {
+      if (!counts(static_cast<estimator::Constant>(i))) continue;
+      const estimator::Assumption& each = estimator::assumptions()[i];
+      add("variator." + std::string(each.key), request_.model.variator.*each.value);
+    }
     for (const daemon::AssumedAccuracy& each : request_.assumed) {
       const bool is_torque = each.role == Role::kEngineTorque || each.role == Role::kPrimaryTorque;
       const bool is_engine = each.role == Role::kEngineTorque;
       if (is_torque && is_engine != runs.front().torque_is_engine) continue;
-      all += (all.empty() ? "" : ", ") + each.key + " = " + text_of(each.value);
+      add(each.key, each.value);
     }
     if (!all.empty()) out().notes.push_back("assumed, since nobody told: " + all);
   }

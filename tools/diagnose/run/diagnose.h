@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/physics/assumed_constants.h"
 #include "tools/diagnose/data/diagnosis.h"
 #include "tools/diagnose/data/signal_table.h"
 #include "tools/diagnose/model/model_file.h"
@@ -19,6 +20,7 @@ struct Request {
   bool is_model_given = false;                   // else it is the usual machine
   Accuracies accuracies{};                       // what is known of the sensors'
   std::vector<daemon::AssumedAccuracy> assumed;  // of these, what nobody told
+  estimator::ConstantSet assumed_constants;      // of the machine's, the same
   bool with_plots = false;
   int jobs = 1;                // threads; the answer is the same for every number
   std::function<bool()> stop;  // true: end with what is known

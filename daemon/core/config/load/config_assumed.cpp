@@ -6,11 +6,9 @@ namespace beltgrip::daemon {
 
 namespace {
 
-void assume_constants(const TomlNode& root, const std::vector<std::string>& model_keys,
-                      Config& config) {
+void assume_constants(const estimator::ConstantSet& left_out, Config& config) {
   using estimator::Constant;
   using estimator::RatioChoice;
-  const TomlNode* stated = section_of(root, "variator");
   const auto is_needed = [&](Constant constant) {
     switch (constant) {
       case Constant::kRadiusOverdrive:
@@ -24,13 +22,9 @@ void assume_constants(const TomlNode& root, const std::vector<std::string>& mode
     }
   };
   for (std::size_t i = 0; i < estimator::kConstantCount; ++i) {
-    const estimator::Assumption& each = estimator::assumptions()[i];
-    const bool in_model =
-        std::find(model_keys.begin(), model_keys.end(), each.key) != model_keys.end();
-    const bool in_file = stated != nullptr && stated->find(each.key) != nullptr;
-    if (in_model || in_file || !is_needed(static_cast<Constant>(i))) continue;
+    if (!left_out.test(i) || !is_needed(static_cast<Constant>(i))) continue;
     config.assumed_constants.set(i);
-    config.assumed.push_back(key_of("variator", each.key));
+    config.assumed.push_back(key_of("variator", estimator::assumptions()[i].key));
     config.friction_is_assumed = true;
   }
 }
@@ -70,9 +64,21 @@ void assume_accuracy(Role role, bool decides, SensorText& sensor, Config& config
 
 }  // namespace
 
-void assume(const TomlNode& root, const std::vector<std::string>& model_keys, SensorTexts& sensors,
-            Config& config) {
-  assume_constants(root, model_keys, config);
+estimator::ConstantSet left_out_constants(const TomlNode& root,
+                                          const std::vector<std::string>& model_keys) {
+  const TomlNode* stated = section_of(root, "variator");
+  estimator::ConstantSet out;
+  for (std::size_t i = 0; i < estimator::kConstantCount; ++i) {
+    const std::string_view key = estimator::assumptions()[i].key;
+    const bool in_model = std::find(model_keys.begin(), model_keys.end(), key) != model_keys.end();
+    const bool in_file = stated != nullptr && stated->find(key) != nullptr;
+    out.set(i, !in_model && !in_file);
+  }
+  return out;
+}
+
+void assume(const estimator::ConstantSet& left_out, SensorTexts& sensors, Config& config) {
+  assume_constants(left_out, config);
   const auto accuracy = [&](Role role, bool decides) {
     assume_accuracy(role, decides, sensors[static_cast<std::size_t>(role)], config);
   };

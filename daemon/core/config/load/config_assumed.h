@@ -15,8 +15,9 @@ namespace beltgrip::daemon {
 using SensorTexts = std::array<SensorText, kRoleCount>;  // by role
 
 // `model_keys`: of [variator], that the model file states.
-void assume(const TomlNode& root, const std::vector<std::string>& model_keys, SensorTexts& sensors,
-            Config& config);
+estimator::ConstantSet left_out_constants(const TomlNode& root,
+                                          const std::vector<std::string>& model_keys);
+void assume(const estimator::ConstantSet& left_out, SensorTexts& sensors, Config& config);
 // The same for who reads no more than what [sensors] states: of a sensor that it leaves out beside
 // others.
 void assume_beside(const SensorTexts& sensors, ConfigResult& result);

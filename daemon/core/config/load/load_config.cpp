@@ -83,7 +83,8 @@ void Loader::load(ConfigScope scope) {
     result_.stated[i] = accuracy(static_cast<Role>(i));
   }
   assume_beside(sensors_, result_);
-  if (scope == ConfigScope::kAll) assume(root_, model_keys_, sensors_, config_);
+  result_.left_out = left_out_constants(root_, model_keys_);
+  if (scope == ConfigScope::kAll) assume(result_.left_out, sensors_, config_);
   settle_sensors();
   result_.config = std::move(config_);
 }

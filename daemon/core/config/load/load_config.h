@@ -20,6 +20,7 @@ struct ConfigResult {
   // where it states nothing at all, all is 0.
   std::array<estimator::ChannelAccuracy, kRoleCount> stated{};
   std::vector<AssumedAccuracy> assumed;
+  estimator::ConstantSet left_out;  // of [variator], in any scope
 
   int exit_code() const { return errors.empty() ? 0 : errors.front().exit_code; }
 };
