@@ -84,22 +84,16 @@ TEST(OwnShape, AloneIsToldAsWhatItFollows) {
   EXPECT_EQ(told.kind, MisfitKind::kFunction);
 }
 
-TEST(TorqueSwing, IsToldAsALine) {
-  Criticism left = failing({"torque_swing"});
-  left.swing = {"torque", 3.25, 10.0, 0.1};
-  const Unexplained told = what_is_left(left, true);
-  EXPECT_EQ(told.kind, MisfitKind::kLine);
-  EXPECT_EQ(told.acts_on, "torque");
-  EXPECT_EQ(told.frequency_Hz, 3.25);
-}
-
-TEST(SwingOfTheSlip, IsToldAsALine) {
-  Criticism left = failing({"slip_swing"});
-  left.slip_swing = {"ratio", 9.75, 10.0, 0.1};
-  const Unexplained told = what_is_left(left, true);
-  EXPECT_EQ(told.kind, MisfitKind::kLine);
-  EXPECT_EQ(told.acts_on, "ratio");
-  EXPECT_EQ(told.frequency_Hz, 9.75);
+TEST(Swing, IsToldAsALine) {
+  Criticism torque = failing({"torque_swing"}), slip = failing({"slip_swing"});
+  torque.swing = {"torque", 3.25, 10.0, 0.1};
+  slip.slip_swing = {"ratio", 9.75, 10.0, 0.1};
+  for (const auto& [left, line] : {std::pair{torque, torque.swing}, {slip, slip.slip_swing}}) {
+    const Unexplained told = what_is_left(left, true);
+    EXPECT_EQ(told.kind, MisfitKind::kLine);
+    EXPECT_EQ(told.acts_on, line.acts_on);
+    EXPECT_EQ(told.frequency_Hz, line.frequency_Hz);
+  }
 }
 
 TEST(RepeatsWithin, WhatFollowsAVariableThatChangesInEachExperiment) {

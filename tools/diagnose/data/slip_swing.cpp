@@ -14,7 +14,7 @@ constexpr double kBeyond_Hz = 2.0;
 // Chosen, sigmas of a hump in a torque or in the pressure: what swings there moves the slip too,
 // and the machine answers as it should.
 constexpr double kDrivesSigmas = 2.5;
-constexpr std::size_t kDrivesAround = 2;  // chosen, in PooledSpectrum::kStep_Hz
+constexpr std::size_t kDrivesAround = 2;  // chosen, in PooledSpectrum::kStep_Hz; not varied
 // Derived, in power: what both shafts do leaves in their difference what they do within the time
 // between the two readings: of a swing at kSwingMost_Hz a third in amplitude at 4 ms.
 constexpr double kShared = 0.1;
