@@ -33,6 +33,18 @@ TEST(FindingWords, HaveTheSizeWithItsUnitAndNoMoreDigitsThanItKnows) {
             "a drag that grows with the clamp force, 0.5 (0.4 to 0.8) Nm/kN (torque_loss)");
 }
 
+TEST(FindingWords, HaveNoExponentThatNobodyReads) {
+  Finding spring;
+  spring.effect = "spring_force";
+  spring.parameters["force_N"] = {360.0, 250.0, 470.0};
+  EXPECT_EQ(in_words(spring),
+            "a spring that is stronger than configured by 360 +- 110 N (spring_force)");
+  EXPECT_EQ(readable(-1.2345e5, 2), "-120000");
+  EXPECT_EQ(readable(999.6, 3), "1000");
+  EXPECT_EQ(readable(3e-7, 2), "3e-07");
+  EXPECT_EQ(readable(4.2e7, 2), "4.2e+07");
+}
+
 TEST(FindingWords, NameAFileInPlaceOfAnIndex) {
   Finding worn;
   worn.effect = "wear";

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <iterator>
 #include <utility>
 
+#include "can_dbc/text/number_text.h"
 #include "estimator/physics/machine_effects.h"
 
 namespace beltgrip::diagnose {
@@ -117,12 +117,6 @@ const Words* row_of(std::string_view effect, std::string_view parameter) {
   return found == std::end(kWords) ? nullptr : &*found;
 }
 
-std::string rounded(double value, int digits) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.*g", digits, value);
-  return buffer;
-}
-
 // A value to the place of the second digit of its half width.
 std::string size_of(const Interval& size) {
   const double half = 0.5 * (size.high - size.low);
@@ -133,12 +127,20 @@ std::string size_of(const Interval& size) {
     digits = std::clamp(static_cast<int>(places) + 2, 2, 9);
   }
   const bool even = std::abs(size.high + size.low - 2.0 * size.value) < 0.1 * half;
-  return even ? rounded(size.value, digits) + " +- " + rounded(half, 2)
-              : rounded(size.value, digits) + " (" + rounded(size.low, digits) + " to " +
-                    rounded(size.high, digits) + ")";
+  return even ? readable(size.value, digits) + " +- " + readable(half, 2)
+              : readable(size.value, digits) + " (" + readable(size.low, digits) + " to " +
+                    readable(size.high, digits) + ")";
 }
 
 }  // namespace
+
+std::string readable(double value, int digits) {
+  constexpr double kReadable = 1e6;  // chosen: longer ones are counted, not read; decides no more
+  const std::string text = rounded_text(value, digits);
+  if (text.find("e+") == std::string::npos || !(std::abs(value) < kReadable)) return text;
+  const double last = std::pow(10.0, std::floor(std::log10(std::abs(value))) + 1.0 - digits);
+  return fixed_text(last * std::round(value / last), 0);
+}
 
 std::string words_of(std::string_view effect, std::string_view parameter, double size) {
   const Words* const row = row_of(effect, parameter);
@@ -188,7 +190,7 @@ Display display_of(std::string_view what) {
 
 std::string told(std::string_view what, double value, int digits) {
   const Display shown = display_of(what);
-  return rounded(value * shown.per_SI, digits) +
+  return readable(value * shown.per_SI, digits) +
          (shown.unit.empty() ? "" : " " + std::string(shown.unit));
 }
 
@@ -196,7 +198,7 @@ std::string told_change(std::string_view what, double before, double after, doub
                         double high) {
   const Display shown = display_of(what);
   constexpr int kDigits = 4;
-  const auto text = [&](double value) { return rounded(value * shown.per_SI, kDigits); };
+  const auto text = [&](double value) { return readable(value * shown.per_SI, kDigits); };
   return text(before) + " -> " + text(after) + " [" + text(low) + ", " + text(high) + "]" +
          (shown.unit.empty() ? "" : " " + std::string(shown.unit));
 }

@@ -8,6 +8,8 @@
 
 namespace beltgrip::diagnose {
 
+// With so many digits, and without an exponent where that is only large: "360" of 3.6e+02.
+std::string readable(double value, int digits);
 // What one parameter of one effect is, with an article, of a size of that sign; empty: the table
 // has none.
 std::string words_of(std::string_view effect, std::string_view parameter, double size);

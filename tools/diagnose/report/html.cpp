@@ -138,14 +138,14 @@ void add_tests(report::HtmlPage& page, const Diagnosis& d) {
       std::vector<std::string>& row = cells[test];
       row.resize(head.size() - 1);
       const bool fails = all.fails(p);
-      row.push_back((fails ? "fails, p " : "p ") + (p < kShown ? "< 1e-12" : short_number(p)));
+      row.push_back((fails ? "fails, p " : "p ") + (p < kShown ? "< 1e-12" : readable(p, 2)));
       if (fails) ++failed;
     }
     head.push_back(name);
   }
-  const std::string least = "p " + short_number(all.least_p) + ", the smallest of " +
+  const std::string least = "p " + readable(all.least_p, 2) + ", the smallest of " +
                             std::to_string(all.count) + ", chance gives in " +
-                            short_number(100.0 * all.by_chance(all.least_p)) +
+                            readable(100.0 * all.by_chance(all.least_p), 2) +
                             " % of healthy campaigns";
   page.paragraph(
       "The scatter between experiments of a healthy machine lies beyond the noise, too. Tests of "
@@ -174,7 +174,7 @@ void add_left(report::HtmlPage& page, const Diagnosis& d) {
     const bool fails = left.value > left.limit;
     (fails ? fail : pass)
         .push_back({std::string(words_of_test(test)), fails ? "fails" : "passes",
-                    short_number(left.value), short_number(left.limit)});
+                    readable(left.value, 2), readable(left.limit, 2)});
   }
   page.paragraph((fail.empty() ? "None" : std::to_string(fail.size())) + " of " +
                  std::to_string(d.left.size()) +

@@ -312,12 +312,6 @@ std::string json_text(const Diagnosis& d) {
   return json.take() + "\n";
 }
 
-std::string short_number(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.2g", value);
-  return buffer;
-}
-
 std::string verdict_line(const Diagnosis& d) {
   std::string what;
   switch (d.verdict) {

@@ -28,5 +28,4 @@ inline constexpr std::array<RerunFigure, 3> kRerunFigures{
      {"min_clamp_force_N", "MinClampForce, N", &Measured::min_clamp_force_N}}};
 std::string figure_text(const Rerun& rerun, const RerunFigure& figure);  // "before -> after"
 
-std::string short_number(double value);  // two digits
 }  // namespace beltgrip::diagnose
