@@ -136,7 +136,7 @@ std::string size_of(const Interval& size) {
 
 std::string readable(double value, int digits) {
   constexpr double kReadable = 1e6;  // chosen: longer ones are counted, not read; decides no more
-  const std::string text = rounded_text(value, digits);
+  std::string text = rounded_text(value, digits);
   if (text.find("e+") == std::string::npos || !(std::abs(value) < kReadable)) return text;
   const double last = std::pow(10.0, std::floor(std::log10(std::abs(value))) + 1.0 - digits);
   return fixed_text(last * std::round(value / last), 0);
