@@ -96,6 +96,41 @@ TEST(Swing, IsToldAsALine) {
   }
 }
 
+// Twelve experiments, warmer from one to the next, of which the friction differs by so much.
+Criticism scattered(const std::vector<double>& friction) {
+  Cell warmer = cell(Injection::kFriction, "oil_temperature", 20.0, 0.0, 1.0);
+  warmer.abscissa.x.clear();
+  warmer.abscissa.mean.clear();
+  Criticism out = failing({"unusual_friction"});
+  for (std::size_t e = 0; e < friction.size(); ++e) {
+    const double place = static_cast<double>(e) / static_cast<double>(friction.size() - 1);
+    warmer.abscissa.x.push_back(Eigen::ArrayXd::Constant(4, place));
+    warmer.abscissa.mean.push_back(30.0 + 60.0 * place);
+    out.offsets.push_back(RandomVector::Zero());
+    out.offsets.back()[0] = friction[e];
+  }
+  warmer.abscissa.low = 30.0;
+  warmer.abscissa.high = 90.0;
+  out.cells.push_back(warmer);
+  return out;
+}
+
+// By von Neumann's own definition: of 1, 2, 3 half the squares of what neighbours differ by are 1,
+// the squares about the mean 2.
+TEST(ScatterBetween, FollowsWhatNeighboursAlongItAreAlikeBy) {
+  const Criticism three = scattered({1.0, 2.0, 3.0});
+  EXPECT_NEAR(unlikeness(three.cells.front(), three.offsets, 0), 0.5, 1e-12);
+  const Criticism level = scattered({1.0, 1.0, 1.0});
+  EXPECT_EQ(unlikeness(level.cells.front(), level.offsets, 0), 1.0);
+  const std::vector<double> grows{-5.0, -4.0, -3.0, -2.5, -1.0, 0.0, 0.5, 1.5, 2.0, 3.0, 4.0, 5.0};
+  EXPECT_EQ(what_is_left(scattered(grows), true).depends_on,
+            std::vector<std::string>{"oil_temperature"});
+  const std::vector<double> jumps{-5.0, 3.0, -1.0, 0.5, 4.0, -2.5, 5.0, -4.0, 2.0, -3.0, 1.5, 0.0};
+  const Unexplained told = what_is_left(scattered(jumps), true);
+  EXPECT_TRUE(told.depends_on.empty());
+  EXPECT_EQ(told.kind, MisfitKind::kBetweenRuns);
+}
+
 TEST(RepeatsWithin, WhatFollowsAVariableThatChangesInEachExperiment) {
   const Cell within = cell(Injection::kRatio, "time", 900.0, 0.5, 0.5);
   const Cell between = cell(Injection::kFriction, "oil_temperature", 900.0, 0.1, 0.9);

@@ -145,6 +145,7 @@ Criticism criticise(const Engine& engine) {
   out.swing = swing(engine.campaign());
   out.slip_swing = swing_of_slip(engine.campaign());
   out.base = scatter_base(engine);
+  out.offsets = engine.offsets();
   double law = 0.0, smooth = 0.0;
   for (const Cell& cell : out.cells) {
     if (cell.is_told_by_form) continue;
@@ -238,6 +239,45 @@ bool may_be_scatter(const Cell& cell, const Criticism& criticism, bool has_balan
   return false;
 }
 
+double unlikeness(const Cell& cell, const std::vector<RandomVector>& offsets, Eigen::Index random) {
+  std::vector<std::pair<double, double>> by_mean;
+  for (std::size_t e = 0; e < cell.abscissa.x.size() && by_mean.size() < offsets.size(); ++e) {
+    if (cell.abscissa.x[e].size() == 0) continue;
+    by_mean.emplace_back(cell.abscissa.mean[e], offsets[by_mean.size()][random]);
+  }
+  std::sort(by_mean.begin(), by_mean.end());
+  double mean = 0.0, variance = 0.0, apart = 0.0;
+  for (const auto& [x, off] : by_mean) mean += off / static_cast<double>(by_mean.size());
+  for (std::size_t i = 0; i < by_mean.size(); ++i) {
+    variance += std::pow(by_mean[i].second - mean, 2.0);
+    if (i > 0) apart += 0.5 * std::pow(by_mean[i].second - by_mean[i - 1].second, 2.0);
+  }
+  return variance > 0.0 ? apart / variance : 1.0;
+}
+
+namespace {
+
+// Of what scatters too much, neighbours are more alike than those of a scatter are.
+bool is_followed(const Cell& cell, const Criticism& criticism) {
+  const auto fails = [&](const char* name) { return !criticism.test(name).passed(); };
+  const bool any = fails("unusual_scatter");  // does not say of what
+  const std::array<bool, 3> scatters{any || fails("scatter_friction") || fails("unusual_friction"),
+                                     fails("scatter_ratio") || fails("unusual_ratio"),
+                                     any || fails("scatter_torque")};
+  const auto n = static_cast<double>(criticism.offsets.size());
+  const double sigma = std::sqrt(std::max(n - 2.0, 0.0) / std::max(n * n - 1.0, 1.0));
+  for (std::size_t random = 0; random < scatters.size(); ++random) {
+    const auto of = static_cast<Eigen::Index>(random);
+    if (scatters[random] &&
+        unlikeness(cell, criticism.offsets, of) < 1.0 - thresholds::kAlikeSigmas * sigma) {
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
 Unexplained what_is_left(const Criticism& criticism, bool has_balance) {
   const auto fails = [&](const char* name) { return !criticism.test(name).passed(); };
   Unexplained out;
@@ -276,9 +316,10 @@ Unexplained what_is_left(const Criticism& criticism, bool has_balance) {
                         fails("unusual_ratio") || fails("unusual_friction");
   const bool stands_out = fails("law_cell") || fails("smooth_cell");
   if (!stands_out) {
-    const auto found = std::find_if(
-        criticism.cells.begin(), criticism.cells.end(),
-        [&](const Cell& cell) { return may_be_scatter(cell, criticism, has_balance); });
+    const auto found =
+        std::find_if(criticism.cells.begin(), criticism.cells.end(), [&](const Cell& cell) {
+          return may_be_scatter(cell, criticism, has_balance) && is_followed(cell, criticism);
+        });
     best = found == criticism.cells.end() ? nullptr : &*found;
   }
   if (!stands_out && best == nullptr && criticism.own && fails("own_shape")) best = &*criticism.own;

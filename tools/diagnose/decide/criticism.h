@@ -26,6 +26,8 @@ struct Criticism {
   SpectralLine line, slow_line, channel_line, swing, slip_swing;
   double belt_Hz = 0.0;  // of the belt's passage, mean
   ScatterBase base;
+  // Of each experiment with valid samples: friction (share), ratio (share), torque (Nm) and so on.
+  std::vector<RandomVector> offsets;
   std::vector<JudgedTest> tests;
   bool passed() const;
   const JudgedTest& test(const std::string& name) const;
@@ -50,6 +52,10 @@ bool repeats_within(const Criticism& criticism);
 // Where the scatter between experiments fails: the cell may be what it is, for it acts where they
 // scatter, and what it follows differs between them rather than within.
 bool may_be_scatter(const Cell& cell, const Criticism& criticism, bool has_balance);
+// Von Neumann's ratio of what the experiments differ by in that random effect, in the order of what
+// the cell follows: half the mean square of what neighbours differ by, over the variance. About 1
+// where it follows nothing, near 0 where it is a function.
+double unlikeness(const Cell& cell, const std::vector<RandomVector>& offsets, Eigen::Index random);
 
 // What is to be said of residuals that fail.
 Unexplained what_is_left(const Criticism& criticism, bool has_balance);

@@ -23,10 +23,11 @@ struct Kind {
   double usual_most;
 };
 // In the order of the random effects.
-constexpr std::array kKinds{
-    Kind{"scatter_friction", "unusual_friction", true, thresholds::kUsualMostFriction},
-    Kind{"scatter_ratio", "unusual_ratio", false, thresholds::kUsualMostRatio},
-    Kind{"scatter_torque", "", true, thresholds::kUsualMostTorque}};
+std::array<Kind, 3> kinds() {
+  return {Kind{"scatter_friction", "unusual_friction", true, thresholds::kUsualMostFriction},
+          Kind{"scatter_ratio", "unusual_ratio", false, thresholds::kUsualMostRatio},
+          Kind{"scatter_torque", "", true, thresholds::kUsualMostTorque}};
+}
 
 // Variances that a healthy machine may have; of what passes not less than it has, for one takes
 // over what another is denied. Nothing where all pass.
@@ -37,18 +38,19 @@ std::optional<RandomVector> bounds(const Engine& engine, const Criticism& critic
   const Scatter usual = default_scatter();
   const auto runs = static_cast<double>(engine.used().size());
   const ScatterRatios unusual = scatter_ratios(engine, usual);
-  const std::array<double, kKinds.size()> ratio{unusual.friction, unusual.ratio, unusual.torque};
+  const std::array ratio{unusual.friction, unusual.ratio, unusual.torque};
   RandomVector out = engine.first_scatter().most;
   bool any = false;
-  for (std::size_t i = 0; i < kKinds.size(); ++i) {
+  const auto all = kinds();
+  for (std::size_t i = 0; i < all.size(); ++i) {
     const auto kind = static_cast<Eigen::Index>(i);
     const auto within = [&](const Scatter& base) {
-      const double most = kKinds[i].usual_most * kKinds[i].usual_most;
+      const double most = all[i].usual_most * all[i].usual_most;
       return scatter_variance(most * base.variance, runs)[kind];
     };
-    const bool is_unusual = fails(kKinds[i].unusual) || (kKinds[i].is_in_unusual_scatter &&
-                                                         ratio[i] > thresholds::kUnusualScatter);
-    const bool is_more = fails(kKinds[i].over_base);
+    const bool is_unusual = fails(all[i].unusual) || (all[i].is_in_unusual_scatter &&
+                                                      ratio[i] > thresholds::kUnusualScatter);
+    const bool is_more = fails(all[i].over_base);
     any = any || is_more || is_unusual;
     double least = within(usual);
     if (is_more) least = std::min(least, within(criticism.base.scatter));

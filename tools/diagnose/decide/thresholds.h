@@ -17,6 +17,10 @@ inline constexpr double kSmoothCell = 35.0;
 inline constexpr double kOwnShape = 6.0;
 // Of the best cell, where the scatter between experiments is more than it should be.
 inline constexpr double kCellBesideScatter = 9.0;
+// By how much neighbours along it are more alike than in a scatter, sigmas of von Neumann's ratio.
+// Chosen: one of 160 by chance. Where nothing is followed 1.6 at most (three campaigns of eight to
+// thirteen experiments), so that a fifth either way is the same.
+inline constexpr double kAlikeSigmas = 2.5;
 // The order of the experiments is scatter by another name: it has to beat all others by so much.
 inline constexpr double kOrderAhead = 10.0;
 // The strongest line of the residuals, in sigmas of the pooled spectrum.
@@ -44,9 +48,11 @@ inline constexpr double kSlipSwing = 5.0;
 inline constexpr double kLineShare = 0.2;
 // Common p-value of the residuals' autocorrelation.
 inline constexpr double kWhiteness = 1e-9;
-// Of residuals that wander within experiments, rms, by as much as healthy ones differ from each
-// other: less is what sensors do.
-inline constexpr double kWander = 1.0;
+// Of residuals that wander within experiments, rms, in what healthy ones differ by from each other:
+// less is what sensors do. Between 0.6, the most of healthy ones (200 of other make, 0.32 in 100 of
+// the blind test's), and 1.0, the least that is there (a ratio that creeps; 1.1 to 3 where a delay
+// or a zero drifts).
+inline constexpr double kWander = 0.7;
 // Scatter between experiments over that of replicates, standard deviations, where many tell it.
 inline constexpr double kScatterFriction = 2.2;
 inline constexpr double kScatterRatio = 3.3;
