@@ -74,6 +74,19 @@ TEST(ModelFile, WhatIsWrongWithALearnedTermIsNamed) {
             "values, covariance, box or law; nearest is \"knots\"");
 }
 
+// A force of the turning oil that is 5e-4 less than its maker states: the file says it, and a fit
+// from it begins there.
+TEST(ModelFile, HoldsTheForceOfTheTurningOilThatWasFitted) {
+  estimator::VariatorParameters variator;
+  variator.secondary_centrifugal_N_s2 = 8e-3;
+  ModelFile model = nominal_model(variator);
+  Eigen::VectorXd nuisance = Eigen::VectorXd::Zero(kNuisanceCount);
+  nuisance[kCentrifugalOff_N_s2] = -5e-4;
+  store_machine(nuisance, model);
+  EXPECT_NEAR(model.variator.secondary_centrifugal_N_s2, 7.5e-3, 1e-15);
+  EXPECT_EQ(nuisances_of(model)[kCentrifugalOff_N_s2].nominal, 0.0);
+}
+
 TEST(ModelFile, NominalMachineSurvivesTheWayThroughTheFile) {
   const NuisanceTable direct = default_nuisances();
   const NuisanceTable through = nuisances_of(nominal_model({}));

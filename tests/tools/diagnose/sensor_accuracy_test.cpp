@@ -2,12 +2,14 @@
 // known to. The recordings are the blind generator's.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/tools/diagnose/recorded_runs.h"
 #include "tools/diagnose/decide/namer.h"
 #include "tools/diagnose/infer/peak.h"
 #include "tools/diagnose/infer/uncertainty.h"
+#include "tools/diagnose/run/diagnose.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -95,6 +97,34 @@ TEST(SensorAccuracy, OfThePressureIsAConstantOfTheMachine) {
   constexpr double kOffset_Pa = 40e3;
   EXPECT_NEAR(offset(kOffset_Pa, kOffset_Pa).as_machine_Pa, kOffset_Pa, 0.3 * kOffset_Pa);
   EXPECT_EQ(offset(kOffset_Pa, 0.0).as_machine_Pa, 0.0);
+}
+
+constexpr double kTold_N_s2 = 8e-3;
+
+// A machine whose oil has that share of the force that its maker states.
+Diagnosis with_turning_oil(double share) {
+  blind::Trial trial;
+  trial.seed = 7;
+  blind::Random random(trial.seed);
+  trial.plan = blind::draw_plan(random, trial.machine.setting, 10);
+  trial.planted.push_back({"centrifugal_force", {{"coefficient_N_s2", share * kTold_N_s2}}, {}});
+  Request request = request_of(trial);
+  request.model.variator.secondary_centrifugal_N_s2 = kTold_N_s2;
+  return diagnose(std::move(request)).diagnosis;
+}
+
+// A few hundredths are what makers' values are off by; a half is a cause.
+TEST(MakersValue, OfTheTurningOilIsNoGainOfThePressure) {
+  const Diagnosis nearly = with_turning_oil(0.94);
+  EXPECT_EQ(nearly.verdict, Verdict::kNothingWrong);
+  EXPECT_NEAR(nearly.machine.at("secondary_centrifugal_off_N_s2").value, -0.06 * kTold_N_s2,
+              0.03 * kTold_N_s2);
+  EXPECT_TRUE(std::any_of(nearly.notes.begin(), nearly.notes.end(), [](const std::string& note) {
+    return note.starts_with("secondary_centrifugal_N_s2: 0.008 as told, 0.007");
+  }));
+  const Diagnosis half = with_turning_oil(0.5);
+  ASSERT_FALSE(half.findings.empty());
+  EXPECT_EQ(half.findings.front().effect, "centrifugal_force");
 }
 
 // What one usual scatter of the torque's zero comes to in the first experiment, in sigmas.

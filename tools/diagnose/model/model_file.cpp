@@ -34,7 +34,8 @@ Named to_file(int index, double value) {
 
 // No part of the machine that a model file describes.
 bool is_beside_file(int index) {
-  return index == kSecondaryTorqueGain || index == kPressureBias_Pa || index == kDeformationLost;
+  return index == kSecondaryTorqueGain || index == kPressureBias_Pa ||
+         index == kCentrifugalOff_N_s2 || index == kDeformationLost;
 }
 
 }  // namespace
@@ -86,6 +87,8 @@ void store_machine(const Eigen::VectorXd& nuisance, ModelFile& model) {
     (daemon::is_friction_key(named.name) ? model.friction : model.driveline)[named.name] =
         named.value;
   }
+  // By what the maker states no friction that is fitted beside it would be right.
+  model.variator.secondary_centrifugal_N_s2 += nuisance[kCentrifugalOff_N_s2];
 }
 
 Eigen::VectorXd slot_values(const ModelFile& model, const std::vector<Slot>& slots) {

@@ -19,7 +19,8 @@ using daemon::read_model;
 // The nominal machine without any file: [friction] and [driveline] with their defaults.
 ModelFile nominal_model(const estimator::VariatorParameters& variator);
 
-// The machine's constants of a model as nominal values of a fit, and back.
+// The machine's constants of a model as nominal values of a fit, and back: once, for what the
+// turning oil's force was off by goes into the value that [variator] has.
 NuisanceTable nuisances_of(const ModelFile& model);
 void store_machine(const Eigen::VectorXd& nuisance, ModelFile& model);
 // Values of the slots that a model switches on; an effect that these data cannot carry is left out.

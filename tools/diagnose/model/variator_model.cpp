@@ -68,6 +68,7 @@ NuisanceTable default_nuisances() {
       {"secondary_loss_per_kN_Nm", 0.05, 0.08, 1e-3},
       {"secondary_torque_gain", 0.0, 0.0, 1e-4},
       {"secondary_pressure_bias_Pa", 0.0, 0.0, 10.0},
+      {"secondary_centrifugal_off_N_s2", 0.0, 0.0, 1e-6},
       {"command_offset_Pa", 0.0, 1e5, 10.0},
       {"command_gain", 0.0, 0.1, 1e-4},
   }};
@@ -416,6 +417,9 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
   c.pressure -= nuisance[kPressureBias_Pa];
   apply(Stage::kMeasurement);
   pass.force(c);
+  if (const double off_N_s2 = nuisance[kCentrifugalOff_N_s2]; off_N_s2 != 0.0) {
+    c.force_N += off_N_s2 * c.omega_s.square();
+  }
   apply(Stage::kForce);
   pass.loss(c);
   apply(Stage::kDriveline);

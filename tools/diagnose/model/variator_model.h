@@ -53,6 +53,7 @@ enum Nuisance : int {
   kSecondaryLossPerkN_Nm,
   kSecondaryTorqueGain,  // T_measured = (1 + gain) T_true, as far as the sensors' accuracies go
   kPressureBias_Pa,      // p_measured = p_true + bias, the same
+  kCentrifugalOff_N_s2,  // F_true = F_model + off omega_s^2, as far as a maker's value goes
   kCommandOffset_Pa,     // tracking residual only
   kCommandGain,
   kNuisanceCount

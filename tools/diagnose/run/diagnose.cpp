@@ -403,6 +403,7 @@ class Run {
     }
     fill_machine(engine, naming);
     note_torque_ratio();
+    note_turning_oil(campaign);
     check_fitted_friction(out().machine, implausible_);
     note_implausible();
     fill_baseline(engine, naming);
@@ -625,6 +626,15 @@ class Run {
     out().notes.push_back(
         "the ratio of the torques does not follow pulleys that give way: a share of " +
         text_of(share->second.value) + " of it takes speed alone, as slip does");
+  }
+
+  void note_turning_oil(const Campaign& campaign) {
+    const auto off = out().machine.find("secondary_centrifugal_off_N_s2");
+    if (off == out().machine.end() || off->second.low * off->second.high < 0.0) return;
+    const double told = campaign.variator.secondary_centrifugal_N_s2;
+    out().notes.push_back("secondary_centrifugal_N_s2: " + text_of(told) + " as told, " +
+                          text_of(told + off->second.low) + " to " +
+                          text_of(told + off->second.high) + " by these data");
   }
 
   void no_mu_max(const std::string& why) {
