@@ -182,7 +182,7 @@ double variance_of_pushed(const Engine& engine, const Hypothesis& hypothesis,
   const std::vector<int>& all = engine.active_nuisances();
   std::vector<Index> columns;
   for (std::size_t j = 0; j < all.size(); ++j) {
-    if (all[j] != kPressureBias_Pa && all[j] != kCentrifugalOff_N_s2) continue;
+    if (all[j] != kPressureBias_Pa) continue;
     const NuisanceRow& row = engine.campaign().nuisances[static_cast<std::size_t>(all[j])];
     const double off = hypothesis.state.nuisance[all[j]] - row.nominal;
     if (std::abs(off) > kPushed * row.tolerance) columns.push_back(static_cast<Index>(j));

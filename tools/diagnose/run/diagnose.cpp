@@ -403,7 +403,7 @@ class Run {
     }
     fill_machine(engine, naming);
     note_torque_ratio();
-    note_turning_oil(campaign);
+    tell_turning_oil(engine);
     check_fitted_friction(out().machine, implausible_);
     note_implausible();
     fill_baseline(engine, naming);
@@ -628,13 +628,17 @@ class Run {
         text_of(share->second.value) + " of it takes speed alone, as slip does");
   }
 
-  void note_turning_oil(const Campaign& campaign) {
+  // A gain of the pressure by as much looks the same, and has another friction.
+  void tell_turning_oil(const Engine& engine) {
     const auto off = out().machine.find("secondary_centrifugal_off_N_s2");
     if (off == out().machine.end() || off->second.low * off->second.high < 0.0) return;
-    const double told = campaign.variator.secondary_centrifugal_N_s2;
+    const double told = engine.campaign().variator.secondary_centrifugal_N_s2;
     out().notes.push_back("secondary_centrifugal_N_s2: " + text_of(told) + " as told, " +
                           text_of(told + off->second.low) + " to " +
-                          text_of(told + off->second.high) + " by these data");
+                          text_of(told + off->second.high) +
+                          " by these data, or the pressure has a gain by as much");
+    if (!out().machine.contains("mu_max")) return;
+    widen_mu_max(std::pow(off->second.value / told * share_of_pressure(engine), 2.0));
   }
 
   void no_mu_max(const std::string& why) {
@@ -816,6 +820,14 @@ class Run {
     return std::sqrt(squares / weights);
   }
 
+  // Of the clamp force, about what the pressure makes of it.
+  static double share_of_pressure(const Engine& engine) {
+    const estimator::VariatorParameters& variator = engine.campaign().variator;
+    const double by_pressure_N =
+        variator.secondary_piston_area_m2 * typical(engine, &ExperimentData::pressure);
+    return by_pressure_N / (by_pressure_N + variator.secondary_spring_force_N);
+  }
+
   // What the gains of torque and pressure may have it off by, as far as somebody stated them, one
   // sigma: nothing in these data says more of them. Constant errors are constants of the fit.
   double mu_of_sensors(const Engine& engine) const {
@@ -826,11 +838,7 @@ class Run {
     const bool is_engine = campaign.runs[0].torque_is_engine;
     const auto torque = accuracy(is_engine ? Role::kEngineTorque : Role::kPrimaryTorque);
     const auto pressure = accuracy(Role::kSecondaryPressure);
-    const double by_pressure_N =
-        campaign.variator.secondary_piston_area_m2 * typical(engine, &ExperimentData::pressure);
-    const double by_pressure =
-        by_pressure_N / (by_pressure_N + campaign.variator.secondary_spring_force_N);
-    return std::hypot(torque.gain, pressure.gain * by_pressure);
+    return std::hypot(torque.gain, pressure.gain * share_of_pressure(engine));
   }
 
   void tell_machine(const std::string& name, const Interval& fitted, double of_model,
