@@ -923,10 +923,14 @@ void name_anew(Engine& engine, Naming& naming, const std::function<bool()>& stop
 }
 
 Naming name_effects(Engine& engine, const std::function<bool()>& stop) {
+  engine.fit_machine();
+  return name_fitted(engine, stop);
+}
+
+Naming name_fitted(Engine& engine, const std::function<bool()>& stop) {
   Naming out;
   out.threshold = chance_threshold(static_cast<int>(engine.campaign().slots.size()), kFalseName);
   out.ripples = find_ripples(engine.campaign(), out.threshold);
-  engine.fit_machine();
   engine.update_noise();
   for (int i = 0; i < 2; ++i) {
     engine.accept(engine.refine({}, kSettling));

@@ -62,6 +62,8 @@ struct Naming {
 
 // stop() is asked between steps, on any of the threads; true ends early with what is known.
 Naming name_effects(Engine& engine, const std::function<bool()>& stop);
+// The same of an engine whose machine is fitted already.
+Naming name_fitted(Engine& engine, const std::function<bool()>& stop);
 
 // The same once more from the engine's present state, which has learned something since: what that
 // makes superfluous goes, what it hid is found.

@@ -227,9 +227,8 @@ class Run {
   // more.
   void explain_by_machine(const Campaign& campaign, Engine& engine, Naming& naming,
                           Learning& learning) {
-    const auto is_explained_by = [&](Losses losses, TorqueRatio torque_ratio) {
-      Engine other(campaign, request_.jobs, losses, torque_ratio);
-      Naming named = name_effects(other, stop());
+    const auto is_explained_by = [&](Engine other) {
+      Naming named = name_fitted(other, stop());
       if (stop()()) return;
       Learning learned = criticise_and_learn(other, named);
       if (!learned.left.passed()) return;
@@ -243,9 +242,25 @@ class Run {
       naming = std::move(named);
       learning = std::move(learned);
     };
-    if (loses_unusually(campaign, naming)) is_explained_by(Losses::kUsual, TorqueRatio::kFollows);
-    if (things_in(engine, learning) > 0 && torque_ratio_stays(campaign))
-      is_explained_by(Losses::kAsFitted, TorqueRatio::kMayStay);
+    if (loses_unusually(campaign, naming)) {
+      Engine usual(campaign, request_.jobs, Losses::kUsual);
+      usual.fit_machine();
+      is_explained_by(std::move(usual));
+    }
+    if (things_in(engine, learning) == 0 || !campaign.has_balance || stop()()) return;
+    Engine stays(campaign, request_.jobs, Losses::kAsFitted, TorqueRatio::kMayStay);
+    stays.fit_machine();
+    if (stays.state().nuisance[kDeformationLost] > kStays && !is_settled(engine, learning, stays))
+      is_explained_by(std::move(stays));
+  }
+
+  // One name with which all tests pass, and that does what the torque ratio that stays cannot: that
+  // explains less in its place, and is not there beside it.
+  static bool is_settled(const Engine& engine, const Learning& learning, Engine stays) {
+    if (engine.accepted().size() != 1 || things_in(engine, learning) != 1) return false;
+    stays.update_noise();
+    const Hypothesis beside = stays.refine_from(engine.state(), engine.accepted());
+    return beside.state.nuisance[kDeformationLost] <= kStays && explain_more_than(stays, engine);
   }
 
   static bool loses_unusually(const Campaign& campaign, const Naming& naming) {
@@ -256,13 +271,6 @@ class Run {
       const double off = naming.hypothesis.state.nuisance[loss] - row.nominal;
       return std::abs(off) > Engine::kReach * row.tolerance;
     });
-  }
-
-  bool torque_ratio_stays(const Campaign& campaign) const {
-    if (!campaign.has_balance || stop()()) return false;
-    Engine alone(campaign, request_.jobs, Losses::kAsFitted, TorqueRatio::kMayStay);
-    alone.fit_machine();
-    return alone.state().nuisance[kDeformationLost] > kStays;
   }
 
   // Where names leave something, the whole naming anew beside them: the first pass weighs a second
