@@ -49,6 +49,17 @@ TEST(Csv, CountsWhatItLeavesOut) {
   EXPECT_EQ(table.notes[2], "a.csv:5: 1 lines whose time does not increase, ignored");
 }
 
+// A decimal comma beside commas between the cells moves every value behind it by one.
+TEST(Csv, ALineWithMoreCellsThanTheHeaderHasNoValues) {
+  const SignalTable table = parse_csv("t[s],primary_speed[rad/s]\n0,1,\n1,2,5\n2,3\n", "a.csv");
+  EXPECT_EQ(table[Role::kPrimarySpeed].value, (std::vector<double>{1.0, 3.0}));
+  ASSERT_EQ(table.notes.size(), 1U);
+  EXPECT_EQ(table.notes[0],
+            "a.csv:3: 1 lines with more cells than the header, ignored (decimal commas?)");
+  EXPECT_EQ(error_of("t[s],primary_speed[rad/s]\n0,1,5\n1,2,5\n"),
+            "a.csv:2: more cells than the header has; expected decimal points");
+}
+
 TEST(Csv, AShareHasTheUnitOneOrPercent) {
   const SignalTable table =
       parse_csv("t[s],accelerator_pedal[1],primary_speed[rad/s]\n0,0.5,1\n", "a.csv");

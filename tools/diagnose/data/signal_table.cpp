@@ -77,7 +77,13 @@ class CsvParser {
         read_row(line);
       }
     }
+    if (rows_ == 0 && long_rows_ > 0) {
+      line_ = first_long_row_;
+      fail("more cells than the header has; expected decimal points");
+    }
     if (rows_ == 0) fail("no line with numbers after the header");
+    note(long_rows_, first_long_row_,
+         "lines with more cells than the header, ignored (decimal commas?)");
     note(bad_rows_, first_bad_row_, "lines that are not numbers, ignored");
     note(set_back_, first_set_back_, "times the clock was set back: a new stretch begins");
     note(backward_, first_backward_, "lines whose time does not increase, ignored");
@@ -173,6 +179,11 @@ class CsvParser {
           }
       }
     }
+    // Which of them belong to which column nobody knows.
+    if (line.find_first_not_of(" \t\r,;") != std::string_view::npos) {
+      count(long_rows_, first_long_row_);
+      return;
+    }
     if (!(std::abs(t_s) <= kLatest_s)) {
       count(bad_rows_, first_bad_row_);
       return;
@@ -213,6 +224,7 @@ class CsvParser {
   static constexpr double kSetBack_s = 3.0;
   static constexpr double kLatest_s = 1e11;  // beyond, seconds have no microseconds left
   std::size_t rows_ = 0, bad_rows_ = 0, first_bad_row_ = 0, backward_ = 0, first_backward_ = 0;
+  std::size_t long_rows_ = 0, first_long_row_ = 0;
   std::size_t set_back_ = 0, first_set_back_ = 0;
   double last_t_s_ = 0.0, shift_s_ = 0.0;
 };
