@@ -35,7 +35,7 @@ TEST(TorqueRatio, ThatStaysIsNoFunctionOfThePressure) {
 // Where pulleys give way as they usually do, a gain of the torque does most of what the ratio
 // lacks, and all tests pass with it: one name, and a wrong one.
 TEST(TorqueRatio, ThatStaysIsNoGainOfTheTorque) {
-  for (const std::uint64_t seed : {14, 16, 20}) {
+  for (const std::uint64_t seed : {14U, 16U, 20U}) {
     const Diagnosis answer = diagnose(request_of(soft_pulleys(true, seed, 1.2e-3))).diagnosis;
     EXPECT_EQ(answer.verdict, Verdict::kNothingWrong) << seed;
   }
