@@ -81,6 +81,30 @@ INSTANTIATE_TEST_SUITE_P(
                     "\na = '''b''''.c'''\n" + std::string("a") + repeated(" . a", 30000) +
                         " = 1\n"));
 
+// What the library's own headers take for a failed assertion of theirs.
+class UnfinishedToml : public Hostile, public testing::WithParamInterface<std::string> {};
+
+TEST_P(UnfinishedToml, IsOneLineAndStatus78) {
+  place.write("typed.toml", GetParam());
+  const std::string typed = place.path("typed.toml");
+  const std::vector<std::vector<std::string>> commands{
+      {program_path("beltgripd"), "--check", "--config", typed},
+      {program_path(), "replay", "-", "--config", typed},
+      {program_path(), "diagnose", place.path("table.csv"), "--config", config(), "--model", typed},
+      {program_path(), "simulate", "--scenario", typed},
+      {program_path(), "simulate", "--scenario", "demo", "--model", typed}};
+  for (const auto& command : commands) {
+    const RunResult result = run(command, kHostileLimit);
+    EXPECT_EQ(result.status, 78) << command[1] << ": " << result.err;
+    EXPECT_NE(result.err.find("typed.toml:1: "), std::string::npos) << result.err;
+    EXPECT_EQ(lines(result.err), 1) << result.err;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(, UnfinishedToml,
+                         testing::Values("[\n", "[ \n", "[[\n", "[[[\n", "[.a]\n", "[[[a]]]\n",
+                                         "[[#\n", "[#\n", "a = {.b = 1}\n", ".a = 1\n"));
+
 TEST_F(Hostile, ADeepFileDoesNotEndARunningDaemon) {
   Process process({program_path("beltgripd"), "--config", config(), "--log-level", "debug"});
   ASSERT_TRUE(process.wait_for_error(" samples, ", kHostileLimit)) << process.err();
