@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -57,6 +58,17 @@ Loaded load(const DiagnoseOptions& options) {
     throw Failure{result.exit_code(), result.errors.back().text};
   }
   return {*result.config, result.stated, result.assumed, result.left_out};
+}
+
+// What the fit has seen says nothing of experiments that it has not.
+void demand_apart(const std::string& held_out, const std::vector<std::string>& logs) {
+  for (const std::string& log : logs) {
+    std::error_code none_there;
+    if (held_out != log && !std::filesystem::equivalent(held_out, log, none_there)) continue;
+    throw Failure{kUsage, "--held-out " + held_out + ": found an experiment of the fit" +
+                              (held_out == log ? "" : " (" + log + ")") +
+                              ", expected one that is none"};
+  }
 }
 
 diagnose::SignalTable read(const std::string& path, const daemon::Config& config) {
@@ -142,6 +154,7 @@ void run_diagnose(const DiagnoseOptions& options) {
   if (options.model.empty()) request.assumed_constants = assumed_constants;
   request.is_model_given = !options.model.empty();
   Inputs inputs(options.logs);
+  for (const std::string& path : options.held_out) demand_apart(path, options.logs);
   inputs.add(options.held_out);
   inputs.add(config.files);
   inputs.add(options.model);

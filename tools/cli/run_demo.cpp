@@ -185,7 +185,7 @@ void run_rig(const RunDemoOptions& options) {
   const sim::RigScenario scenario = options.scenario.load();
   const daemon::Config config =
       load_configuration_text(sim::rig_configuration(scenario, kBus, "vehicle.dbc"),
-                              sim::shipped("paper-rig.dbc"), options.method);
+                              sim::rig_dbc(scenario), options.method);
   sim::RigSource source(scenario, options.scenario.seed, start_s, end_s);
   can::StampedFrame first;
   if (!source.next(first)) throw Failure{kUsage, "run-demo: the scenario ends before --start"};

@@ -1,9 +1,12 @@
 #include "tools/cli/scenario_options.h"
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <limits>
-#include <sstream>
+#include <string_view>
 
 #include "daemon/core/config/toml/toml_bounds.h"
 #include "tools/cli/failure.h"
@@ -42,17 +45,36 @@ sim::ScenarioLayer setting_of(const std::string& setting) {
   return sim::setting_layer(setting);
 }
 
+// Blank lines and comments alone, as where diagnose had no further experiment to ask for: the usual
+// machine would be run in its place.
+bool says_nothing(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size() - 1);
+    const std::string_view line = text.substr(0, end + 1);
+    const std::size_t first = line.find_first_not_of(" \t\r\n");
+    if (first != std::string_view::npos && line[first] != '#') return false;
+    text.remove_prefix(end + 1);
+  }
+  return true;
+}
+
 sim::ScenarioLayer layer_of(const std::string& scenario) {
   if (const auto text = sim::resource(scenario + std::string(kSuffix))) {
     return {scenario + std::string(kSuffix), std::string(*text)};
   }
   std::ifstream file(scenario, std::ios::binary);
-  std::ostringstream text;
-  if (!file || !(text << file.rdbuf())) {
+  file.peek();
+  if (file.bad() || !file.is_open() || std::filesystem::is_directory(scenario)) {
     throw Failure{kNoInput, scenario + ": neither a readable file nor a shipped scenario (" +
                                 shipped_names() + ")"};
   }
-  return bounded({scenario, text.str()});
+  file.clear();
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (says_nothing(text)) {
+    throw Failure{kConfiguration, scenario + ":1: found a file that sets nothing, expected a "
+                                             "scenario, e.g. plant = \"vehicle\" and what differs"};
+  }
+  return bounded({scenario, text});
 }
 
 // The file and the settings of the command line on it.

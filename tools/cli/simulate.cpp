@@ -54,7 +54,7 @@ struct SimulateOptions {
 // What a run leaves behind beside its log.
 struct Run {
   std::string configuration;
-  std::string_view dbc;
+  std::string dbc;
   std::string truth_json, truth_text;
   ReplayResult daemon;
 };
@@ -107,7 +107,7 @@ Run run_rig(const SimulateOptions& options, std::FILE* log, bool results) {
                         options.scenario.end_s());
   Run run;
   run.configuration = sim::rig_configuration(scenario, kInterface, "vehicle.dbc");
-  run.dbc = sim::shipped("paper-rig.dbc");
+  run.dbc = sim::rig_dbc(machine);
   const double end_s = std::min(machine.duration_s * machine.cycles, options.scenario.end_s());
   auto reader =
       std::make_unique<RigLog>(source, end_s - options.scenario.start_s, !options.quiet, log);

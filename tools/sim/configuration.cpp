@@ -1,7 +1,9 @@
 #include "tools/sim/configuration.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <numbers>
+#include <string_view>
 
 #include "can_dbc/dbc/parser.h"
 #include "estimator/physics/variator_geometry.h"
@@ -9,10 +11,45 @@
 
 namespace beltgrip::sim {
 
+namespace {
+
+constexpr std::string_view kSlowSpeed = "(0.0625,0) [0|4095.875]",
+                           kFastSpeed = "(0.125,0) [0|8191.75]";
+constexpr double kSlowMost_rpm = 4095.875;
+// Chosen: what ripple, noise, a wrong scale and the way to the set speed add to it.
+constexpr double kReserve = 1.1;
+
+bool is_fast(const RigScenario& scenario) {
+  const double fastest_rad_s =
+      scenario.primary_speed_rad_s * std::max(1.0, scenario.variator.ratio);
+  return kReserve * fastest_rad_s * 30.0 / std::numbers::pi > kSlowMost_rpm;
+}
+
+std::string fast_dbc() {
+  std::string text(shipped("paper-rig.dbc"));
+  for (std::size_t at = text.find(kSlowSpeed); at != std::string::npos;
+       at = text.find(kSlowSpeed, at)) {
+    text.replace(at, kSlowSpeed.size(), kFastSpeed);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string rig_dbc(const RigScenario& scenario) {
+  return is_fast(scenario) ? fast_dbc() : std::string(shipped("paper-rig.dbc"));
+}
+
 const can::Database& rig_database() {
   static const can::Database database =
       can::parse_dbc(std::string(shipped("paper-rig.dbc"))).database;
   return database;
+}
+
+const can::Database& rig_database(const RigScenario& scenario) {
+  if (!is_fast(scenario)) return rig_database();
+  static const can::Database fast = can::parse_dbc(fast_dbc()).database;
+  return fast;
 }
 
 std::string rig_configuration(const RigScenario& scenario, const std::string& interface,

@@ -10,7 +10,11 @@
 
 namespace beltgrip::sim {
 
-const can::Database& rig_database();
+// The names and identifiers are the same whatever the scenario; of fast shafts the speeds have a
+// step twice as large, for their frames would not reach so far.
+std::string rig_dbc(const RigScenario& scenario);
+const can::Database& rig_database(const RigScenario& scenario);
+const can::Database& rig_database();  // as of slow shafts
 std::string rig_configuration(const RigScenario& scenario, const std::string& interface,
                               const std::string& dbc_file);
 

@@ -29,6 +29,7 @@ struct RigScenario : World {
   OperatorAction action = OperatorAction::kRestore;
   double operator_slip_percent = 0.0;
   double reaction_s = 0.0;
+  double grip_step_N = 0.0;  // at once, before the force returns by its rate
   double restore_N_per_s = 0.0;
   double rest_s = 0.0;
 

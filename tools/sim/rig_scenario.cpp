@@ -43,6 +43,8 @@ constexpr NumberKey<Rig> kClamp[] = {
 constexpr NumberKey<Rig> kOperator[] = {
     {"slip_percent", &Rig::operator_slip_percent, 0.1, 100.0, "slip that is noticed"},
     {"reaction_s", &Rig::reaction_s, 0.0, 60.0, "a duration"},
+    {"grip_step_N", &Rig::grip_step_N, 0.0, 1e6,
+     "the force is raised by so much at once where it returns, so that the belt grips"},
     {"restore_N_per_s", &Rig::restore_N_per_s, 1.0, 1e6, "the force returns at this rate"},
     {"rest_s", &Rig::rest_s, 0.0, 1e4, "a duration"},
 };

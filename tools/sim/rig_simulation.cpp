@@ -110,6 +110,7 @@ void RigSimulation::operate() {
       if (in_mode_s >= scenario_.hold_s) {
         enter(RigMode::kLowering);
         noticed_s_.reset();
+        was_below_peak_ = false;
         truth_.push_back({});
         truth_.back().mu_max = friction_factor_ * scenario_.friction().mu_max;
         truth_.back().start_s = now_s;
@@ -123,7 +124,10 @@ void RigSimulation::operate() {
       } else if (!truth_.back().let_go_s) {
         truth_.back().let_go_s = now_s;
       }
-      if (reacts && scenario_.action == OperatorAction::kRestore) enter(RigMode::kRestoring);
+      if (reacts && scenario_.action == OperatorAction::kRestore) {
+        command_force_N_ += scenario_.grip_step_N;
+        enter(RigMode::kRestoring);
+      }
       break;
     }
     case RigMode::kRestoring:
@@ -150,7 +154,9 @@ void RigSimulation::observe(double slip_before_share, double sigma_star_before) 
   const double sigma = std::abs(sigma_star());
   if (!truth.peak_s) truth.mu_max = friction_factor_ * scenario_.friction().mu_max;
   const bool has_peak = scenario_.friction().shape != CurveShape::kSaturating;
-  if (has_peak && !truth.peak_s && slip_share >= peak_slip_share) {
+  // A belt that slips from the start has no peak to pass.
+  if (slip_share < peak_slip_share) was_below_peak_ = true;
+  if (has_peak && !truth.peak_s && was_below_peak_ && slip_share >= peak_slip_share) {
     const double share =
         (peak_slip_share - slip_before_share) / std::max(slip_share - slip_before_share, 1e-12);
     truth.peak_s = seconds() - (1.0 - share) * step_s_;

@@ -56,6 +56,7 @@ class RigSimulation final : public Simulation {
   double friction_factor_ = 1.0;
   double mode_since_s_ = 0.0;
   std::optional<double> noticed_s_;
+  bool was_below_peak_ = false;  // in this ramp
   double cycles_left_;
   std::vector<ExperimentTruth> truth_;
   bool finished_ = false;

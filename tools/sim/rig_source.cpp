@@ -11,7 +11,7 @@ namespace beltgrip::sim {
 RigSource::RigSource(const RigScenario& scenario, std::uint64_t seed, double start_s, double end_s)
     : seed_(seed),
       simulation_(scenario),
-      bus_(rig_database(), kRigBus, scenario, seed),
+      bus_(rig_database(scenario), kRigBus, scenario, seed),
       start_ns_(std::llround(start_s * 1e9)),
       end_ns_(end_s < 9e9 ? std::llround(end_s * 1e9) : std::numeric_limits<std::int64_t>::max()) {}
 

@@ -131,6 +131,15 @@ TEST(Simulate, SettingsAndMistakes) {
   EXPECT_NE(car.err.find("car.toml:1: belt: "), std::string::npos) << car.err;
   EXPECT_NE(car.err.find("plant = \"vehicle\""), std::string::npos) << car.err;
 
+  // As diagnose leaves where no experiment is left to ask for: not the usual machine in its place.
+  for (const char* const nothing : {"", "# no experiment is left to ask for\n", "\n \n#"}) {
+    place.write("none.toml", nothing);
+    const RunResult none = beltgrip({"simulate", "--scenario", place.path("none.toml")});
+    EXPECT_EQ(none.status, 78) << nothing;
+    EXPECT_NE(none.err.find("none.toml:1: found a file that sets nothing"), std::string::npos)
+        << none.err;
+  }
+
   const RunResult missing = beltgrip({"simulate", "--scenario", "no-rig", "--log-out", "-"});
   EXPECT_EQ(missing.status, 66);
   EXPECT_NE(missing.err.find("paper-rig"), std::string::npos);

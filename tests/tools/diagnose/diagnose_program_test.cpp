@@ -10,6 +10,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -238,6 +239,39 @@ TEST_F(Diagnose, JudgesTheGainOnHeldOutExperiments) {
   EXPECT_EQ(result.at("experiments"), 9);
   const json& torque = result.at("held_out").at("secondary_torque");
   EXPECT_LT(torque.at("rmse_after").get<double>(), 0.3 * torque.at("rmse_before").get<double>());
+}
+
+// The bias is not in what was held out: nothing is named, and what is not named gains nothing.
+TEST_F(Diagnose, WhatHeldOutExperimentsRefuteGainsNothing) {
+  std::vector<std::string> tables = record(rig(8, {{"torque_bias", {{"bias_Nm", 6.0}}, ""}})).csv;
+  const std::vector<std::string> healthy = record(rig(3)).csv;
+  tables.insert(tables.end(), healthy.begin(), healthy.end());
+  std::vector<std::string> arguments = write(tables);
+  arguments.insert(arguments.end() - 3, "--held-out");
+  const json result = answer(arguments);
+  EXPECT_EQ(result.at("findings").size(), 0U) << result.dump(1);
+  EXPECT_NE(notes(result).find("held-out experiments; not named"), std::string::npos);
+  for (const auto& [signal, error] : result.at("held_out").items()) {
+    const bool is_mu = signal == "mu_max";
+    EXPECT_EQ(error.at(is_mu ? "error_after" : "rmse_after"),
+              error.at(is_mu ? "error_before" : "rmse_before"))
+        << signal;
+  }
+}
+
+TEST_F(Diagnose, WhatIsFittedIsNotHeldOut) {
+  const auto logs = write(record(rig(4)).csv);
+  const RunResult same = run({logs[0], logs[1], logs[2], "--held-out", logs[1]});
+  EXPECT_EQ(same.status, 64);
+  EXPECT_EQ(lines(same.err), 1);
+  EXPECT_NE(same.err.find("--held-out " + logs[1] + ": found an experiment of the fit"),
+            std::string::npos)
+      << same.err;
+  std::filesystem::copy_file(logs[1], place_.path("copy.csv"));
+  const json copied =
+      answer({logs[0], logs[1], logs[2], "--held-out", place_.path("copy.csv"), logs[3]});
+  EXPECT_NE(notes(copied).find("the same data as " + logs[1] + "; not held out"), std::string::npos)
+      << notes(copied);
 }
 
 // The table as a candump log: one message of 8 bytes a signal, 32 bits, little endian.

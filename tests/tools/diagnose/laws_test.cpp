@@ -38,7 +38,7 @@ TEST(Laws, AStepStandsAlone) {
   const auto laws = possible_laws(fit);
   ASSERT_EQ(names(laws), std::vector<std::string>{"step"});
   ASSERT_EQ(named_law(fit, laws), &laws.front());
-  EXPECT_TRUE(laws.front().text.starts_with("a step of 0.0")) << laws.front().text;
+  EXPECT_TRUE(laws.front().text.starts_with("a step of 2")) << laws.front().text;
 }
 
 TEST(Laws, ALineIsFoundAndNothingFarFromIt) {

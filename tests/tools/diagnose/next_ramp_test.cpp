@@ -105,6 +105,42 @@ TEST(PlannedRun, GoesToThePeakAndUpAgain) {
   EXPECT_GT(data.pressure.value.end() - turn, 60);
 }
 
+// Pulleys that give way read as slip: a ramp that turned at that would not begin.
+TEST(NextRamp, TurnsBehindWhatReadsAsSlipAtItsStart) {
+  const Engine engine = fitted(equal_ramps());
+  ModelState state = engine.state();
+  state.nuisance[kDeformationPerkN2] = 0.0;
+  for (const double per_kN : {0.0, 3e-3, 1e-2}) {
+    state.nuisance[kDeformationPerkN] = per_kN;
+    const Ramp ramp = ramp_like_first(engine.campaign(), state, Varied::kRepeat);
+    EXPECT_GT(ramp.turn_slip_percent, 0.1 * per_kN * ramp.start_force_N + 0.5) << per_kN;
+    EXPECT_GE(ramp.turn_slip_percent, 3.0);
+  }
+}
+
+TEST(NextRamp, TurnsBehindALatePeak) {
+  const Engine engine = fitted(equal_ramps());
+  ModelState state = engine.state();
+  state.nuisance[kLnPeakSlipOverdrive] = std::log(0.045);
+  const Ramp ramp = ramp_like_first(engine.campaign(), state, Varied::kRepeat);
+  EXPECT_GT(ramp.turn_slip_percent, 4.5);
+  EXPECT_LT(ramp.turn_slip_percent, 8.0);
+}
+
+// Oil that turns fast presses by itself: no ramp of the pressure ends below that.
+TEST(NextRamp, IsNoFasterThanTheTurningOilLetsItSlip) {
+  const Engine engine = fitted(equal_ramps());
+  Campaign campaign = engine.campaign();
+  campaign.variator.secondary_centrifugal_N_s2 = 0.05;
+  const Ramp ramp = ramp_like_first(campaign, engine.state(), Varied::kSpeed);
+  const double radius_m = campaign.variator.primary_radius_overdrive_m;
+  const double slips_N = ramp.torque_Nm * std::cos(campaign.variator.half_wedge_angle_rad) /
+                         (2.0 * radius_m * std::exp(engine.state().nuisance[kLnMuMax]));
+  const double omega_s_rad_s = ramp.speed_rad_s * campaign.variator.ratio_overdrive;
+  EXPECT_LT(campaign.variator.secondary_spring_force_N + 0.05 * omega_s_rad_s * omega_s_rad_s,
+            0.9 * slips_N);
+}
+
 // A ratio error at one end stop and a scale error of a speed: the other end stop tells.
 TEST(NextRamp, GoesToTheOtherEndStopWhereOnlyThatTells) {
   const Engine engine = fitted(equal_ramps({{"speed_scale", {{"secondary", 0.006}}, {}}}));

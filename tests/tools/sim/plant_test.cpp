@@ -281,6 +281,41 @@ TEST(PaperRig, RepeatsTheExperiment) {
   }
 }
 
+// A force that returns slowly lets the belt run away: the second ramp finds it slipping and passes
+// no peak. A step on the way up lets it grip again.
+TEST(PaperRig, ABeltThatRanAwayPassesNoPeakAndAStepLetsItGrip) {
+  const auto second = [](const std::string& step_N) {
+    RigSimulation simulation(
+        rig({"run.cycles=2", "clamp.hold_s=2", "clamp.start_force_N=5700", "clamp.ramp_N_per_s=500",
+             "operator.slip_percent=3.5", "operator.reaction_s=0.1", "operator.restore_N_per_s=100",
+             "operator.grip_step_N=" + step_N}));
+    run(simulation);
+    EXPECT_EQ(simulation.truth().size(), 2U);
+    return simulation.truth().back();
+  };
+  EXPECT_FALSE(second("0").peak_s);
+  const ExperimentTruth grips = second("1000");
+  ASSERT_TRUE(grips.peak_s);
+  EXPECT_GT(*grips.peak_s, grips.start_s);
+}
+
+// 240 rad/s are 5157 rpm behind a ratio of 2.25: twice the step reaches so far.
+TEST(RigDbc, ReachesAsFarAsTheShafts) {
+  for (const char* const speed :
+       {"driveline.primary_speed_rad_s=105", "driveline.primary_speed_rad_s=240"}) {
+    const RigScenario scenario = rig({speed});
+    const can::MessageDef& speeds = *std::find_if(
+        rig_database(scenario).messages.begin(), rig_database(scenario).messages.end(),
+        [](const can::MessageDef& message) { return message.name == "RIG_Speed"; });
+    double reaches_rpm = 0.0;
+    for (const can::SignalDef& signal : speeds.signals) {
+      if (signal.name == "SecondarySpeed") reaches_rpm = signal.scale * 65535.0;
+    }
+    EXPECT_GT(reaches_rpm, scenario.primary_speed_rad_s * 2.25 * 30.0 / std::numbers::pi) << speed;
+    EXPECT_NE(rig_dbc(scenario).find("SecondarySpeed"), std::string::npos);
+  }
+}
+
 TEST(PaperRig, WithoutAPeakTheTruthHasNone) {
   RigSimulation simulation(rig({"belts.new.curve=saturating"}));
   run(simulation);

@@ -730,11 +730,11 @@ ExperimentData prepare(const SignalTable& table, const estimator::VariatorParame
   const Channel& speed = table[Role::kPrimarySpeed];
   if (speed.t_s.size() < kSpeedSamplesMin) {
     note_what_is_read(table, data);
-    data.notes.push_back(table.name + (speed.empty()
-                                           ? ": no primary_speed"
-                                           : ": " + std::to_string(speed.t_s.size()) +
-                                                 " samples of primary_speed, expected at least " +
-                                                 std::to_string(kSpeedSamplesMin)));
+    if (!speed.empty()) {  // what is missing altogether is said of all channels at once
+      data.notes.push_back(table.name + ": " + std::to_string(speed.t_s.size()) +
+                           " samples of primary_speed, expected at least " +
+                           std::to_string(kSpeedSamplesMin));
+    }
     return data;
   }
   const double start_s = speed.t_s.front();

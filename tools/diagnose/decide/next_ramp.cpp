@@ -30,6 +30,9 @@ constexpr double kFaster = 4.0;      // the other rate
 constexpr std::array kRampShares{kRampShare, kFaster* kRampShare};
 constexpr double kAboveSpring_N = 300.0;
 constexpr double kTorqueLeast_Nm = 5.0;
+// Where a ramp turns: behind the peak that was fitted, and before 10 % of slip, which damages the
+// belt. Beyond what reads as slip at its start, where the belt creeps by less than half a percent.
+constexpr double kTurnLeast = 0.03, kTurnMost = 0.06, kBehindPeak = 1.2, kBeyondStart = 0.01;
 
 // Derived: below odds of 3 to 1, and of a width that shrinks by less than a tenth, a ramp is not
 // worth an afternoon.
@@ -40,6 +43,14 @@ constexpr int kPasses = 2;  // chosen: over the levels, from each end stop; most
 // Chosen, of the log evidence: what is less probable by more counts as by so much, so that what is
 // nearly excluded is still asked about. No verdict depends on it.
 constexpr double kEvidenceMost = 5.0;
+
+// Chosen, of the clamp force at which the belt slips: behind the peak friction is less, and a belt
+// that is let slip on runs away from a force that returns slowly.
+constexpr double kGripShare = 0.3;
+
+// Chosen, of the same force: what spring and turning oil press with no pressure at all has to be
+// less, or the ramp ends above it.
+constexpr double kUnpressedMost = 0.85;
 
 struct Setting {
   bool is_low = false;
@@ -53,12 +64,32 @@ Ramp ramp_of(const Campaign& campaign, const ModelState& state, const Setting& s
                          (2.0 * radius_m * std::exp(state.nuisance[kLnMuMax]));
   Ramp out;
   out.is_low = setting.is_low;
+  const double coefficient_N_s2 =
+      v.secondary_centrifugal_N_s2 + state.nuisance[kCentrifugalOff_N_s2];
+  const double room_N = kUnpressedMost * slips_N - v.secondary_spring_force_N;
   out.speed_rad_s = setting.speed_rad_s;
+  if (coefficient_N_s2 > 0.0 && room_N > 0.0) {
+    const double most_rad_s =
+        std::sqrt(room_N / coefficient_N_s2) / (setting.is_low ? v.ratio_low : v.ratio_overdrive);
+    out.speed_rad_s = std::min(out.speed_rad_s, std::floor(most_rad_s));
+  }
   out.torque_Nm = setting.torque_Nm;
   out.oil_C = setting.oil_C;
   out.start_force_N =
       std::round(std::max(kStartShare * slips_N, v.secondary_spring_force_N + kAboveSpring_N));
   out.ramp_N_s = std::round(setting.ramp_share * out.start_force_N);
+  out.grip_step_N = std::round(kGripShare * slips_N);
+  const double peak_slip =
+      std::exp(state.nuisance[setting.is_low ? kLnPeakSlipLow : kLnPeakSlipOverdrive]);
+  const auto giving_way = [&](double force_N) {
+    const double force_kN = 1e-3 * force_N;
+    return std::max(0.0, state.nuisance[kDeformationPerkN] * force_kN +
+                             state.nuisance[kDeformationPerkN2] * force_kN * force_kN);
+  };
+  const double turn = std::clamp(kBehindPeak * peak_slip, kTurnLeast, kTurnMost);
+  out.turn_slip_percent = std::round(1e3 * std::max(turn + giving_way(slips_N),
+                                                    giving_way(out.start_force_N) + kBeyondStart)) /
+                          10.0;
   return out;
 }
 

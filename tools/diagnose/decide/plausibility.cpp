@@ -188,6 +188,17 @@ void drop_copies(std::vector<SignalTable>& tables, Implausible& doubts) {
   }
 }
 
+void drop_copies_of(const std::vector<SignalTable>& fitted, std::vector<SignalTable>& held_out,
+                    Implausible& doubts) {
+  std::erase_if(held_out, [&](const SignalTable& table) {
+    const auto same = std::find_if(fitted.begin(), fitted.end(),
+                                   [&](const SignalTable& each) { return same_data(each, table); });
+    if (same == fitted.end()) return false;
+    doubts.notes.push_back(table.name + ": the same data as " + same->name + "; not held out");
+    return true;
+  });
+}
+
 void drop_uneven_channels(std::vector<ExperimentData>& runs, Implausible& doubts) {
   drop_uneven(runs, &ExperimentData::temperature, "oil_temperature", doubts);
   drop_uneven(runs, &ExperimentData::command, "secondary_pressure_command", doubts);

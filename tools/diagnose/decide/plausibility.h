@@ -19,6 +19,9 @@ struct Implausible {
 
 // The same data under two names would count as two experiments that agree in everything.
 void drop_copies(std::vector<SignalTable>& tables, Implausible& doubts);
+// The same of experiments that are held out of the fit: what it has seen is none of them.
+void drop_copies_of(const std::vector<SignalTable>& fitted, std::vector<SignalTable>& held_out,
+                    Implausible& doubts);
 
 // An optional channel that some experiments have and others have not would make of the others what
 // it is not: left out of all.

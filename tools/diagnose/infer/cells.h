@@ -18,13 +18,16 @@ struct InjectionRow {
   Injection injection;
   std::string_view acts_on;
   double unit;  // share, share, Nm, share, N: a size that is met in practice
+  // As a law's size is told: behind the number, which is so many times what it is inside.
+  std::string_view told_unit;
+  double told_per_SI = 1.0;
 };
 inline constexpr std::array<InjectionRow, 5> kInjections{{
-    {Injection::kFriction, "friction", 0.02},
-    {Injection::kRatio, "ratio", 1e-3},
-    {Injection::kTorque, "torque", 1.0},
-    {Injection::kTorqueGain, "torque_gain", 0.02},
-    {Injection::kClampForce, "clamp_force", 100.0},
+    {Injection::kFriction, "friction", 0.02, "%", 100.0},
+    {Injection::kRatio, "ratio", 1e-3, "%", 100.0},
+    {Injection::kTorque, "torque", 1.0, "Nm"},
+    {Injection::kTorqueGain, "torque_gain", 0.02, "%", 100.0},
+    {Injection::kClampForce, "clamp_force", 100.0, "N"},
 }};
 
 // A function stands as its values at equidistant knots over the abscissa, straight in between.

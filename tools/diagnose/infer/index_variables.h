@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "tools/diagnose/infer/residuals.h"
@@ -14,6 +15,7 @@ struct IndexVariable {
   const char* name;                                                    // the role, or what it is
   Eigen::ArrayXd (*value)(const ExperimentData& run, int experiment);  // empty: not recorded
   std::optional<estimator::LearnedVariable> learnable = std::nullopt;
+  std::string_view unit = {};  // of its values, where a function of it may be learned
 };
 
 std::span<const IndexVariable> index_variables();

@@ -94,7 +94,11 @@ std::string number(double value) {
   return buffer;
 }
 
-std::string filled(std::string_view text, double size, double place, double width) {
+struct Told {
+  double value;
+  std::string_view unit;
+};
+std::string filled(std::string_view text, Told size, Told place, Told width) {
   std::string out;
   for (std::size_t i = 0; i < text.size(); ++i) {
     if (text[i] != '%') {
@@ -102,7 +106,9 @@ std::string filled(std::string_view text, double size, double place, double widt
       continue;
     }
     const char which = text[++i];
-    out += number(which == '1' ? size : which == '2' ? place : width);
+    const auto& [value, unit] = which == '1' ? size : which == '2' ? place : width;
+    out += number(value);
+    if (!unit.empty()) out.append(" ").append(unit);
   }
   return out;
 }
@@ -142,8 +148,10 @@ LawEvidence judge(const Family& family, const std::vector<CellScore>& scores,
         if (evidence.back() <= best) continue;
         best = evidence.back();
         const double span = abscissa.high - abscissa.low;
-        out.text = filled(family.text, fitted.size * row.unit, abscissa.low + shape.place * span,
-                          shape.width * span);
+        const std::string_view unit = abscissa.variable ? abscissa.variable->unit : "";
+        out.text =
+            filled(family.text, {fitted.size * row.unit * row.told_per_SI, row.told_unit},
+                   {abscissa.low + shape.place * span, unit}, {shape.width * span, unit});
       }
     }
   }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <numbers>
 #include <utility>
 
 #include "can_dbc/text/number_text.h"
@@ -57,8 +58,9 @@ constexpr Words kWords[] = {
     {"ratio_creep", "rate", "a ratio that leaves its end stop as the holding force falls,", {}, {}},
     {"friction_temperature", "per_K", "friction that grows with the oil temperature,",
      "friction that falls with the oil temperature, by", "% per K", kPercent},
-    {"friction_speed", "per_ln_speed", "friction that grows with the logarithm of the speed,",
-     "friction that falls with the logarithm of the speed, by", "% per factor of 2.72", kPercent},
+    {"friction_speed", "per_ln_speed", "friction that grows with the logarithm of the speed, by",
+     "friction that falls with the logarithm of the speed, by", "% per doubling",
+     kPercent * std::numbers::ln2},
     {"friction_load",
      "exponent",
      "friction that falls with the clamp force, exponent",
@@ -127,7 +129,7 @@ std::string size_of(const Interval& size) {
     digits = std::clamp(static_cast<int>(places) + 2, 2, 9);
   }
   const bool even = std::abs(size.high + size.low - 2.0 * size.value) < 0.1 * half;
-  return even ? readable(size.value, digits) + " +- " + readable(half, 2)
+  return even ? readable(size.value, digits) + " ± " + readable(half, 2)
               : readable(size.value, digits) + " (" + readable(size.low, digits) + " to " +
                     readable(size.high, digits) + ")";
 }
@@ -146,7 +148,7 @@ std::string words_of(std::string_view effect, std::string_view parameter, double
   const Words* const row = row_of(effect, parameter);
   if (row == nullptr) return {};
   std::string_view words = size < 0.0 && !row->opposite.empty() ? row->opposite : row->words;
-  for (const std::string_view end : {",", " by", " of", ", by", ", exponent"}) {
+  for (const std::string_view end : {", by", ", exponent", ",", " by", " of"}) {
     if (words.ends_with(end)) words.remove_suffix(end.size());
   }
   return std::string(words);

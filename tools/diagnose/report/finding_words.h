@@ -28,7 +28,7 @@ std::string told(std::string_view what, double value, int digits = 2);
 std::string told_change(std::string_view what, double before, double after, double low,
                         double high);
 std::string_view unit_of(std::string_view effect, std::string_view parameter);  // empty: none
-// "a drag that grows with the clamp force, 0.50 +- 0.01 Nm/kN (torque_loss)"
+// "a drag that grows with the clamp force, 0.50 ± 0.01 Nm/kN (torque_loss)"
 std::string in_words(const Finding& finding);
 
 }  // namespace beltgrip::diagnose

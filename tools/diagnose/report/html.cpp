@@ -178,7 +178,9 @@ void add_left(report::HtmlPage& page, const Diagnosis& d) {
   }
   page.paragraph((fail.empty() ? "None" : std::to_string(fail.size())) + " of " +
                  std::to_string(d.left.size()) +
-                 " fail with what was found in the model. The verdict rests on these.");
+                 " fail with what was found in the model. The verdict rests on these. What "
+                 "experiments differ by is judged against " +
+                 base_words(d) + ".");
   fail.insert(fail.end(), pass.begin(), pass.end());
   page.table({"looked for", "", "value", "limit"}, fail);
 }
@@ -256,7 +258,9 @@ void add_tables(report::HtmlPage& page, const Diagnosis& d) {
     for (const NotIdentifiable& each : d.not_identifiable) {
       std::string sizes;
       for (const auto& [name, value] : each.smallest_detectable) {
-        sizes += name + " " + rounded_text(value) + " ";
+        const std::string unit(unit_of(each.effect, name));
+        sizes += (sizes.empty() ? "" : ", ") + name + " " + readable(value, 4) +
+                 (unit.empty() ? "" : " " + unit);
       }
       rows.push_back({each.effect, sizes, each.reason});
     }

@@ -275,6 +275,11 @@ std::string sentence(const LearnedFinding& learned) {
   return out;
 }
 
+std::string base_words(const Diagnosis& d) {
+  return d.scatter_from_replicates ? "what replicates differ by"
+                                   : "what is usual, as none was repeated often enough";
+}
+
 std::string figure_text(const Rerun& rerun, const RerunFigure& figure) {
   const auto text = [&](const std::optional<Measured>& side) {
     return side ? rounded_text((*side).*figure.value) : std::string("none");
@@ -327,7 +332,8 @@ std::string verdict_line(const Diagnosis& d) {
     case Verdict::kUnexplained:
       what = "unexplained";
   }
-  return what + " (" + std::to_string(d.experiments) + " experiments, " +
+  return what + " (" + std::to_string(d.experiments) +
+         (d.experiments == 1 ? " experiment, " : " experiments, ") +
          rounded_text(0.1 * d.samples) + " s usable)" +
          (d.complete ? "" : ", stopped before the end");
 }
@@ -343,7 +349,10 @@ std::string share_text(const Diagnosis& d) {
 
 // By how much the error of mu_max falls, or of the signal that gains most.
 std::string gain_text(const Diagnosis& d) {
-  if (d.mu_max && d.mu_max->after < d.mu_max->before) {
+  const auto is_told = [](double before, double after) {  // by the digits that are shown
+    return rounded_text(after) != rounded_text(before) && after < before;
+  };
+  if (d.mu_max && is_told(d.mu_max->before, d.mu_max->after)) {
     return "; with it mu_max is off by " + told("mu_max", d.mu_max->after) + " instead of " +
            told("mu_max", d.mu_max->before);
   }
@@ -351,7 +360,7 @@ std::string gain_text(const Diagnosis& d) {
       std::min_element(d.held_out.begin(), d.held_out.end(), [](const auto& a, const auto& b) {
         return a.second.after * b.second.before < b.second.after * a.second.before;
       });
-  if (best == d.held_out.end() || !(best->second.after < best->second.before)) return {};
+  if (best == d.held_out.end() || !is_told(best->second.before, best->second.after)) return {};
   return "; with it " + best->first + " is off by " + told(best->first, best->second.after) +
          " instead of " + told(best->first, best->second.before);
 }
@@ -436,6 +445,7 @@ std::string plain_text(const Diagnosis& d) {
     }
   }
   if (d.unexplained) out += "unexplained: " + sentence(*d.unexplained) + "\n";
+  if (!d.left.empty()) out += "what experiments differ by is judged against " + base_words(d) + "\n";
   if (!d.held_out.empty()) {
     out += "on experiments not used for the fit (before -> after, 95 % of the difference):\n";
   }

@@ -27,5 +27,7 @@ inline constexpr std::array<RerunFigure, 3> kRerunFigures{
      {"slip_stop_percent", "slip at the stop, %", &Measured::slip_stop_percent},
      {"min_clamp_force_N", "MinClampForce, N", &Measured::min_clamp_force_N}}};
 std::string figure_text(const Rerun& rerun, const RerunFigure& figure);  // "before -> after"
+// What scatter between experiments is judged against.
+std::string base_words(const Diagnosis& d);
 
 }  // namespace beltgrip::diagnose

@@ -62,6 +62,7 @@ class Run {
     answer_.extended = request_.model;
     std::vector<ExperimentData> runs;
     drop_copies(request_.experiments, implausible_);
+    drop_copies_of(request_.experiments, request_.held_out, implausible_);
     std::vector<const SignalTable*> tables;
     tables.reserve(request_.experiments.size() + request_.held_out.size());
     for (const SignalTable& table : request_.experiments) tables.push_back(&table);
@@ -73,8 +74,8 @@ class Run {
       // From here on the grid is all that counts; half of the memory that an hour takes.
       if (!request_.with_plots) request_.experiments[i] = {};
     });
-    out().experiments = static_cast<int>(runs.size());
     for (const ExperimentData& run : runs) {
+      out().experiments += run.valid_count > 0 ? 1 : 0;
       out().samples += run.valid_count;
       for (const std::string& note : run.notes) out().notes.push_back(note);
       if (run.valid_count == 0) {
@@ -476,11 +477,12 @@ class Run {
                             "not named");
     }
     const bool named = !refuted && !unconfirmed;
-    out().held_out = gain.signals;
-    out().mu_max = gain.mu_max;
-    for (const auto& [name, errors] : gain.forward) out().simulation[name].left_out = errors;
-    fill_findings(engine, named ? naming.accepted : std::vector<Accepted>(), naming, gain);
-    fill_learned(engine, naming, learning, gain);
+    const Gain told = named ? gain : unchanged(gain);
+    out().held_out = told.signals;
+    out().mu_max = told.mu_max;
+    for (const auto& [name, errors] : told.forward) out().simulation[name].left_out = errors;
+    fill_findings(engine, named ? naming.accepted : std::vector<Accepted>(), naming, told);
+    fill_learned(engine, naming, learning, told);
     judge(engine, naming, learning, named);
     if (named && !(naming.accepted.empty() && learning.terms.empty())) {
       out().explained_share = explained_share(engine, naming.nominal.state, extended);
@@ -499,6 +501,18 @@ class Run {
     }
     store_effects(campaign.slots, campaign.switched_on + stored.effects, stored.nuisance,
                   answer_.extended);
+  }
+
+  // Of what is not named nothing is gained.
+  static Gain unchanged(Gain gain) {
+    const auto stays = [](auto& each) {
+      each.after = each.before;
+      each.low = each.high = 0.0;
+    };
+    for (auto& [name, change] : gain.signals) stays(change);
+    for (auto& [name, change] : gain.forward) stays(change);
+    if (gain.mu_max) stays(*gain.mu_max);
+    return gain;
   }
 
   void fill_learned(const Engine& engine, const Naming& naming, const Learning& learning,

@@ -111,6 +111,10 @@ class Proposal {
     if (left.kind == MisfitKind::kFunction && !left.depends_on.empty()) {
       const std::string& follows = left.depends_on.front();
       const Varied varied = varied_by(follows);
+      if (follows.starts_with("direction of ")) {
+        return like_first(varied,
+                          "down and up once more, by another rate: it follows the " + follows);
+      }
       // Nobody sets the time, nor which experiment it is.
       return like_first(varied, varied == Varied::kRepeat
                                     ? "repeat the reference: does it follow " + follows + " again"
