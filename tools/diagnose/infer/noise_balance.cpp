@@ -10,7 +10,7 @@ namespace beltgrip::diagnose {
 namespace {
 
 // Chosen: of as many samples each, by the share that is the slip's. 6 and 10: the same names in
-// five campaigns of other make (115, 228, 161, 219, 94 of tools/DIAGNOSE.md).
+// five campaigns of other make (115, 228, 161, 219, 94 of tools/diagnose/RECORD.md).
 constexpr std::size_t kBins = 8;
 // Derived: samples that tell a variance as a median does, whose square is 2.7 times as uncertain as
 // the mean of squares, to its own size. A fifth less or more: the same names in those five.
