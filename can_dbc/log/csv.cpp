@@ -8,6 +8,7 @@
 #include "can_dbc/log/format.h"
 #include "can_dbc/log/frame_bits.h"
 #include "can_dbc/log/text.h"
+#include "can_dbc/text/table_row.h"
 
 namespace beltgrip::can {
 
@@ -153,6 +154,22 @@ bool is_true(std::string_view field) {
   return plain == "1" || plain == "true" || plain == "yes" || plain == "t" || plain == "x";
 }
 
+// Of an identifier: extended or not; nothing: a word of another column.
+std::optional<bool> is_extended(std::string_view field) {
+  static constexpr std::array<std::string_view, 5> kExtended{"ext", "extended", "xtd", "eff",
+                                                             "ide"};
+  static constexpr std::array<std::string_view, 9> kStandard{"",   "0",   "f",        "false", "n",
+                                                             "no", "std", "standard", "sff"};
+  if (is_true(field)) return true;
+  if (field.size() == 1 && field[0] == '0') return false;
+  const std::string plain = plain_name(field);
+  const auto is_in = [&plain](const auto& words) {
+    return std::find(words.begin(), words.end(), plain) != words.end();
+  };
+  if (is_in(kExtended)) return true;
+  return is_in(kStandard) ? std::optional(false) : std::nullopt;
+}
+
 std::optional<std::uint32_t> with_prefix_or(std::string_view field, int base) {
   constexpr std::size_t kTwoDigits = 2;
   if (base == 16 && field.size() == kTwoDigits &&
@@ -258,8 +275,9 @@ class CsvParser : public LineParser {
       return has_header_ ? LineKind::kNothing : bad("not a header with time, identifier and data");
     }
     split(line);
-    if (field_count_ < columns_needed_) return bad("fewer columns than the header has");
-    return read_row(record);
+    const char* const wrong =
+        wrong_width({fields_.data(), field_count_}, columns_needed_, column_count_);
+    return wrong != nullptr ? bad(wrong) : read_row(record);
   }
 
  private:
@@ -312,7 +330,8 @@ class CsvParser : public LineParser {
         id |= column == Column::kId;
         data |= column == Column::kData || column == Column::kDataByte;
         length |= column == Column::kLength;
-        if (is_time || column == Column::kId) columns_needed_ = i + 1;
+        // A frame may leave out the bytes that it has not.
+        if (column != Column::kDataByte && !fields_[i].empty()) columns_needed_ = i + 1;
       }
       has_header_ = time && id && data;
       if (!has_header_) continue;
@@ -432,11 +451,18 @@ class CsvParser : public LineParser {
       case Column::kId:
         if (!read_id(field, frame)) return "unreadable identifier";
         break;
-      case Column::kExtended:
-        frame.id.extended |= is_true(field);
+      case Column::kExtended: {
+        const auto extended = is_extended(field);
+        if (!extended) return "unreadable kind of identifier; expected true or false";
+        frame.id.extended |= *extended;
         break;
+      }
       case Column::kLength:
-        if (const auto value = decimal(field)) payload.wanted_length = *value;
+        if (const auto value = with_prefix_or(field, 10)) {
+          payload.wanted_length = *value;
+        } else if (!field.empty()) {
+          return "unreadable length";
+        }
         break;
       case Column::kData:
         payload.data = field;

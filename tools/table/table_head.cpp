@@ -102,7 +102,7 @@ class HeadReader {
     if (!find_names()) return {};
     bool first = true;
     while (const auto line = lines_.next()) {
-      split(*line, head_.separator, cells_);
+      can::split_row(*line, head_.separator, cells_);
       if (first && take_units()) continue;
       first = false;
       if (head_.rows++ == 0) head_.first_row = lines_.number();
@@ -121,7 +121,7 @@ class HeadReader {
       const auto line = lines_.next();
       if (!line) return false;
       for (const char separator : {',', ';', '\t'}) {
-        split(*line, separator, cells_);
+        can::split_row(*line, separator, cells_);
         if (cells_.size() < kColumnsLeast || cells_.size() > kColumnsMost) continue;
         if (!std::all_of(cells_.begin(), cells_.end(),
                          [&](std::string_view cell) { return is_name(cell, separator); })) {
@@ -129,6 +129,7 @@ class HeadReader {
         }
         head_.separator = separator;
         for (const std::string_view cell : cells_) head_.columns.push_back(column_of(cell));
+        head_.width = can::RowWidth(cells_.size());
         return true;
       }
     }
@@ -150,7 +151,10 @@ class HeadReader {
   }
 
   void take_row() {
-    for (std::size_t i = 0; i < std::min(cells_.size(), head_.columns.size()); ++i) {
+    const std::size_t columns = head_.columns.size();
+    head_.width.look(cells_);
+    if (can::wrong_width(cells_, columns, columns) != nullptr) return;
+    for (std::size_t i = 0; i < columns; ++i) {
       Column& column = head_.columns[i];
       const std::string_view cell = cells_[i];
       if (is_missing(cell)) continue;
@@ -168,7 +172,7 @@ class HeadReader {
 
   Lines lines_;
   Head head_;
-  Cells cells_;
+  can::Cells cells_;
 };
 
 can::ValueTable values_of(std::vector<std::string> texts, can::Arena& arena) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "can_dbc/dbc/model.h"
+#include "can_dbc/text/table_row.h"
 
 namespace beltgrip::table {
 
@@ -27,6 +28,7 @@ struct Head {
   std::int64_t time_unit_ns = 1'000'000'000;
   std::uint64_t first_row = 0;  // its line
   std::uint64_t rows = 0;
+  can::RowWidth width;
 };
 
 // Nothing where the file is none, or frames stand in it. Throws can::LogOpenError.

@@ -7,6 +7,7 @@
 
 #include "can_dbc/dbc/signal_codec.h"
 #include "can_dbc/log/text.h"
+#include "can_dbc/text/table_row.h"
 #include "tools/table/table_head.h"
 #include "tools/table/table_text.h"
 
@@ -65,9 +66,17 @@ class TableLog final : public can::LogReader {
     while (const auto line = lines_.next()) {
       ++stats_.lines;
       if (lines_.number() < head_.first_row) continue;
-      split(*line, head_.separator, row_);
-      const std::optional<std::int64_t> t_ns = time_of_row();
-      if (!t_ns) continue;
+      can::split_row(*line, head_.separator, row_);
+      const std::uint64_t number = row_number_++;  // the time of a bad row passes too
+      if (const char* const wrong = head_.width.wrong(row_)) {
+        count_bad(wrong);
+        continue;
+      }
+      const std::optional<std::int64_t> t_ns = time_of_row(number);
+      if (!t_ns) {
+        count_bad("unreadable time");
+        continue;
+      }
       t_ns_ = *t_ns;
       next_ = 0;
       return true;
@@ -75,26 +84,26 @@ class TableLog final : public can::LogReader {
     return false;
   }
 
-  std::optional<std::int64_t> time_of_row() {
+  void count_bad(const char* reason) {
+    ++stats_.lines_bad;
+    if (stats_.first_bad.size() >= kFirstBad) return;
+    stats_.first_bad.push_back({.line = lines_.number(), .reason = reason});
+  }
+
+  std::optional<std::int64_t> time_of_row(std::uint64_t number) const {
     if (!head_.time) {
       return static_cast<std::int64_t>(
-          std::llround(kNanoseconds * static_cast<double>(row_number_++) / rate_Hz_));
+          std::llround(kNanoseconds * static_cast<double>(number) / rate_Hz_));
     }
-    const std::string_view cell = *head_.time < row_.size() ? row_[*head_.time] : "";
+    const std::string_view cell = row_[*head_.time];
     auto t_ns = can::log_text::time_ns(cell, head_.time_unit_ns);
     if (!t_ns) t_ns = can::log_text::date_ns(cell);
     if (!t_ns) t_ns = can::log_text::clock_ns(cell);
-    if (!t_ns) {
-      ++stats_.lines_bad;
-      if (stats_.first_bad.size() < kFirstBad) {
-        stats_.first_bad.push_back({.line = lines_.number(), .reason = "unreadable time"});
-      }
-    }
     return t_ns;
   }
 
   std::optional<double> value_of(const Cell& cell) const {
-    if (cell.column >= row_.size() || is_missing(row_[cell.column])) return {};
+    if (is_missing(row_[cell.column])) return {};
     const std::string_view text = row_[cell.column];
     // Of a DBC's value table the numbers stand in the cells.
     if (const auto number = number_of(text, head_.separator)) return number;
@@ -108,7 +117,7 @@ class TableLog final : public can::LogReader {
   Head head_;
   double rate_Hz_;
   std::vector<Cell> cells_;
-  Cells row_;
+  can::Cells row_;
   std::size_t next_ = std::numeric_limits<std::size_t>::max();  // cell of this row
   std::uint64_t row_number_ = 0;
   std::int64_t t_ns_ = 0;

@@ -5,18 +5,13 @@
 #include <charconv>
 #include <cmath>
 
+#include "can_dbc/text/table_row.h"
+
 namespace beltgrip::table {
 
 namespace {
 
 constexpr std::size_t kBlock = std::size_t{64} * 1024;
-constexpr std::string_view kBlank = " \t\r\"";
-
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(kBlank);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
-}
 
 // With a point; empty where that is the cell itself.
 std::string with_point(std::string_view cell, char separator) {
@@ -50,22 +45,8 @@ std::optional<std::string_view> Lines::next() {
     at_ = std::min(end + 1, buffer_.size());
     ++number_;
     if (number_ == 1 && line.starts_with("\xEF\xBB\xBF")) line.remove_prefix(3);
-    const std::string_view bare = trimmed(line);
+    const std::string_view bare = can::bare_cell(line);
     if (!bare.empty() && bare.front() != '#') return line;
-  }
-}
-
-void split(std::string_view line, char separator, Cells& cells) {
-  cells.clear();
-  for (;;) {
-    std::size_t end = 0;
-    bool quoted = false;
-    while (end < line.size() && (quoted || line[end] != separator)) {
-      quoted ^= line[end++] == '"';
-    }
-    cells.push_back(trimmed(line.substr(0, end)));
-    if (end == line.size()) return;
-    line.remove_prefix(end + 1);
   }
 }
 

@@ -1,5 +1,5 @@
 // The lines of a table of signals: comment lines begin with "#", cells are parted by comma,
-// semicolon or tab, quotes may hold a separator. Tools only.
+// semicolon or tab. Tools only.
 #pragma once
 
 #include <cstddef>
@@ -8,13 +8,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "can_dbc/log/byte_source.h"
 
 namespace beltgrip::table {
-
-using Cells = std::vector<std::string_view>;
 
 // One line after the other, unpacked on the way.
 class Lines {
@@ -32,9 +29,6 @@ class Lines {
   std::uint64_t number_ = 0;
   bool ended_ = false;
 };
-
-// Cells without blanks and quotes around them.
-void split(std::string_view line, char separator, Cells& cells);
 
 // The whole cell as a number; with the separator ';' a comma may stand for the point.
 std::optional<double> number_of(std::string_view cell, char separator);

@@ -520,6 +520,38 @@ TEST(CsvLog, SavvyCan) {
   EXPECT_EQ(log.frames[1].text(), "1 18FEEE00#010A");
 }
 
+// The columns of bytes that a frame has not may be left out.
+TEST(CsvLog, ARowWithoutOneOfItsCellsIsNoFrame) {
+  const Log log = read(
+      "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n"
+      "13348,00000130,false,Rx,0,2,48,08,\n"
+      "13349,00000130,Rx,0,8,02,08,C0,0D,C6,08,2B,20,\n"
+      "13350,00000130,Rx,0,8,07,08,C0,0D,C6,08,2B,20,\n"
+      "13351,00000130,xx,Rx,0,2,48,08,\n"
+      "13352,00000130,false,Rx,0,3E,48,08,\n"
+      "13353,00000130,false,Rx,0\n"
+      "13354,00000130,false,Rx,0,8,01,02,03,04,05,06,07,08,09\n"
+      "13355,00000130,,Rx,0,1,48\n");
+  EXPECT_EQ(log.stats.lines_bad, 6U);
+  ASSERT_EQ(log.frames.size(), 2U);
+  EXPECT_EQ(log.frames[0].text(), "0 130#4808");
+  EXPECT_EQ(log.frames[1].text(), "0 130#48");
+  EXPECT_EQ(log.stats.first_bad.at(0).reason,
+            "unreadable kind of identifier; expected true or false");
+  EXPECT_EQ(log.stats.first_bad.at(3).reason, "unreadable length");
+  EXPECT_EQ(log.stats.first_bad.at(5).reason,
+            "more cells than the header has; expected decimal points");
+  const Log kinds = read(
+      "time,id,ide,comment,data\n"
+      "0.1,0x12,EXT,,11\n"
+      "0.2,0x12,Std,,12\n"
+      "0.3,0x12,STD,13\n");
+  EXPECT_EQ(kinds.stats.lines_bad, 1U);
+  ASSERT_EQ(kinds.frames.size(), 2U);
+  EXPECT_EQ(kinds.frames[0].text(), "1 00000012#11");
+  EXPECT_EQ(kinds.frames[1].text(), "1 012#12");
+}
+
 TEST(CsvLog, PythonCanWithBase64) {
   const Log log = read(
       "timestamp,arbitration_id,extended,remote,error,dlc,data\n"

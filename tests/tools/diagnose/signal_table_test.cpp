@@ -60,6 +60,18 @@ TEST(Csv, ALineWithMoreCellsThanTheHeaderHasNoValues) {
             "a.csv:2: more cells than the header has; expected decimal points");
 }
 
+// It was cut, or a cell was lost in it.
+TEST(Csv, ALineWithFewerCellsThanTheHeaderHasNoValues) {
+  const SignalTable table =
+      parse_csv("t[s],oil_temperature[K],primary_speed[rad/s]\n0,300,1\n1,2\n2,,3\n3,30", "a.csv");
+  EXPECT_EQ(table[Role::kPrimarySpeed].value, (std::vector<double>{1.0, 3.0}));
+  EXPECT_EQ(table[Role::kOilTemperature].value.size(), 1U);
+  ASSERT_EQ(table.notes.size(), 1U);
+  EXPECT_EQ(table.notes[0], "a.csv:3: 2 lines with fewer cells than the header, ignored");
+  EXPECT_EQ(error_of("t[s],primary_speed[rad/s]\n0\n1\n"),
+            "a.csv:2: fewer cells than the header has; expected one for each column");
+}
+
 TEST(Csv, AShareHasTheUnitOneOrPercent) {
   const SignalTable table =
       parse_csv("t[s],accelerator_pedal[1],primary_speed[rad/s]\n0,0.5,1\n", "a.csv");

@@ -86,6 +86,24 @@ TEST_F(TableCli, SignalsOutAreReadAgain) {
   EXPECT_NEAR(table["mu_max"].get<double>(), 0.105, 0.004);  // the scenario's
 }
 
+// Its decimal points are commas now, like what parts its cells.
+TEST_F(TableCli, ATableThatIsNothingButRowsOfTooManyCellsCannotBeUsed) {
+  const std::string toml = path("rig/beltgrip.toml");
+  std::string csv =
+      "t[s],primary_speed[rad/s],secondary_speed[rad/s],secondary_pressure[Pa],"
+      "primary_torque[Nm]\n";
+  for (int i = 0; i < 40; ++i) csv += "0," + std::to_string(10 + i) + ",100,5,225,5,1000,20\n";
+  place_->write("commas.csv", csv);
+  for (const char* command : {"replay", "check", "calibrate"}) {
+    const RunResult result = beltgrip({command, path("commas.csv"), "--config", toml});
+    EXPECT_EQ(result.status, 65) << command << result.out;
+    EXPECT_TRUE(has(result.err,
+                    "commas.csv: no readable frame in 41 lines, line 2: more cells "
+                    "than the header has; expected decimal points"))
+        << result.err;
+  }
+}
+
 // As scan tools write them: a row of units, comments, texts, columns of no role, no time.
 std::string scan_table() {
   std::ostringstream out;

@@ -100,9 +100,39 @@ TEST_F(Table, WhatIsBadIsLeftOutAndCounted) {
   can::LogRecord record;
   while (log->next(record)) {
   }
-  EXPECT_EQ(log->stats().lines_bad, 1U);
-  ASSERT_EQ(log->stats().first_bad.size(), 1U);
+  EXPECT_EQ(log->stats().lines_bad, 2U);
+  ASSERT_EQ(log->stats().first_bad.size(), 2U);
   EXPECT_EQ(log->stats().first_bad[0].line, 4U);
+  EXPECT_EQ(log->stats().first_bad[1].line, 5U);
+}
+
+// Nobody knows which of the cells belong to which column.
+TEST_F(Table, ARowWithMoreOrFewerCellsThanTheHeaderHasNoValues) {
+  const std::string path = write("t,a,b\n0,1,2\n1,1,2,3\n2,3\n3,4,5\n4,6,7\n4.5,6,7,\n5,8");
+  EXPECT_EQ(frames(path), (Lines{"0 a=1", "0 b=2", "3000000000 a=4", "3000000000 b=5",
+                                 "4000000000 a=6", "4000000000 b=7"}));
+  const auto log = open(path, database_of(*read_head(path)), 0.0);
+  can::LogRecord record;
+  while (log->next(record)) {
+  }
+  EXPECT_EQ(log->stats().lines_bad, 4U);
+  ASSERT_EQ(log->stats().first_bad.size(), 4U);
+  EXPECT_EQ(log->stats().first_bad[0].line, 3U);
+  EXPECT_EQ(log->stats().first_bad[0].reason,
+            "more cells than the header has; expected decimal points");
+  EXPECT_EQ(log->stats().first_bad[1].line, 4U);
+  EXPECT_EQ(log->stats().first_bad[2].line, 7U) << "no other row ends with a separator";
+  EXPECT_EQ(log->stats().first_bad[3].line, 8U) << "cut";
+}
+
+// It says nothing of the columns either, and its time passes.
+TEST_F(Table, ARowOfAnotherWidthIsNoRowOfTheHead) {
+  const std::string path = write("a,b\n1,2\n0,25,x,7\n3,4\n");
+  const auto head = read_head(path);
+  ASSERT_TRUE(head);
+  EXPECT_EQ(head->columns[1].numbers, 2U);
+  EXPECT_TRUE(head->columns[1].texts.empty());
+  EXPECT_EQ(frames(path, 1.0), (Lines{"0 a=1", "0 b=2", "2000000000 a=3", "2000000000 b=4"}));
 }
 
 TEST_F(Table, OfTwoColumnsOfOneNameTheFirstCounts) {

@@ -10,18 +10,12 @@
 #include <memory>
 #include <optional>
 
+#include "can_dbc/text/table_row.h"
 #include "can_dbc/text/unit_text.h"
 #include "estimator/statistics/order.h"
 
 namespace beltgrip::diagnose {
 namespace {
-
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r\"";
-  const std::size_t first = text.find_first_not_of(kBlank);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
-}
 
 std::string_view next_line(std::string_view& text) {
   const std::size_t end = text.find('\n');
@@ -40,7 +34,7 @@ std::string_view next_cell(std::string_view& line, char separator) {
 // Missing: an empty cell, NaN. Otherwise a number or nothing at all.
 enum class Cell { kNumber, kMissing, kBad };
 Cell parse_number(std::string_view text, double& value) {
-  text = trimmed(text);
+  text = can::bare_cell(text);
   if (text.empty()) return Cell::kMissing;
   if (text.front() == '+') text.remove_prefix(1);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -70,20 +64,22 @@ class CsvParser {
 
   SignalTable parse() {
     read_header();
+    look_at_width();
     while (!rest_.empty()) {
       const std::string_view line = next_line(rest_);
       ++line_;
-      if (const std::string_view bare = trimmed(line); !bare.empty() && bare.front() != '#') {
-        read_row(line);
-      }
+      if (!is_row(line)) continue;
+      can::split_row(line, separator_, cells_);
+      read_row();
     }
-    if (rows_ == 0 && long_rows_ > 0) {
-      line_ = first_long_row_;
-      fail("more cells than the header has; expected decimal points");
+    if (rows_ == 0 && first_wrong_ != nullptr) {
+      line_ = first_wrong_row_;
+      fail(first_wrong_);
     }
     if (rows_ == 0) fail("no line with numbers after the header");
     note(long_rows_, first_long_row_,
          "lines with more cells than the header, ignored (decimal commas?)");
+    note(short_rows_, first_short_row_, "lines with fewer cells than the header, ignored");
     note(bad_rows_, first_bad_row_, "lines that are not numbers, ignored");
     note(set_back_, first_set_back_, "times the clock was set back: a new stretch begins");
     note(backward_, first_backward_, "lines whose time does not increase, ignored");
@@ -100,10 +96,25 @@ class CsvParser {
                            " " + what);
   }
 
+  static bool is_row(std::string_view line) {
+    const std::string_view bare = can::bare_cell(line);
+    return !bare.empty() && bare.front() != '#';
+  }
+
+  void look_at_width() {
+    width_ = can::RowWidth(columns_.size());
+    for (std::string_view rest = rest_; !rest.empty();) {
+      const std::string_view line = next_line(rest);
+      if (!is_row(line)) continue;
+      can::split_row(line, separator_, cells_);
+      width_.look(cells_);
+    }
+  }
+
   void read_header() {
     std::string_view header;
     while (!rest_.empty() && (header.empty() || header.front() == '#')) {
-      header = trimmed(next_line(rest_));
+      header = can::bare_cell(next_line(rest_));
       ++line_;
     }
     separator_ = header.find(';') != std::string_view::npos    ? ';'
@@ -112,7 +123,7 @@ class CsvParser {
                                                                : ',';
     bool has_time = false;
     while (!header.empty()) {
-      const std::string_view cell = trimmed(next_cell(header, separator_));
+      const std::string_view cell = can::bare_cell(next_cell(header, separator_));
       columns_.push_back(read_column(cell));
       has_time |= columns_.back().time;
     }
@@ -121,7 +132,7 @@ class CsvParser {
 
   Column read_column(std::string_view cell) {
     const std::size_t open = cell.find('[');
-    const std::string_view name = trimmed(cell.substr(0, open));
+    const std::string_view name = can::bare_cell(cell.substr(0, open));
     Column column;
     if (name == "t") {
       column.time = true;
@@ -160,12 +171,24 @@ class CsvParser {
     return column;
   }
 
-  void read_row(std::string_view line) {
+  void read_row() {
+    if (const char* const wrong = width_.wrong(cells_)) {
+      if (first_wrong_ == nullptr) {
+        first_wrong_ = wrong;
+        first_wrong_row_ = line_;
+      }
+      if (cells_.size() <= columns_.size()) {
+        count(short_rows_, first_short_row_);
+      } else {
+        count(long_rows_, first_long_row_);
+      }
+      return;
+    }
     values_.assign(columns_.size(), std::nullopt);
     double t_s = std::nan("");
     for (std::size_t i = 0; i < columns_.size(); ++i) {
       double value = 0.0;
-      switch (parse_number(next_cell(line, separator_), value)) {
+      switch (parse_number(cells_[i], value)) {
         case Cell::kBad:
           count(bad_rows_, first_bad_row_);
           return;
@@ -178,11 +201,6 @@ class CsvParser {
             values_[i] = value * columns_[i].unit.factor + columns_[i].unit.offset;
           }
       }
-    }
-    // Which of them belong to which column nobody knows.
-    if (line.find_first_not_of(" \t\r,;") != std::string_view::npos) {
-      count(long_rows_, first_long_row_);
-      return;
     }
     if (!(std::abs(t_s) <= kLatest_s)) {
       count(bad_rows_, first_bad_row_);
@@ -219,12 +237,16 @@ class CsvParser {
   std::size_t line_ = 0;
   char separator_ = ',';
   std::vector<Column> columns_;
+  can::Cells cells_;
+  can::RowWidth width_;
   std::vector<std::optional<double>> values_;
   std::array<bool, daemon::kRoleCount> seen_{};
   static constexpr double kSetBack_s = 3.0;
   static constexpr double kLatest_s = 1e11;  // beyond, seconds have no microseconds left
   std::size_t rows_ = 0, bad_rows_ = 0, first_bad_row_ = 0, backward_ = 0, first_backward_ = 0;
-  std::size_t long_rows_ = 0, first_long_row_ = 0;
+  std::size_t long_rows_ = 0, first_long_row_ = 0, short_rows_ = 0, first_short_row_ = 0;
+  const char* first_wrong_ = nullptr;  // what is wrong with the first line of another width
+  std::size_t first_wrong_row_ = 0;
   std::size_t set_back_ = 0, first_set_back_ = 0;
   double last_t_s_ = 0.0, shift_s_ = 0.0;
 };
