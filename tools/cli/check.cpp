@@ -167,10 +167,10 @@ void observe_log(const std::string& path, const daemon::Config& config, check::R
   run_progress.reads(*timeline);
   observe(port, config, watch, {}, &run_progress, seen);
   const can::LogStats stats = timeline->stats();
-  if (stats.lines_bad > 0) {
-    progress.clear();
-    text::warn(path + ": " + unreadable_with_first(stats));
-  }
+  const std::uint64_t left_out = timeline->counters().frames_bad;
+  if (stats.lines_bad > 0 || left_out > 0) progress.clear();
+  if (stats.lines_bad > 0) text::warn(path + ": " + unreadable_with_first(stats));
+  if (left_out > 0) text::warn(path + ": " + left_out_text(left_out));
 }
 
 // The constants as these drives show them, where the signals are right and the logs can be read

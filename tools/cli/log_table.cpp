@@ -63,6 +63,9 @@ diagnose::SignalTable read_log(const std::string& path, const daemon::Config& co
   }
   if (stats.lines_bad > 0) table.notes.push_back(path + ": " + unreadable_with_first(stats));
   note(bad, "frames whose length or kind is not the DBC's, ignored");
+  if (const std::uint64_t left_out = timeline->counters().frames_bad; left_out > 0) {
+    table.notes.push_back(path + ": " + left_out_text(left_out));
+  }
   note(timeline->counters().clock_steps, "steps of the log's clock, taken out");
   for (diagnose::Channel& each : table.channels) {
     each.t_s.shrink_to_fit();

@@ -101,6 +101,11 @@ std::string bad_line_text(const std::string& path, const can::BadLine& bad) {
   return path + (bad.line > 0 ? ":" : ": ") + bad.place() + ": " + bad.reason;
 }
 
+std::string left_out_text(std::uint64_t frames) {
+  return std::to_string(frames) +
+         " frames left out, their time stamps are far from their neighbours'";
+}
+
 std::string unreadable_text(const can::LogStats& stats) {
   return std::to_string(stats.lines_bad) + " unreadable" + unit_of(stats, stats.lines_bad);
 }

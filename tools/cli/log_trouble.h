@@ -1,6 +1,7 @@
 // What is said of a log that cannot be read, or not all of it. Tools only.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "can_dbc/log/can_log.h"
@@ -16,6 +17,9 @@ std::string no_frame_text(const std::string& path, const can::LogStats& stats);
 
 // "LOG:17: reason", "LOG: byte 4096: reason" for a binary log.
 std::string bad_line_text(const std::string& path, const can::BadLine& bad);
+
+// Of frames that were left out because of their stamps.
+std::string left_out_text(std::uint64_t frames);
 
 // "3 unreadable lines", "1 unreadable record" of a binary log.
 std::string unreadable_text(const can::LogStats& stats);

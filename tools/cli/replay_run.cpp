@@ -186,8 +186,7 @@ void describe_troubles(const can::LogStats& stats, const ports::TimelineCounters
     result.warnings.push_back(result.log + ": " + unreadable_text(stats) + " in all");
   }
   if (counters.frames_bad > 0) {
-    result.warnings.push_back(result.log + ": " + std::to_string(counters.frames_bad) +
-                              " frames left out, their time stamps are far from their neighbours'");
+    result.warnings.push_back(result.log + ": " + left_out_text(counters.frames_bad));
   }
   if (counters.clock_steps > 0) {
     result.warnings.push_back(result.log + ": the clock of the log was set " +

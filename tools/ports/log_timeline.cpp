@@ -13,10 +13,14 @@ constexpr std::int64_t kDisorder_ns = kSecond_ns;
 // comes from years before (chosen). Time then goes on after what stands for a pause.
 constexpr std::int64_t kClockSet_ns = 604'800 * kSecond_ns;
 constexpr std::int64_t kPause_ns = 600 * kSecond_ns;
+// A garbled line is alone, or one of a few; a clock that is set stays so (chosen). Of one stamp are
+// as many frames as a row of a table has cells.
+constexpr std::size_t kStrayStamps = 3;
+constexpr std::size_t kStrayFrames = 256;
 }  // namespace
 
-// One log, one frame ahead of what is taken. The two frames change places; none is copied before it
-// is known to be wanted.
+// One log, one frame ahead of what is taken, and some more where a stamp leaps. The two frames
+// change places; none is copied before it is known to be wanted, but what was read ahead of a leap.
 class LogTimeline::Source {
  public:
   Source(std::unique_ptr<can::LogReader> log, const FrameSelection& selection,
@@ -53,15 +57,12 @@ class LogTimeline::Source {
 
   // False at the end.
   bool step() {
-    for (;;) {
-      std::swap(first_, second_);
-      if (!first_->there) return false;
-      read(*second_);
-      const std::int64_t t_ns = first_->record.t_ns;
-      const bool leaps = has_before_ && t_ns - before_ns_ > kDisorder_ns;
-      if (!leaps || !second_->there || second_->record.t_ns >= t_ns - kDisorder_ns) break;
+    shift();
+    for (std::size_t left = strays(); left > 0; --left) {
       ++counters_.frames_bad;
+      shift();
     }
+    if (!first_->there) return false;
     const std::int64_t log_ns = first_->record.t_ns;
     if (has_before_) {
       const std::int64_t gap_ns = log_ns - before_ns_;
@@ -74,6 +75,52 @@ class LogTimeline::Source {
     last_ns_ = has_before_ ? std::max(last_ns_, log_ns + shift_ns_) : log_ns;
     has_before_ = true;
     return true;
+  }
+
+  void shift() {
+    std::swap(first_, second_);
+    if (!first_->there) return;
+    if (next_more_ == more_.size()) {
+      read(*second_);
+      return;
+    }
+    *second_ = more_[next_more_++];
+    if (next_more_ < more_.size()) return;
+    more_.clear();
+    next_more_ = 0;
+  }
+
+  // The frame so many behind the first.
+  const Ahead& ahead(std::size_t count) {
+    if (count == 0) return *first_;
+    if (count == 1) return *second_;
+    const std::size_t at = next_more_ + count - 2;
+    while (more_.size() <= at) read(more_.emplace_back());
+    return more_[at];
+  }
+
+  // How many frames from the first on are of garbled lines: the few whose stamps lie apart from the
+  // frame before, where the next one takes the leap back.
+  std::size_t strays() {
+    if (!first_->there || !has_before_) return 0;
+    const std::int64_t begin_ns = first_->record.t_ns;
+    const bool is_back = begin_ns < before_ns_ - kDisorder_ns;
+    if (!is_back && begin_ns <= before_ns_ + kDisorder_ns) return 0;
+    const std::int64_t end_ns = (is_back ? before_ns_ : begin_ns) - kDisorder_ns;
+    std::size_t stamps = 1;
+    std::int64_t last_ns = begin_ns;
+    for (std::size_t count = 1; count <= kStrayFrames; ++count) {
+      const Ahead& next = ahead(count);
+      if (!next.there) return 0;
+      const std::int64_t next_ns = next.record.t_ns;
+      if (is_back == (next_ns >= end_ns)) {
+        const bool leaps_too = !is_back || next_ns > last_ns + kDisorder_ns;
+        return leaps_too ? count : 0;
+      }
+      if (next_ns != last_ns && ++stamps > kStrayStamps) return 0;
+      last_ns = next_ns;
+    }
+    return 0;
   }
 
   void read(Ahead& ahead) {
@@ -99,6 +146,8 @@ class LogTimeline::Source {
   Ahead one_, other_;
   Ahead* first_ = &one_;
   Ahead* second_ = &other_;
+  std::vector<Ahead> more_;  // behind the second, where they were looked at
+  std::size_t next_more_ = 0;
   bool has_before_ = false;
   std::int64_t before_ns_ = 0;  // stamp in the log of the frame before
   std::int64_t last_ns_ = 0;    // stamp on the timeline of the frame before

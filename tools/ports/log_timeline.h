@@ -1,8 +1,9 @@
 // One or several logs as one timeline: merged by stamp, frames of one interface or of all, of one
-// bus or two, stamps made monotonic. A single stamp that leaps ahead of its successor marks a
-// garbled line: the frame is dropped and counted. Where the stamps of a log step back, or ahead by
-// more than a week, its clock was set: time goes on without the step. A shorter gap is a pause of
-// the recording, and time passes in it. Memory flat. Tools only.
+// bus or two, stamps made monotonic. A stamp, or a few, from which the next one leaps back to where
+// the time was marks a garbled line: its frame is dropped and counted. Where the stamps of a log
+// step back and stay there, or ahead by more than a week, its clock was set: time goes on without
+// the step. A shorter gap is a pause of the recording, and time passes in it. Memory flat. Tools
+// only.
 #pragma once
 
 #include <cstdint>

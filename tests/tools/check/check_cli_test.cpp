@@ -384,6 +384,26 @@ TEST_F(Check, APauseOfTheWholeBus) {
       << found["across"];
 }
 
+// One stamp of a log is garbled: its frame has no part in what is found, and is counted.
+TEST_F(Check, AStampThatLiesBack) {
+  Drive wrong = drive("coast-overdrive");
+  std::size_t at = wrong.log.find(" 130#", wrong.log.size() / 2);
+  at = wrong.log.rfind('\n', at) + 1;
+  wrong.log.replace(at, wrong.log.find(')', at) - at, "(2.000000");
+  const json found = check(wrong);
+  for (const auto& [role, of] : found["roles"].items()) {
+    EXPECT_EQ(count(of["findings"], "gap"), 0) << role << of["findings"];
+  }
+  for (const char* command : {"check", "diagnose"}) {
+    const RunResult result =
+        beltgrip({command, place.path("trace.log"), "--config", place.path("beltgrip.toml")});
+    EXPECT_TRUE(has(result.out + result.err,
+                    "trace.log: 1 frames left out, their time stamps are far from "
+                    "their neighbours'"))
+        << command << result.err;
+  }
+}
+
 TEST_F(Check, AMessageThatEndsBeforeTheLog) {
   Drive wrong = drive("coast-overdrive");
   wrong.log =

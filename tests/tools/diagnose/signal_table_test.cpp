@@ -72,6 +72,20 @@ TEST(Csv, ALineWithFewerCellsThanTheHeaderHasNoValues) {
             "a.csv:2: fewer cells than the header has; expected one for each column");
 }
 
+// A garbled time is ignored, as in a log; a clock that stays back was set.
+TEST(Csv, ALineWhoseTimeLiesBackAloneSetsNoClock) {
+  const std::string header = "t[s],primary_speed[rad/s]\n";
+  const SignalTable alone = parse_csv(header + "20,1\n20.1,2\n2,3\n1,4\n20.2,5\n20.3,6\n", "a.csv");
+  EXPECT_EQ(alone[Role::kPrimarySpeed].value, (std::vector<double>{1.0, 2.0, 5.0, 6.0}));
+  EXPECT_DOUBLE_EQ(alone[Role::kPrimarySpeed].t_s.back(), 20.3);
+  ASSERT_EQ(alone.notes.size(), 1U);
+  EXPECT_EQ(alone.notes[0], "a.csv:4: 2 lines whose time does not increase, ignored");
+  const SignalTable set = parse_csv(header + "20,1\n21,2\n16,3\n17,4\n18,5\n19,6\n", "a.csv");
+  EXPECT_EQ(set[Role::kPrimarySpeed].value.size(), 6U);
+  ASSERT_EQ(set.notes.size(), 1U);
+  EXPECT_EQ(set.notes[0], "a.csv:4: 1 times the clock was set back: a new stretch begins");
+}
+
 TEST(Csv, AShareHasTheUnitOneOrPercent) {
   const SignalTable table =
       parse_csv("t[s],accelerator_pedal[1],primary_speed[rad/s]\n0,0.5,1\n", "a.csv");

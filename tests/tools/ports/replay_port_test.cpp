@@ -145,6 +145,69 @@ TEST(LogTimeline, ALonelyLeapIsAGarbledLine) {
   EXPECT_EQ(log.counters().clock_steps, 0u);
 }
 
+// Time goes on from before it: no clock was set.
+TEST(LogTimeline, ALonelyStepBackIsAGarbledLine) {
+  for (const std::int64_t back : {0 * kS, 14 * kS}) {
+    LogTimeline log = timeline({{{15 * kS + 540 * kMs},
+                                 {15 * kS + 545 * kMs},
+                                 {back},
+                                 {15 * kS + 555 * kMs},
+                                 {15 * kS + 560 * kMs}}});
+    EXPECT_EQ(stamps(log), (Stamps{15 * kS + 540 * kMs, 15 * kS + 545 * kMs, 15 * kS + 555 * kMs,
+                                   15 * kS + 560 * kMs}));
+    EXPECT_EQ(log.counters().frames_bad, 1U);
+    EXPECT_EQ(log.counters().clock_steps, 0U);
+  }
+}
+
+TEST(LogTimeline, SoAreAFewStampsApartFromTheirNeighbours) {
+  LogTimeline back = timeline({{{15 * kS}, {14 * kS - kMs}, {3 * kS}, {14 * kS}, {16 * kS}}});
+  EXPECT_EQ(stamps(back), (Stamps{15 * kS, 15 * kS, 16 * kS})) << "14 s are a little disorder";
+  EXPECT_EQ(back.counters().frames_bad, 2U);
+  LogTimeline ahead = timeline({{{1 * kS}, {99 * kS}, {98 * kS}, {1 * kS + kMs}, {2 * kS}}});
+  EXPECT_EQ(stamps(ahead), (Stamps{1 * kS, 1 * kS + kMs, 2 * kS}));
+  EXPECT_EQ(ahead.counters().frames_bad, 2U);
+  // A row of a table is many frames of one stamp.
+  std::vector<Line> rows{{5 * kS}};
+  for (std::uint32_t column = 0; column < 40; ++column) rows.push_back({1 * kS, column});
+  rows.push_back({5 * kS + kMs});
+  LogTimeline row = timeline({rows});
+  EXPECT_EQ(stamps(row), (Stamps{5 * kS, 5 * kS + kMs}));
+  EXPECT_EQ(row.counters().frames_bad, 40U);
+}
+
+// It ran on from there until it passed the stamp from before, or the log ended.
+TEST(LogTimeline, AStepBackThatLastsIsAClockThatWasSet) {
+  std::vector<Line> lines{{10 * kS}};
+  for (int i = 0; i <= 40; ++i) lines.push_back({8 * kS + 100 * i * kMs});
+  LogTimeline log = timeline({lines});
+  const Stamps found = stamps(log);
+  ASSERT_EQ(found.size(), 42U);
+  EXPECT_EQ(found[1], 10 * kS);
+  EXPECT_EQ(found[41], 14 * kS);
+  EXPECT_EQ(log.counters().frames_bad, 0U);
+  EXPECT_EQ(log.counters().clock_steps, 1U);
+  // Few frames, and a step so short that they come near the time before it at once.
+  LogTimeline slow = timeline(
+      {{{10 * kS}, {8 * kS + 800 * kMs}, {9 * kS}, {9 * kS + 200 * kMs}, {9 * kS + 400 * kMs}}});
+  EXPECT_EQ(stamps(slow), (Stamps{10 * kS, 10 * kS, 10 * kS + 200 * kMs, 10 * kS + 400 * kMs,
+                                  10 * kS + 600 * kMs}));
+  EXPECT_EQ(slow.counters().frames_bad, 0U);
+  LogTimeline last = timeline({{{10 * kS}, {11 * kS}, {2 * kS}}});
+  EXPECT_EQ(stamps(last), (Stamps{10 * kS, 11 * kS, 11 * kS}));
+  EXPECT_EQ(last.counters().clock_steps, 1U);
+}
+
+// However long the run of frames is that nobody can tell, it is held to its bound.
+TEST(LogTimeline, AStampThatStandsLongIsNoGarbledLine) {
+  std::vector<Line> lines{{5 * kS}};
+  for (std::uint32_t i = 0; i < 10000; ++i) lines.push_back({1 * kS, i});
+  lines.push_back({5 * kS});
+  LogTimeline log = timeline({lines});
+  EXPECT_EQ(stamps(log).size(), 10002U);
+  EXPECT_EQ(log.counters().frames_bad, 0U);
+}
+
 TEST(LogTimeline, AClockSetBackOrFarAheadIsTakenOut) {
   LogTimeline back = timeline({{{5000 * kS}, {5001 * kS}, {1401 * kS}, {1402 * kS}}});
   EXPECT_EQ(stamps(back), (Stamps{5000 * kS, 5001 * kS, 5001 * kS, 5002 * kS}));

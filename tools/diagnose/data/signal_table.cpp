@@ -125,6 +125,7 @@ class CsvParser {
     while (!header.empty()) {
       const std::string_view cell = can::bare_cell(next_cell(header, separator_));
       columns_.push_back(read_column(cell));
+      if (columns_.back().time) time_ = columns_.size() - 1;
       has_time |= columns_.back().time;
     }
     if (!has_time) fail("no column t[s]; expected a header such as t[s],primary_speed[rad/s],...");
@@ -206,8 +207,9 @@ class CsvParser {
       count(bad_rows_, first_bad_row_);
       return;
     }
-    // A clock that is set back begins a new stretch too; a few lines in disorder do not.
-    if (rows_ > 0 && t_s + shift_s_ < last_t_s_ - kSetBack_s) {
+    // A clock that is set back begins a new stretch too; a few lines in disorder do not, nor a
+    // garbled time.
+    if (rows_ > 0 && t_s + shift_s_ < last_t_s_ - kSetBack_s && !goes_on()) {
       shift_s_ = last_t_s_ + kSetBack_s - t_s;
       count(set_back_, first_set_back_);
     }
@@ -227,6 +229,22 @@ class CsvParser {
       channel.value.push_back(*value);
     }
   }
+  // The time, in one of the next few lines, from where it was before this one.
+  bool goes_on() {
+    std::string_view rest = rest_;
+    for (std::size_t looked = 0; looked < kStrayRows && !rest.empty();) {
+      const std::string_view line = next_line(rest);
+      if (!is_row(line)) continue;
+      ++looked;
+      can::split_row(line, separator_, cells_);
+      double value = 0.0;
+      if (width_.wrong(cells_) != nullptr || parse_number(cells_[time_], value) != Cell::kNumber) {
+        continue;
+      }
+      if (value * columns_[time_].unit.factor + shift_s_ > last_t_s_) return true;
+    }
+    return false;
+  }
   void count(std::size_t& counter, std::size_t& first) const {
     if (counter++ == 0) first = line_;
   }
@@ -241,7 +259,10 @@ class CsvParser {
   can::RowWidth width_;
   std::vector<std::optional<double>> values_;
   std::array<bool, daemon::kRoleCount> seen_{};
+  std::size_t time_ = 0;  // its column
   static constexpr double kSetBack_s = 3.0;
+  // A garbled line is alone, or one of a few; a clock that is set stays so (chosen).
+  static constexpr std::size_t kStrayRows = 3;
   static constexpr double kLatest_s = 1e11;  // beyond, seconds have no microseconds left
   std::size_t rows_ = 0, bad_rows_ = 0, first_bad_row_ = 0, backward_ = 0, first_backward_ = 0;
   std::size_t long_rows_ = 0, first_long_row_ = 0, short_rows_ = 0, first_short_row_ = 0;
