@@ -23,23 +23,32 @@ using log_text::trim_end;
 
 constexpr std::size_t kClassicPayload = 8;
 
-// Identifier digits as candump writes them: three for a standard one, eight for an extended one or
-// an error frame. Fewer than eight are taken as well.
+constexpr std::size_t kStandardDigits = 3;
+constexpr std::size_t kExtendedDigits = 8;
+
+// Identifier digits: three for a standard one, eight for an extended one or an error frame. On the
+// console older candumps pad with blanks, so that there may be fewer.
 bool read_id(std::string_view digits, CanFrame& frame) {
-  if (digits.empty() || digits.size() > 8) return false;
+  if (digits.empty() || digits.size() > kExtendedDigits) return false;
   std::uint32_t id = 0;
   for (const char c : digits) {
     const int value = hex_value(c);
     if (value < 0) return false;
     id = (id << 4) | static_cast<std::uint32_t>(value);
   }
-  if (digits.size() == 8) {
+  if (digits.size() == kExtendedDigits) {
     frame.error = (id & kErrorFlag) != 0;
     frame.id = {id & kExtendedIdMax, !frame.error};
     return true;
   }
-  frame.id = {id, digits.size() > 3};
+  frame.id = {id, digits.size() > kStandardDigits};
   return frame.id.value <= (frame.id.extended ? kExtendedIdMax : kStandardIdMax);
+}
+
+// "_9" to "_F" behind eight bytes is the raw length code of a classic frame.
+bool is_length_code(std::string_view text, std::size_t length) {
+  return length == kClassicPayload && text.size() == 2 && text[0] == '_' &&
+         hex_value(text[1]) > static_cast<int>(kClassicPayload);
 }
 
 class CandumpParser : public LineParser {
@@ -73,6 +82,10 @@ class CandumpParser : public LineParser {
     const LineKind kind = hash != std::string_view::npos ? compact_frame(word, hash, record.frame)
                                                          : console_frame(word, line, record.frame);
     if (kind != LineKind::kFrame) return kind;
+    const std::string_view direction = hash != std::string_view::npos ? take_word(line) : "";
+    if (!direction.empty() && (!is_direction(direction) || !take_word(line).empty())) {
+      return bad("more behind the frame than R or T");
+    }
     after_error_ = record.frame.error;
     record.t_ns = *t_ns;
     if (delta_ && hash == std::string_view::npos) {
@@ -82,7 +95,7 @@ class CandumpParser : public LineParser {
       record.t_ns = sum_ns_;
     }
     record.interface = interface;
-    record.sent = hash != std::string_view::npos && take_word(line) == "T";
+    record.sent = direction == "T";
     return LineKind::kFrame;
   }
 
@@ -94,9 +107,14 @@ class CandumpParser : public LineParser {
   }
 
  private:
+  static bool is_direction(std::string_view word) { return word == "R" || word == "T"; }
+
   // "123#0011", "123#R8", "12345678##10011", "123#00.11".
   LineKind compact_frame(std::string_view word, std::size_t hash, CanFrame& frame) {
-    if (!read_id(word.substr(0, hash), frame)) return bad("unreadable identifier");
+    if ((hash != kStandardDigits && hash != kExtendedDigits) ||
+        !read_id(word.substr(0, hash), frame)) {
+      return bad("unreadable identifier; expected 3 or 8 hexadecimal digits");
+    }
     word.remove_prefix(hash + 1);
     if (word.starts_with('#')) {
       constexpr int kBitRateSwitch = 1;
@@ -113,7 +131,11 @@ class CandumpParser : public LineParser {
       word.remove_prefix(1);
       if (word.empty()) return LineKind::kFrame;
       const int length = hex_value(word[0]);
-      if (length < 0 || length > 8) return bad("remote frame with an unreadable length");
+      word.remove_prefix(1);
+      if (length < 0 || length > 8 ||
+          !(word.empty() || is_length_code(word, static_cast<std::size_t>(length)))) {
+        return bad("remote frame with an unreadable length");
+      }
       frame.length = static_cast<std::uint8_t>(length);
       return LineKind::kFrame;
     }
@@ -132,9 +154,10 @@ class CandumpParser : public LineParser {
       frame.data[length++] = static_cast<std::uint8_t>(high << 4 | low);
       word.remove_prefix(2);
     }
-    // "_9" to "_F" behind eight bytes is the raw length code of a classic frame.
     if (word.size() == 1 && hex_value(word[0]) >= 0) return bad("odd number of data digits");
-    if (!word.empty() && word[0] != '_') return bad("data that are no hexadecimal digits");
+    if (!word.empty() && (frame.fd || !is_length_code(word, length))) {
+      return bad("data that are no hexadecimal digits");
+    }
     frame.length = static_cast<std::uint8_t>(length);
     return LineKind::kFrame;
   }

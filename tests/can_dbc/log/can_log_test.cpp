@@ -213,6 +213,58 @@ TEST(CandumpLog, CountsBrokenLinesWithNumberAndReason) {
   EXPECT_EQ(log.stats.first_bad[4].reason, "odd number of data digits");
 }
 
+// The grammar is that of can-utils, above parse_canframe() in its lib.h.
+TEST(CandumpLog, WhatCandumpDoesNotWriteIsNoFrame) {
+  const char* const wrong[] = {"12#11",
+                               "1#11",
+                               "12345#11",
+                               "0012#11",
+                               "0000123#11",
+                               "123456789#11",
+                               "#11",
+                               "123#11_22_zz",
+                               "123#11_",
+                               "123#11_9",
+                               "123#1122334455667788_8",
+                               "123#1122334455667788_BB",
+                               "123##11122334455667788_B",
+                               "123#11 garbage here",
+                               "123#11 X",
+                               "123#11 R R",
+                               "123#11 RT",
+                               "123#R garbage",
+                               "123#R9",
+                               "123#R4_B",
+                               "123#R44",
+                               "123#Rx",
+                               "123#R8_8",
+                               "123#R_B"};
+  std::string lines = "(1.0) can0 123#00\n";
+  for (const char* frame : wrong) lines += "(1.0) can0 " + std::string(frame) + "\n";
+  const Log log = read(lines);
+  EXPECT_EQ(log.frames.size(), 1U);
+  for (std::size_t i = 1; i < log.frames.size(); ++i) ADD_FAILURE() << log.frames[i].text();
+  EXPECT_EQ(log.stats.lines_bad, std::size(wrong));
+  EXPECT_EQ(log.stats.first_bad.at(0).reason,
+            "unreadable identifier; expected 3 or 8 hexadecimal digits");
+  const Log right = read(
+      "(1.0) can0 123#R8_C\n"
+      "(1.0) can0 12345678#R4 T\n"
+      "(1.0) can0 123#r0 R\n"
+      "(1.0) can0 123#11.22 T\n"
+      "(1.0) can0 123##0.11.22\n"
+      "(1.0) can0 123##011 R\n"
+      "(1.0) can0 123# R\n"
+      "(1.0) can0 123#11.22.33.44.55.66.77.88_f T\n");
+  EXPECT_EQ(right.stats.lines_bad, 0U);
+  ASSERT_EQ(right.frames.size(), 8U);
+  EXPECT_EQ(right.frames[0].text(), "can0 123#R8");
+  EXPECT_EQ(right.frames[1].text(), "can0 12345678#R4");
+  EXPECT_EQ(right.frames[3].text(), "can0 123#1122");
+  EXPECT_EQ(right.frames[4].text(), "can0 123##01122");
+  EXPECT_EQ(right.frames[7].text(), "can0 123#1122334455667788");
+}
+
 // --- candump, console ----------------------------------------------------------------------------
 
 TEST(CandumpLog, ConsoleFormatWithAbsoluteTimes) {
