@@ -112,6 +112,12 @@ class HeadReader {
       if (is_time(head_.columns[i], head_.time_unit_ns)) head_.time = i;
     }
     if (head_.rows == 0) return {};
+    if (head_.time) {
+      // A clock or a date needs no unit.
+      const Column& time = head_.columns[*head_.time];
+      head_.time_unit_unknown =
+          time.numbers > 0 && !is_missing(time.unit) && !time_unit(lower(time.unit));
+    }
     return std::move(head_);
   }
 
@@ -128,7 +134,10 @@ class HeadReader {
           continue;
         }
         head_.separator = separator;
-        for (const std::string_view cell : cells_) head_.columns.push_back(column_of(cell));
+        for (const std::string_view cell : cells_) {
+          head_.columns.push_back(column_of(cell));
+          head_.columns.back().unit_line = lines_.number();
+        }
         head_.width = can::RowWidth(cells_.size());
         return true;
       }
@@ -145,7 +154,9 @@ class HeadReader {
     }
     if (!unit) return false;
     for (std::size_t i = 0; i < std::min(cells_.size(), head_.columns.size()); ++i) {
-      if (head_.columns[i].unit.empty()) head_.columns[i].unit = cells_[i];
+      if (!head_.columns[i].unit.empty()) continue;
+      head_.columns[i].unit = cells_[i];
+      head_.columns[i].unit_line = lines_.number();
     }
     return true;
   }

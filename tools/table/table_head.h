@@ -16,6 +16,7 @@ namespace beltgrip::table {
 struct Column {
   std::string name;                // without a unit in brackets
   std::string unit;                // of the brackets, or of the row of units
+  std::uint64_t unit_line = 0;     // where that stands
   std::vector<std::string> texts;  // the values of a column without a number
   std::uint64_t numbers = 0;
   std::optional<int> decimals = 0;  // the most; none: written with an exponent
@@ -26,7 +27,8 @@ struct Head {
   std::vector<Column> columns;
   std::optional<std::size_t> time;  // its column
   std::int64_t time_unit_ns = 1'000'000'000;
-  std::uint64_t first_row = 0;  // its line
+  bool time_unit_unknown = false;  // numbers of a unit that is none of time
+  std::uint64_t first_row = 0;     // its line
   std::uint64_t rows = 0;
   can::RowWidth width;
 };

@@ -104,6 +104,38 @@ TEST_F(TableCli, ATableThatIsNothingButRowsOfTooManyCellsCannotBeUsed) {
   }
 }
 
+// What is no unit of time was read as seconds.
+TEST_F(TableCli, ATimeInAnotherUnitIsRefused) {
+  const std::string toml = path("rig/beltgrip.toml");
+  const std::string roles =
+      "primary_speed[rad/s],secondary_speed[rad/s],secondary_pressure[Pa],primary_torque[Nm]\n";
+  const auto rows = [](bool clock) {
+    std::string csv;
+    for (int i = 10; i < 50; ++i) {
+      csv += (clock ? "10:00:" : "") + std::to_string(i) + ",100,225,1000000,20\n";
+    }
+    return csv;
+  };
+  const auto check = [&](const std::string& csv) {
+    place_->write("unit.csv", csv);
+    return beltgrip({"check", path("unit.csv"), "--config", toml});
+  };
+  for (const char* unit : {"bar", "furlong", "rad/s"}) {
+    const RunResult result = check("# a rig\nt[" + std::string(unit) + "]," + roles + rows(false));
+    EXPECT_EQ(result.status, 65) << unit << result.out;
+    EXPECT_TRUE(has(result.err, "unit.csv:2: time in '" + std::string(unit) +
+                                    "', expected s, ms, us, ns, min or h, as in t[s]"))
+        << result.err;
+  }
+  const RunResult row = check("Time," + roles + "bar,,,,\n" + rows(false));
+  EXPECT_EQ(row.status, 65) << row.out;
+  EXPECT_TRUE(has(row.err, "unit.csv:2: time in 'bar'")) << row.err;
+  for (const char* unit : {"t[s],", "t[ms],", "t,", "t[-],", "Time (us),"}) {
+    EXPECT_EQ(check(unit + roles + rows(false)).status, 0) << unit;
+  }
+  EXPECT_EQ(check("Time [hh:mm:ss]," + roles + rows(true)).status, 0) << "they say it themselves";
+}
+
 // As scan tools write them: a row of units, comments, texts, columns of no role, no time.
 std::string scan_table() {
   std::ostringstream out;
