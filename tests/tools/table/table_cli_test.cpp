@@ -230,7 +230,21 @@ TEST_F(TableCli, WhatDoesNotGoTogether) {
   const RunResult unit =
       beltgrip({"check", path("scan.csv"), "--rate", "2", "--config", path("wrong.toml")});
   EXPECT_EQ(unit.status, 78);
-  EXPECT_TRUE(has(unit.err, "expected a unit of pressure")) << unit.err;
+  EXPECT_TRUE(has(unit.err,
+                  "wrong.toml:2: signals.secondary_pressure: found unit \"degree C\" in the table "
+                  "(temperature), expected a unit of pressure such as Pa; set unit in { column = "
+                  "\"...\", unit = \"...\" }"))
+      << unit.err;
+  // A column that is called like the role says its unit itself; the key stands further down.
+  place_->write("bar.csv", "t[s],primary_speed[bar]\n0,1\n1,2\n");
+  place_->write("role.toml", "[signals]\n# speeds\nprimary_speed = \"TCU_Speed.PrimarySpeed\"\n");
+  const RunResult role = beltgrip({"check", path("bar.csv"), "--config", path("role.toml")});
+  EXPECT_EQ(role.status, 78);
+  EXPECT_TRUE(has(role.err,
+                  "role.toml:3: signals.primary_speed: found unit \"bar\" in the table (pressure), "
+                  "expected a unit of angular speed such as rad/s; set it in the header, as in "
+                  "primary_speed[rad/s]"))
+      << role.err;
 }
 
 }  // namespace

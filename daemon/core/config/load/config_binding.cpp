@@ -14,6 +14,7 @@ constexpr std::size_t kMuxDepth = 16;
 // Values at which a flag is 1. Derived: all of a signal of 8 bits.
 constexpr std::size_t kNamedMost = 256;
 constexpr std::uint32_t kClassicPayload = 8;
+constexpr const char* kUnitOfSignal = "unit in { signal = \"...\", unit = \"...\" }";
 
 std::string signal_text(const can::SignalDef& signal) {
   return std::to_string(signal.start_bit) + "|" + std::to_string(signal.length) +
@@ -25,12 +26,15 @@ std::string signal_text(const can::SignalDef& signal) {
 // added to the errors; then there is no binding.
 class RoleBinder {
  public:
-  RoleBinder(Role role, const TomlNode& node, const RoleText& text, ConfigErrors& errors)
+  // unit_hint: where a unit that is wrong can be set.
+  RoleBinder(Role role, const TomlNode& node, const RoleText& text, ConfigErrors& errors,
+             std::string unit_hint)
       : role_(role),
         key_(key_of("signals", role_name(role))),
         node_(node),
         text_(text),
-        errors_(errors) {}
+        errors_(errors),
+        unit_hint_(std::move(unit_hint)) {}
 
   std::optional<RoleBinding> from_diagnostics(const UdsSource& source) const;
   // `binding` knows its message already.
@@ -60,6 +64,7 @@ class RoleBinder {
   const TomlNode& node_;
   const RoleText& text_;
   ConfigErrors& errors_;
+  std::string unit_hint_;
 };
 
 // The raw values at which a flag is 1: texts or numbers of the signal's value table. False when
@@ -155,9 +160,7 @@ std::optional<can::Unit> RoleBinder::unit_of(const can::SignalDef& signal,
   }
   const std::string wanted = "a unit of " + std::string(can::dimension_name(dimension)) +
                              " such as " + std::string(can::si_unit_text(dimension));
-  const std::string hint = has_unit    ? ""
-                           : text_.uds ? "; set unit in { uds = { ... }, unit = \"...\" }"
-                                       : "; set unit in { signal = \"...\", unit = \"...\" }";
+  const std::string hint = has_unit ? "" : "; set " + unit_hint_;
   if (!unit || unit->dimension == can::Dimension::kNone) {
     errors_.add(line, key_, found, wanted + hint);
     return {};
@@ -276,7 +279,8 @@ std::optional<RoleBinding> SignalCatalogue::bind(Role role, const TomlNode& node
   const std::string key = key_of("signals", role_name(role));
   const std::optional<RoleText> text = read_role(key, node, errors);
   if (!text) return {};
-  const RoleBinder binder(role, node, *text, errors);
+  const RoleBinder binder(role, node, *text, errors,
+                          text->uds ? "unit in { uds = { ... }, unit = \"...\" }" : kUnitOfSignal);
   if (!text->uds && text->signal.empty()) {
     errors.add(line_in_role(node, "column"), key, "a column, which no bus has",
                "signal = \"Message.Signal\" beside it; check, calibrate and replay of a table do "
@@ -356,10 +360,16 @@ std::optional<RoleBinding> SignalCatalogue::bind_column(Role role, const TomlNod
   }
   binding.message_name = message->name;
   binding.id = message->id;
-  static const TomlNode kNone;
-  const TomlNode& of_signal = as_role || node == nullptr ? kNone : *node;
+  const std::string unit_hint =
+      as_role ? "it in the header, as in " + std::string(role_name(role)) + "[" +
+                    std::string(can::si_unit_text(role_dimension(role))) + "]"
+      : text.column.empty() ? kUnitOfSignal
+                            : "unit in { column = \"...\", unit = \"...\" }";
+  TomlNode bare;  // its place alone
+  if (node != nullptr) bare.line = node->line;
+  const TomlNode& of_signal = as_role || node == nullptr ? bare : *node;
   if (as_role) text = {};
-  return RoleBinder(role, of_signal, text, errors)
+  return RoleBinder(role, of_signal, text, errors, unit_hint)
       .from_message(std::move(binding), *message, signal, "the table");
 }
 
