@@ -250,9 +250,9 @@ History read_logs(const HistoryOptions& options, int& exit_code) {
       options.file.empty() ? std::make_optional<Scratch>() : std::nullopt;
   HistoryOptions filled = options;
   filled.file = scratch ? scratch->path() : folder_of(options.file);
-  for (const std::string& line : fill_history(filled.file, options.from, config)) {
-    text::complain(line);
-    exit_code = kBadInput;
+  for (const Failure& failure : fill_history(filled.file, options.from, config)) {
+    text::complain(failure.text);
+    if (exit_code == kDone) exit_code = failure.exit_code;
   }
   History history = read_history(filled.file, options.config);
   if (scratch) history.path = std::to_string(options.from.size()) + " logs";

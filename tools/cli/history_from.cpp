@@ -11,7 +11,6 @@
 #include "daemon/core/config/load/config_fingerprint.h"
 #include "daemon/io/carried_keeper.h"
 #include "daemon/io/history_keeper.h"
-#include "tools/cli/failure.h"
 #include "tools/cli/replay_run.h"
 #include "tools/cli/stop_signals.h"
 #include "tools/text/terminal.h"
@@ -45,7 +44,7 @@ void sort_by_time(auto& all) {
 }
 
 Replayed results_of(const std::vector<std::string>& logs, const daemon::Config& config,
-                    std::vector<std::string>& unusable) {
+                    std::vector<Failure>& unusable) {
   Replayed all;
   double undated_s = 0.0;                 // where the undated logs so far have come to
   std::set<std::filesystem::path> taken;  // one without dates would be another drive, later
@@ -56,7 +55,7 @@ Replayed results_of(const std::vector<std::string>& logs, const daemon::Config& 
     try {
       replayed = replay({log}, "", config, {});
     } catch (const Failure& failure) {
-      unusable.push_back(failure.text);
+      unusable.push_back(failure);
       continue;
     }
     if (stop_asked()) break;  // of a log that is not read whole nothing is kept
@@ -95,10 +94,9 @@ std::set<double> kept_in(const std::string& folder, const std::string& fingerpri
 
 }  // namespace
 
-std::vector<std::string> fill_history(const std::string& folder,
-                                      const std::vector<std::string>& logs,
-                                      const daemon::Config& config) {
-  std::vector<std::string> unusable;
+std::vector<Failure> fill_history(const std::string& folder, const std::vector<std::string>& logs,
+                                  const daemon::Config& config) {
+  std::vector<Failure> unusable;
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (access(folder.c_str(), W_OK | X_OK) != 0) {

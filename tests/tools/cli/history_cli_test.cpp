@@ -128,8 +128,10 @@ TEST_F(History, FromLogs) {
   std::vector<std::string> first(logs.begin(), logs.begin() + 4);
   first.push_back(place.path("none.log"));
   const RunResult part = history({kept}, first);
-  EXPECT_EQ(part.status, 65) << part.err;
+  EXPECT_EQ(part.status, 66) << part.err;
   EXPECT_EQ(lines(part.err), 1) << part.err;
+  place.write("empty.log", "nothing\n");
+  EXPECT_EQ(history({}, {place.path("empty.log")}).status, 65);
   EXPECT_EQ(history({kept}, {logs.begin() + 4, logs.end()}).status, 0);
   EXPECT_EQ(history({kept}, logs).status, 0);
   const auto opened = HistoryDb::open_to_read(place.path("fleet/car17/history.db"));
