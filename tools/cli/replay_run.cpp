@@ -9,6 +9,7 @@
 #include "can_dbc/log/can_log.h"
 #include "can_dbc/log/candump_writer.h"
 #include "can_dbc/text/format.h"
+#include "daemon/core/config/load/signal_catalogue.h"
 #include "daemon/core/loop/loop.h"
 #include "daemon/core/observe/reasons_now.h"
 #include "daemon/core/publish/names.h"
@@ -274,6 +275,37 @@ std::string further_interface(const daemon::Config& config) {
 
 namespace {
 
+// Why no value of a role came.
+std::string why_unseen(const daemon::Pipeline& pipeline, const daemon::Config& config,
+                       daemon::Role role) {
+  const std::string no_value = "no frame brought a value of it that is in the DBC's range";
+  const auto bound = std::find_if(config.roles.begin(), config.roles.end(),
+                                  [role](const auto& each) { return each.role == role; });
+  if (bound == config.roles.end() || bound->uds) return no_value;
+  const daemon::RoleBinding& binding = *bound;
+  const daemon::FramesCame came = pipeline.frames_came(role);
+  if (config.table) {
+    return came == daemon::FramesCame::kTaken
+               ? no_value
+               : "no cell of its column \"" + binding.message_name + "\" is a value";
+  }
+  const std::string frame = binding.message_name + " (" + daemon::id_text(binding.id) + ")";
+  switch (came) {
+    case daemon::FramesCame::kNone:
+      return "no frame of " + frame + " came" +
+             (binding.bus == 0 ? "" : " on " + further_interface(config));
+    case daemon::FramesCame::kOfOtherKind:
+      return "every frame of " + frame + " has another length or kind than the DBC's " +
+             std::to_string(binding.message_length) + " bytes, " +
+             (binding.message_fd ? "CAN FD" : "classic");
+    case daemon::FramesCame::kRefused:
+      return "every frame of " + frame + " is refused, its counter or CRC is wrong";
+    case daemon::FramesCame::kTaken:
+      break;
+  }
+  return no_value;
+}
+
 // What keeps the inputs at the end of a log from being a sample; empty if nothing does.
 std::string why_unusable(const daemon::Pipeline& pipeline, const daemon::Config& config) {
   using daemon::Role;
@@ -283,7 +315,7 @@ std::string why_unusable(const daemon::Pipeline& pipeline, const daemon::Config&
        {Role::kPrimarySpeed, Role::kSecondarySpeed, Role::kSecondaryPressure, torque}) {
     const std::string name(daemon::role_name(role));
     const daemon::SignalObservation seen = pipeline.signal(role);
-    if (!seen.seen) return name + ": no frame brought a value of it that is in the DBC's range";
+    if (!seen.seen) return name + ": " + why_unseen(pipeline, config, role);
     if (role == Role::kPrimarySpeed && seen.value <= 0.0) {
       return name + format(" is not above zero (last %.3g rad/s); is its sign wrong?", seen.value);
     }

@@ -184,19 +184,33 @@ FrameUse InputMonitor::on_frame(const RxFrame& frame, FaultSet& faults) noexcept
   if (can_frame.remote || can_frame.fd != message->fd || can_frame.length != message->length) {
     if (!is_followed(*message, source_of(can_frame.id))) return FrameUse::kForeign;
     faults.raise(Fault::kInputFrame, t);
+    message->came = std::max(message->came, FramesCame::kOfOtherKind);
     return FrameUse::kBad;
   }
   message->guard.count(t);
   if (message->guard.wrong_rate()) faults.raise(Fault::kInputRate, t);
   if (!message->guard.admit(can_frame)) {
     faults.raise(Fault::kInputProtection, t);
+    message->came = std::max(message->came, FramesCame::kRefused);
     return FrameUse::kBad;
   }
+  message->came = FramesCame::kTaken;
   newest = t;
   for (std::size_t i = 0; i < message->row_count; ++i) {
     take(rows_[message->rows[i]], can_frame.payload(), source_of(can_frame.id), t, faults);
   }
   return FrameUse::kTaken;
+}
+
+FramesCame InputMonitor::frames_came(Role role) const noexcept {
+  for (std::size_t i = 0; i < message_count_; ++i) {
+    const Message& message = messages_[i];
+    const auto* const end = message.rows.begin() + message.row_count;
+    if (std::find(message.rows.begin(), end, static_cast<std::uint8_t>(role)) != end) {
+      return message.came;
+    }
+  }
+  return FramesCame::kNone;
 }
 
 // False when an answer is too short for a role that it should hold.

@@ -39,6 +39,10 @@ namespace beltgrip::daemon {
 
 enum class FrameUse : std::uint8_t { kForeign, kTaken, kBad };
 
+// Of a role's message, the best of them: of another length or kind than the DBC's, refused for
+// counter or CRC, or such that its value was looked at.
+enum class FramesCame : std::uint8_t { kNone, kOfOtherKind, kRefused, kTaken };
+
 class InputMonitor {
  public:
   // Silence after which a signal of this period is stale: two and a half periods, and no less than
@@ -64,6 +68,8 @@ class InputMonitor {
   estimator::ReadingVerdict verdict(Role role) const noexcept { return row(role).verdict; }
   // Of the newest value heard; tested are those whose spikes are left out (spike_gate.h).
   estimator::ReadingStatus status(Role role) const noexcept;
+  // kNone for a role of diagnostics.
+  FramesCame frames_came(Role role) const noexcept;
   bool is_bound(Role role) const noexcept { return row(role).binding != nullptr; }
   const SignalHistory& history(Role role) const noexcept { return row(role).history; }
   // The newest value; `otherwise` where the configuration has no such role, or none has come. fresh
@@ -142,6 +148,7 @@ class InputMonitor {
     can::CanId id;
     std::bitset<256> sources;  // J1939; else none
     bool fd = false;
+    FramesCame came = FramesCame::kNone;
     std::uint8_t length = 0;
     std::uint8_t row_count = 0;
     std::array<std::uint8_t, kRoleCount> rows{};

@@ -274,6 +274,10 @@ const PipelineCounters& Pipeline::counters() const noexcept { return parts_->cou
 
 std::size_t Pipeline::bus_count() const noexcept { return parts_->config.further_bus ? 2 : 1; }
 
+FramesCame Pipeline::frames_came(Role role) const noexcept {
+  return parts_->input.channels().frames_came(role);
+}
+
 SignalObservation Pipeline::signal(Role role) const noexcept {
   const InputMonitor& channels = parts_->input.channels();
   const SignalHistory& history = channels.history(role);

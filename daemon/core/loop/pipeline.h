@@ -88,6 +88,7 @@ class Pipeline {
   const PipelineCounters& counters() const noexcept;
   std::size_t bus_count() const noexcept;  // that it listens to
   SignalObservation signal(Role role) const noexcept;
+  FramesCame frames_came(Role role) const noexcept;
 
  private:
   struct Parts;

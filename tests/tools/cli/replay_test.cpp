@@ -381,6 +381,57 @@ TEST_F(Replay, TextSaysWhyThereIsNoValue) {
   }
 }
 
+// A value that never came has one cause, and that one is told.
+TEST_F(Replay, TextSaysWhyNoValueCame) {
+  const std::string log = place_->read("trace.log");
+  const std::string config = place_->read("beltgrip.toml");
+  std::string message = config.substr(config.find("\nsecondary_pressure"));
+  message = message.substr(message.find('"') + 1);
+  message = message.substr(0, message.find('.'));
+  const std::string dbc = place_->read("vehicle.dbc");
+  const std::size_t named = dbc.find(" " + message + ":");
+  ASSERT_NE(named, std::string::npos) << message;
+  char id[8];
+  std::snprintf(id, sizeof id, "%03X",
+                static_cast<unsigned>(std::stoul(dbc.substr(dbc.rfind(' ', named - 1)))));
+  const auto why = [&](const char* instead, const std::string& toml) {
+    std::string changed;
+    std::istringstream lines(log);
+    for (std::string line; std::getline(lines, line);) {
+      const std::size_t at = line.find(std::string(" ") + id + "#");
+      if (at == std::string::npos) {
+        changed += line + '\n';
+      } else if (instead != nullptr) {
+        changed += line.substr(0, at + 4) + instead + line.substr(at + 5) + '\n';
+      }
+    }
+    place_->write("changed.log", changed);
+    place_->write("changed.toml", toml);
+    const RunResult result =
+        beltgrip({"replay", path("changed.log"), "--config", path("changed.toml"), "--json", "-"});
+    EXPECT_EQ(result.status, 0) << result.err;
+    return result.err;
+  };
+  const std::string frame = message + " (0x" + id + ")";
+  const auto expect = [](const std::string& found, const std::string& said) {
+    EXPECT_NE(found.find("no experiment: secondary_pressure: " + said), std::string::npos)
+        << found << said;
+  };
+  expect(why(nullptr, config), "no frame of " + frame + " came");
+  expect(why("##0", config),
+         "every frame of " + frame + " has another length or kind than the DBC's 6 bytes, classic");
+  // On a further bus, which the log has no frame of.
+  std::string two = config;
+  const std::size_t begin = two.find("\nsecondary_pressure");
+  const std::string signal =
+      two.substr(two.find('"', begin), two.find('\n', begin + 1) - two.find('"', begin));
+  two.replace(begin, two.find('\n', begin + 1) - begin,
+              "\nsecondary_pressure = { signal = " + signal.substr(0, signal.find('"', 1) + 1) +
+                  ", bus = \"two\" }");
+  two.insert(two.find("\n[signals]"), "\n[bus.two]\ninterface = \"can7\"\n");
+  expect(why("#", two), "no frame of " + frame + " came on can7");
+}
+
 // Outside the box of a learned term no sample can be corrected: the term, its variable, its box and
 // what to do are told, whether an experiment ran or none could begin.
 TEST_F(Replay, ALearnedTermThatDoesNotReachSoFarIsNamed) {

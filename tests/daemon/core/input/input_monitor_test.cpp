@@ -87,6 +87,34 @@ TEST(InputMonitor, EveryIdentifierLengthAndKind) {
   }
 }
 
+// Of a role's message, so that a value that never came has a cause.
+TEST(InputMonitor, WhatFramesCame) {
+  const Config config = one_signal(Role::kOilTemperature, signal_def(8, can::ValueType::kUnsigned));
+  Bench bench(config);
+  const auto came = [&bench](std::optional<can::CanFrame> frame) {
+    if (frame) bench.monitor.on_frame(at(MonoTime::of_ns(1), *frame), bench.faults);
+    return bench.monitor.frames_came(Role::kOilTemperature);
+  };
+  EXPECT_EQ(came({}), FramesCame::kNone);
+  can::CanFrame other = raw_frame(1);
+  other.id.value = 0x101;
+  EXPECT_EQ(came(other), FramesCame::kNone);
+  EXPECT_EQ(came(raw_frame(1, 7)), FramesCame::kOfOtherKind);
+  EXPECT_EQ(came(raw_frame(1)), FramesCame::kTaken);
+  EXPECT_EQ(came(raw_frame(1, 7)), FramesCame::kTaken);
+  EXPECT_EQ(bench.monitor.frames_came(Role::kEngineSpeed), FramesCame::kNone);
+
+  Config guarded = config;
+  guarded.protections.push_back(
+      {.id = {0x100, false}, .counter = {}, .crc = CrcProtection{.byte = 0, .data_id = 0x100}});
+  Bench refusing(guarded);
+  for (int i = 0; i < 9; ++i) {
+    refusing.monitor.on_frame(at(MonoTime::of_ns(10'000'000 * i), raw_frame(0xAA)),
+                              refusing.faults);
+  }
+  EXPECT_EQ(refusing.monitor.frames_came(Role::kOilTemperature), FramesCame::kRefused);
+}
+
 TEST(InputMonitor, ExtendedIdentifiersAreFoundAmongMany) {
   Config config;
   config.trigger = Trigger::kAlways;
