@@ -2,8 +2,11 @@
 
 #include <map>
 
+#include "can_dbc/text/number_text.h"
 #include "daemon/core/config/options/config_model.h"
+#include "estimator/physics/variator_geometry.h"
 #include "tools/cli/failure.h"
+#include "tools/text/terminal.h"
 
 namespace beltgrip::cli {
 namespace {
@@ -39,6 +42,30 @@ void lay(const MachineEffects& model, MachineEffects& machine) {
   }
 }
 
+// The running radius follows from belt and centre distance: of a radius that the model states, the
+// belt that has it.
+template <typename Variator>
+void take_radius(double stated_m, double own_m, double ratio, Variator& variator) {
+  if (stated_m == own_m) return;
+  variator.belt_length_m =
+      estimator::belt_length_m(stated_m, stated_m / ratio, variator.centre_distance_m);
+}
+
+// Beyond the box of a function the machine has its value at the edge: made up, so it is said.
+void warn_beyond_box(const estimator::LearnedTerm& term, const sim::RigScenario& scenario) {
+  using enum estimator::LearnedVariable;
+  const auto warn = [&](const char* role, double value, const char* unit) {
+    if (term.covers(value)) return;
+    text::warn("[learned." + std::string(term.name.data()) + "]: " + role + " of " +
+               number_text(value) + " " + unit + " lies outside the box (" +
+               number_text(term.knot[0]) + " to " + number_text(term.knot[term.count - 1]) +
+               "); the machine has its value at the edge there");
+  };
+  if (term.variable == kOilTemperature) warn("oil_temperature", scenario.oil_degC, "degC");
+  if (term.variable == kPrimarySpeed) warn("primary_speed", scenario.primary_speed_rad_s, "rad/s");
+  if (term.variable == kTorque) warn("primary_torque", scenario.primary_torque_Nm, "Nm");
+}
+
 }  // namespace
 
 void apply_model(const std::string& path, sim::RigScenario& scenario) {
@@ -48,11 +75,17 @@ void apply_model(const std::string& path, sim::RigScenario& scenario) {
   (low ? variator.ratio_low : variator.ratio_overdrive) = scenario.variator.ratio;
   variator.secondary_piston_area_m2 = scenario.variator.secondary_piston_area_m2;
   variator.secondary_spring_force_N = scenario.variator.secondary_spring_force_N;
+  double& own_radius_m = low ? variator.primary_radius_low_m : variator.primary_radius_overdrive_m;
+  own_radius_m = estimator::running_radii(scenario.variator.ratio, scenario.variator.belt_length_m,
+                                          scenario.variator.centre_distance_m)
+                     .primary_m;
   const ModelFile model = read(path, variator);
   scenario.variator.half_wedge_angle_rad = model.variator.half_wedge_angle_rad;
   scenario.variator.ratio = low ? model.variator.ratio_low : model.variator.ratio_overdrive;
   scenario.variator.secondary_piston_area_m2 = model.variator.secondary_piston_area_m2;
   scenario.variator.secondary_spring_force_N = model.variator.secondary_spring_force_N;
+  take_radius(low ? model.variator.primary_radius_low_m : model.variator.primary_radius_overdrive_m,
+              own_radius_m, scenario.variator.ratio, scenario.variator);
   take(model.driveline, "deformation_per_kN", scenario.variator.deformation_per_N, 1e-3);
   sim::FrictionCurve& belt = scenario.belts.at(scenario.belt);
   take(model.friction, "mu_max", belt.mu_max);
@@ -71,6 +104,7 @@ void apply_model(const std::string& path, sim::RigScenario& scenario) {
   whole.centrifugal_N_s2 += model.variator.secondary_centrifugal_N_s2;
   lay(whole, scenario.effects);
   scenario.learned = daemon::learned_terms(model);
+  for (const estimator::LearnedTerm& each : scenario.learned) warn_beyond_box(each, scenario);
 }
 
 void apply_model(const std::string& path, sim::VehicleScenario& scenario) {
@@ -82,6 +116,9 @@ void apply_model(const std::string& path, sim::VehicleScenario& scenario) {
   variator.secondary_piston_area_m2 = v.secondary_piston_area_m2;
   variator.secondary_spring_force_N = v.secondary_spring_force_N;
   variator.secondary_centrifugal_N_s2 = v.secondary_centrifugal_N_s2;
+  variator.primary_radius_overdrive_m =
+      estimator::running_radii(v.ratio_overdrive, v.belt_length_m, v.centre_distance_m).primary_m;
+  const double own_radius_m = variator.primary_radius_overdrive_m;
   variator.primary_inertia_kg_m2 = scenario.engine.inertia_kg_m2 + v.primary_inertia_kg_m2;
   const double known_inertia = variator.primary_inertia_kg_m2;
   const ModelFile model = read(path, variator);
@@ -91,6 +128,8 @@ void apply_model(const std::string& path, sim::VehicleScenario& scenario) {
   v.secondary_piston_area_m2 = model.variator.secondary_piston_area_m2;
   v.secondary_spring_force_N = model.variator.secondary_spring_force_N;
   v.secondary_centrifugal_N_s2 = model.variator.secondary_centrifugal_N_s2;
+  // One belt has both radii: that of the overdrive counts.
+  take_radius(model.variator.primary_radius_overdrive_m, own_radius_m, v.ratio_overdrive, v);
   v.primary_inertia_kg_m2 += model.variator.primary_inertia_kg_m2 - known_inertia;
   take(model.driveline, "deformation_per_kN", v.deformation_per_N, 1e-3);
   take(model.driveline, "loss_constant_Nm", v.primary_loss_Nm);

@@ -111,6 +111,42 @@ TEST(Simulate, WritesTheTruth) {
   EXPECT_NEAR(experiment.at("slip_peak_percent").get<double>(), 2.4, 1e-12);
 }
 
+// A radius that is larger by a twentieth carries the torque with so much less force.
+TEST(Simulate, AModelsRadiusIsTheMachines) {
+  Workplace place;
+  place.write("radius.toml", "[variator]\nprimary_radius_overdrive_m = 0.08229\n");
+  const auto peak_force_N = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"simulate", "--scenario", "paper-rig", "--json", "-"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const RunResult result = beltgrip(arguments);
+    EXPECT_EQ(result.status, 0) << result.err;
+    const std::size_t at = result.out.find("\"clamp_force_peak_N\":");
+    return at == std::string::npos ? 0.0 : std::stod(result.out.substr(at + 21));
+  };
+  const double usual_N = peak_force_N({});
+  ASSERT_GT(usual_N, 2000.0);
+  EXPECT_NEAR(peak_force_N({"--model", place.path("radius.toml")}) / usual_N, 1.0 / 1.05, 2e-3);
+}
+
+TEST(Simulate, AMachineBeyondTheBoxOfAFunctionIsToldSo) {
+  Workplace place;
+  place.write("learned.toml",
+              "[learned.drag]\nacts_on = \"torque\"\ndepends_on = [\"oil_temperature\"]\n"
+              "knots = [40.0, 60.0]\nvalues = [0.0, 1.0]\ncovariance = [0.0, 0.0, 0.0, 0.0]\n"
+              "box = { oil_temperature = [40.0, 60.0] }\n");
+  const RunResult beyond = beltgrip({"simulate", "--scenario", "paper-rig", "--duration", "1",
+                                     "--model", place.path("learned.toml"), "--json", "-"});
+  EXPECT_EQ(beyond.status, 0) << beyond.err;
+  EXPECT_NE(beyond.err.find("[learned.drag]: oil_temperature of 80 degC lies outside the box (40 "
+                            "to 60)"),
+            std::string::npos)
+      << beyond.err;
+  const RunResult within =
+      beltgrip({"simulate", "--scenario", "paper-rig", "--duration", "1", "--set",
+                "run.oil_degC=50", "--model", place.path("learned.toml"), "--json", "-"});
+  EXPECT_EQ(within.err.find("outside the box"), std::string::npos) << within.err;
+}
+
 TEST(Simulate, SettingsAndMistakes) {
   Workplace place;
   place.write("bad.toml", "[driveline]\nsecondary_inertia_kg_m2 = -1\n\n[sensor]\nx = 1\n");

@@ -26,7 +26,7 @@ TEST(Csv, ReadsRolesInTheirUnits) {
   ASSERT_EQ(table[Role::kOilTemperature].value.size(), 2U);
   EXPECT_NEAR(table[Role::kOilTemperature].value[0], 80.0, 1e-9);
   EXPECT_DOUBLE_EQ(table[Role::kSecondaryPressure].value[2], 22e5);
-  EXPECT_TRUE(table.notes.empty());
+  EXPECT_EQ(table.notes, std::vector<std::string>{"a.csv:4: 1 value that is not finite, left out"});
 }
 
 TEST(Csv, TakesSemicolonsTabsAndMarks) {
@@ -45,8 +45,8 @@ TEST(Csv, CountsWhatItLeavesOut) {
   EXPECT_EQ(table[Role::kPrimarySpeed].value.size(), 2U);
   ASSERT_EQ(table.notes.size(), 3U);
   EXPECT_EQ(table.notes[0], "a.csv:1: column 'colour[]' names no role, ignored");
-  EXPECT_EQ(table.notes[1], "a.csv:3: 1 lines that are not numbers, ignored");
-  EXPECT_EQ(table.notes[2], "a.csv:5: 1 lines whose time does not increase, ignored");
+  EXPECT_EQ(table.notes[1], "a.csv:3: 1 line that is not all numbers, ignored");
+  EXPECT_EQ(table.notes[2], "a.csv:5: 1 line whose time does not increase, ignored");
 }
 
 // A decimal comma beside commas between the cells moves every value behind it by one.
@@ -55,7 +55,7 @@ TEST(Csv, ALineWithMoreCellsThanTheHeaderHasNoValues) {
   EXPECT_EQ(table[Role::kPrimarySpeed].value, (std::vector<double>{1.0, 3.0}));
   ASSERT_EQ(table.notes.size(), 1U);
   EXPECT_EQ(table.notes[0],
-            "a.csv:3: 1 lines with more cells than the header, ignored (decimal commas?)");
+            "a.csv:3: 1 line with more cells than the header, ignored (decimal commas?)");
   EXPECT_EQ(error_of("t[s],primary_speed[rad/s]\n0,1,5\n1,2,5\n"),
             "a.csv:2: more cells than the header has; expected decimal points");
 }
@@ -72,6 +72,21 @@ TEST(Csv, ALineWithFewerCellsThanTheHeaderHasNoValues) {
             "a.csv:2: fewer cells than the header has; expected one for each column");
 }
 
+TEST(Csv, ValuesThatAreNotFiniteAreLeftOutAndCounted) {
+  const SignalTable table = parse_csv(
+      "t[s],oil_temperature[K],primary_speed[rad/s]\n0,NaN,1\n1,300,inf\n2,,3\n3,301,4\n", "a.csv");
+  EXPECT_EQ(table[Role::kPrimarySpeed].value, (std::vector<double>{1.0, 3.0, 4.0}));
+  ASSERT_EQ(table.notes.size(), 1U);  // an empty cell is usual
+  EXPECT_EQ(table.notes[0], "a.csv:2: 2 values that are not finite, left out");
+}
+
+TEST(Csv, DecimalCommasBetweenSemicolonsAreNamed) {
+  EXPECT_EQ(error_of("t[s];primary_speed[rad/s]\n0,0;1,5\n0,1;1,6\n"),
+            "a.csv:2: found decimal commas, expected decimal points");
+  EXPECT_EQ(error_of("t[s];primary_speed[rad/s]\nx;y\nz;w\n"),
+            "a.csv:2: no line with numbers after the header");
+}
+
 // A garbled time is ignored, as in a log; a clock that stays back was set.
 TEST(Csv, ALineWhoseTimeLiesBackAloneSetsNoClock) {
   const std::string header = "t[s],primary_speed[rad/s]\n";
@@ -83,7 +98,7 @@ TEST(Csv, ALineWhoseTimeLiesBackAloneSetsNoClock) {
   const SignalTable set = parse_csv(header + "20,1\n21,2\n16,3\n17,4\n18,5\n19,6\n", "a.csv");
   EXPECT_EQ(set[Role::kPrimarySpeed].value.size(), 6U);
   ASSERT_EQ(set.notes.size(), 1U);
-  EXPECT_EQ(set.notes[0], "a.csv:4: 1 times the clock was set back: a new stretch begins");
+  EXPECT_EQ(set.notes[0], "a.csv:4: 1 time the clock was set back: a new stretch begins");
 }
 
 TEST(Csv, AShareHasTheUnitOneOrPercent) {

@@ -31,15 +31,15 @@ std::string_view next_cell(std::string_view& line, char separator) {
   return cell;
 }
 
-// Missing: an empty cell, NaN. Otherwise a number or nothing at all.
-enum class Cell { kNumber, kMissing, kBad };
+// Missing: an empty cell; NaN or an infinity is none either. Otherwise a number or nothing at all.
+enum class Cell { kNumber, kMissing, kNotFinite, kBad };
 Cell parse_number(std::string_view text, double& value) {
   text = can::bare_cell(text);
   if (text.empty()) return Cell::kMissing;
   if (text.front() == '+') text.remove_prefix(1);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size()) return Cell::kBad;
-  return std::isfinite(value) ? Cell::kNumber : Cell::kMissing;
+  return std::isfinite(value) ? Cell::kNumber : Cell::kNotFinite;
 }
 
 struct Column {
@@ -76,13 +76,23 @@ class CsvParser {
       line_ = first_wrong_row_;
       fail(first_wrong_);
     }
-    if (rows_ == 0) fail("no line with numbers after the header");
-    note(long_rows_, first_long_row_,
-         "lines with more cells than the header, ignored (decimal commas?)");
-    note(short_rows_, first_short_row_, "lines with fewer cells than the header, ignored");
-    note(bad_rows_, first_bad_row_, "lines that are not numbers, ignored");
-    note(set_back_, first_set_back_, "times the clock was set back: a new stretch begins");
-    note(backward_, first_backward_, "lines whose time does not increase, ignored");
+    if (rows_ == 0) {
+      line_ = bad_rows_ > 0 ? first_bad_row_ : std::max<std::size_t>(line_, 1);
+      fail(has_decimal_comma_ ? "found decimal commas, expected decimal points"
+                              : "no line with numbers after the header");
+    }
+    note(long_rows_, first_long_row_, "line", "lines",
+         " with more cells than the header, ignored (decimal commas?)");
+    note(short_rows_, first_short_row_, "line", "lines",
+         " with fewer cells than the header, ignored");
+    note(bad_rows_, first_bad_row_, "line that is not all numbers",
+         "lines that are not all numbers", ", ignored");
+    note(not_finite_, first_not_finite_, "value that is not finite", "values that are not finite",
+         ", left out");
+    note(set_back_, first_set_back_, "time", "times",
+         " the clock was set back: a new stretch begins");
+    note(backward_, first_backward_, "line whose time does not increase",
+         "lines whose time does not increase", ", ignored");
     return std::move(table_);
   }
 
@@ -90,10 +100,11 @@ class CsvParser {
   [[noreturn]] void fail(const std::string& what) const {
     throw TableError{false, name_ + ":" + std::to_string(line_) + ": " + what};
   }
-  void note(std::size_t count, std::size_t first, const std::string& what) {
+  void note(std::size_t count, std::size_t first, const char* one, const char* many,
+            const char* then) {
     if (count == 0) return;
     table_.notes.push_back(name_ + ":" + std::to_string(first) + ": " + std::to_string(count) +
-                           " " + what);
+                           " " + (count == 1 ? one : many) + then);
   }
 
   static bool is_row(std::string_view line) {
@@ -191,8 +202,12 @@ class CsvParser {
       double value = 0.0;
       switch (parse_number(cells_[i], value)) {
         case Cell::kBad:
+          has_decimal_comma_ |= separator_ != ',' && cells_[i].find(',') != std::string_view::npos;
           count(bad_rows_, first_bad_row_);
           return;
+        case Cell::kNotFinite:
+          if (columns_[i].role) count(not_finite_, first_not_finite_);
+          break;
         case Cell::kMissing:
           break;
         case Cell::kNumber:
@@ -265,6 +280,8 @@ class CsvParser {
   static constexpr std::size_t kStrayRows = 3;
   static constexpr double kLatest_s = 1e11;  // beyond, seconds have no microseconds left
   std::size_t rows_ = 0, bad_rows_ = 0, first_bad_row_ = 0, backward_ = 0, first_backward_ = 0;
+  std::size_t not_finite_ = 0, first_not_finite_ = 0;
+  bool has_decimal_comma_ = false;
   std::size_t long_rows_ = 0, first_long_row_ = 0, short_rows_ = 0, first_short_row_ = 0;
   const char* first_wrong_ = nullptr;  // what is wrong with the first line of another width
   std::size_t first_wrong_row_ = 0;
