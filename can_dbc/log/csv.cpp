@@ -156,12 +156,11 @@ bool is_true(std::string_view field) {
 
 // Of an identifier: extended or not; nothing: a word of another column.
 std::optional<bool> is_extended(std::string_view field) {
-  static constexpr std::array<std::string_view, 5> kExtended{"ext", "extended", "xtd", "eff",
-                                                             "ide"};
-  static constexpr std::array<std::string_view, 9> kStandard{"",   "0",   "f",        "false", "n",
-                                                             "no", "std", "standard", "sff"};
-  if (is_true(field)) return true;
-  if (field.size() == 1 && field[0] == '0') return false;
+  static constexpr std::array<std::string_view, 11> kExtended{
+      "true", "1", "t", "x", "yes", "y", "ext", "extended", "xtd", "eff", "ide"};
+  static constexpr std::array<std::string_view, 9> kStandard{"false", "0",   "f",        "",   "no",
+                                                             "n",     "std", "standard", "sff"};
+  if (field == "0" || field == "false") return false;  // as most are
   const std::string plain = plain_name(field);
   const auto is_in = [&plain](const auto& words) {
     return std::find(words.begin(), words.end(), plain) != words.end();
@@ -458,8 +457,10 @@ class CsvParser : public LineParser {
         break;
       }
       case Column::kLength:
-        if (const auto value = with_prefix_or(field, 10)) {
+        if (const auto value = decimal(field)) {
           payload.wanted_length = *value;
+        } else if (const auto marked = with_prefix_or(field, 10)) {
+          payload.wanted_length = *marked;
         } else if (!field.empty()) {
           return "unreadable length";
         }
