@@ -58,29 +58,41 @@ class LogTimeline::Source {
   // False at the end.
   bool step() {
     shift();
-    for (std::size_t left = strays(); left > 0; --left) {
-      ++counters_.frames_bad;
-      shift();
-    }
     if (!first_->there) return false;
-    const std::int64_t log_ns = first_->record.t_ns;
-    if (has_before_) {
-      const std::int64_t gap_ns = log_ns - before_ns_;
-      if (gap_ns < -kDisorder_ns || gap_ns > kClockSet_ns) {
-        shift_ns_ -= gap_ns < 0 ? gap_ns : gap_ns - kPause_ns;
-        ++counters_.clock_steps;
-      }
+    if (!has_before_) {
+      last_ns_ = before_ns_ = first_->record.t_ns;
+      has_before_ = true;
+      return true;
     }
-    before_ns_ = log_ns;
-    last_ns_ = has_before_ ? std::max(last_ns_, log_ns + shift_ns_) : log_ns;
-    has_before_ = true;
+    if (is_apart(first_->record.t_ns)) judge_leap();
+    before_ns_ = first_->record.t_ns;
+    last_ns_ = std::max(last_ns_, before_ns_ + shift_ns_);
     return true;
+  }
+
+  bool is_apart(std::int64_t t_ns) const {  // from the frame before
+    return t_ns < before_ns_ - kDisorder_ns || t_ns > before_ns_ + kDisorder_ns;
+  }
+
+  // Of the first frame, which lies apart: out of the way of those that do not.
+  [[gnu::noinline]] void judge_leap() {
+    while (is_apart(first_->record.t_ns)) {
+      const std::size_t count = strays();
+      if (count == 0) break;
+      counters_.frames_bad += count;
+      for (std::size_t i = 0; i < count; ++i) shift();
+    }
+    const std::int64_t gap_ns = first_->record.t_ns - before_ns_;
+    if (gap_ns < -kDisorder_ns || gap_ns > kClockSet_ns) {
+      shift_ns_ -= gap_ns < 0 ? gap_ns : gap_ns - kPause_ns;
+      ++counters_.clock_steps;
+    }
   }
 
   void shift() {
     std::swap(first_, second_);
     if (!first_->there) return;
-    if (next_more_ == more_.size()) {
+    if (more_.empty()) {
       read(*second_);
       return;
     }
@@ -99,13 +111,11 @@ class LogTimeline::Source {
     return more_[at];
   }
 
-  // How many frames from the first on are of garbled lines: the few whose stamps lie apart from the
-  // frame before, where the next one takes the leap back.
+  // How many frames from the first on, which lies apart, are of garbled lines: a few, and the next
+  // one takes the leap back.
   std::size_t strays() {
-    if (!first_->there || !has_before_) return 0;
     const std::int64_t begin_ns = first_->record.t_ns;
-    const bool is_back = begin_ns < before_ns_ - kDisorder_ns;
-    if (!is_back && begin_ns <= before_ns_ + kDisorder_ns) return 0;
+    const bool is_back = begin_ns < before_ns_;
     const std::int64_t end_ns = (is_back ? before_ns_ : begin_ns) - kDisorder_ns;
     std::size_t stamps = 1;
     std::int64_t last_ns = begin_ns;

@@ -167,6 +167,9 @@ TEST(LogTimeline, SoAreAFewStampsApartFromTheirNeighbours) {
   LogTimeline ahead = timeline({{{1 * kS}, {99 * kS}, {98 * kS}, {1 * kS + kMs}, {2 * kS}}});
   EXPECT_EQ(stamps(ahead), (Stamps{1 * kS, 1 * kS + kMs, 2 * kS}));
   EXPECT_EQ(ahead.counters().frames_bad, 2U);
+  LogTimeline fall = timeline({{{1 * kS}, {99 * kS}, {50 * kS}, {1 * kS + kMs}, {2 * kS}}});
+  EXPECT_EQ(stamps(fall), (Stamps{1 * kS, 1 * kS + kMs, 2 * kS}));
+  EXPECT_EQ(fall.counters().frames_bad, 2U);
   // A row of a table is many frames of one stamp.
   std::vector<Line> rows{{5 * kS}};
   for (std::uint32_t column = 0; column < 40; ++column) rows.push_back({1 * kS, column});
