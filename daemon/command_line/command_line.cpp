@@ -136,6 +136,7 @@ std::vector<std::string> Program::chosen() const {
 
 template Option Option::range(int, int) const;
 template Option Option::range(unsigned, unsigned) const;
+template Option Option::range(std::uint64_t, std::uint64_t) const;
 template Option Option::range(double, double) const;
 
 #define BELTGRIP_OPTION_TYPE(...)                                                                 \

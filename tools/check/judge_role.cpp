@@ -214,11 +214,15 @@ void Judge::protection() {
     }
   }
   if (course_.counter_still > 0) {
-    const std::string text = "counter of " + binding_.message_name + " stands still in " +
-                             count(course_.counter_still) +
-                             format(" (last %u): a frozen sender, or another signal is the counter",
-                                    course_.counter_last);
-    static_cast<double>(course_.counter_still) > kCrcWrongShare* frames ? wrong(text) : doubt(text);
+    const std::string text =
+        "counter of " + binding_.message_name + " stands still in " + count(course_.counter_still) +
+        format(
+            " (last %u): a frozen sender, another signal is the counter, or each "
+            "frame is there twice, as in a log of two interfaces "
+            "(--interface takes one)",
+            course_.counter_last);
+    static_cast<double>(course_.counter_still) > kStillWrongShare* frames ? wrong(text)
+                                                                          : doubt(text);
   }
   if (course_.counter_jumps > 0) {
     const double share = static_cast<double>(course_.counter_jumps) / frames;

@@ -635,6 +635,12 @@ std::string no_experiment(const ReplayResult& result) {
   std::string why = result.unusable;
   const std::string inhibits = inhibits_text(result);
   if (why.empty() && !inhibits.empty()) why = "with no pedal pressed, kept away by " + inhibits;
+  if (why.empty() && result.frames_bad > result.frames_decoded) {
+    why = "counter or CRC is wrong in " + std::to_string(result.frames_bad) + " of " +
+          std::to_string(result.frames_bad + result.frames_decoded) +
+          " frames of its messages: a log of two interfaces (--interface takes one)? `beltgrip "
+          "check` tells them apart";
+  }
   if (why.empty()) why = "the trigger's conditions never held for long enough";
   return "no experiment: " + why;
 }

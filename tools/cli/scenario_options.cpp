@@ -30,6 +30,9 @@ std::string shipped_names() {
   return names;
 }
 
+// Chosen: what a program that reads JSON keeps of an integer.
+constexpr std::uint64_t kSeedMost = std::uint64_t{1} << 53;
+
 // Before a parser sees it.
 sim::ScenarioLayer bounded(sim::ScenarioLayer layer) {
   if (const auto beyond = daemon::beyond_bounds(layer.text)) {
@@ -106,7 +109,9 @@ void ScenarioOptions::add_to(command_line::Command command) {
   command.add_option("--belt", belt, "The belt that is mounted")
       .type_name("BELT")
       .one_of({"new", "worn"});
-  command.add_option("--seed", seed, "Seed of the sensor noise").capture_default_str();
+  command.add_option("--seed", seed, "Seed of the sensor noise")
+      .capture_default_str()
+      .range(std::uint64_t{0}, kSeedMost);
   command.add_option("--start", start_s, "Leave out the first seconds")
       .type_name("SECONDS")
       .capture_default_str()

@@ -26,6 +26,41 @@ std::vector<json> parse(const std::string& text) {
   return result;
 }
 
+// As a gateway's two sides have it: each frame twice.
+TEST(LogOfTwoInterfaces, IsNamedAsSuch) {
+  Workplace place;
+  ASSERT_EQ(beltgrip({"simulate", "--scenario", "coast-overdrive", "--duration", "24", "--out-dir",
+                      place.path(""), "--quiet"})
+                .status,
+            0);
+  std::istringstream once(place.read("trace.log"));
+  std::string twice;
+  for (std::string line; std::getline(once, line);) {
+    twice += line + "\n";
+    const std::size_t name = line.find("vcan0");
+    ASSERT_NE(name, std::string::npos) << line;
+    twice += line.replace(name, 5, "can1") + "\n";
+  }
+  place.write("twice.log", twice);
+  const std::vector<std::string> with{place.path("twice.log"), "--config",
+                                      place.path("beltgrip.toml")};
+  const auto command = [&](const std::string& name, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{name};
+    arguments.insert(arguments.end(), with.begin(), with.end());
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return beltgrip(arguments);
+  };
+  const RunResult checked = command("check", {});
+  EXPECT_NE(checked.out.find("Not ready"), std::string::npos) << checked.out;
+  EXPECT_NE(checked.out.find("--interface"), std::string::npos) << checked.out;
+  const RunResult replayed = command("replay", {"--decide-anew"});
+  EXPECT_NE(replayed.out.find("a log of two interfaces (--interface takes one)?"),
+            std::string::npos)
+      << replayed.out;
+  const RunResult one = command("replay", {"--decide-anew", "--interface", "can1"});
+  EXPECT_EQ(one.out.find("two interfaces"), std::string::npos) << one.out;
+}
+
 class Replay : public testing::Test {
  protected:
   static void SetUpTestSuite() {
