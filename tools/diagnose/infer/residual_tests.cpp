@@ -102,12 +102,20 @@ struct Autocorrelation {
       chi2 += r * r * count[lag];
       ++degrees;
     }
-    return {acts_on, "whiteness", estimator::chi2_p(chi2, degrees),
+    return {acts_on, "whiteness", estimator::chi2_p(beyond_healthy(chi2, degrees), degrees),
             estimator::chi2_decades(chi2, degrees)};
   }
 };
 
 }  // namespace
+
+double beyond_healthy(double chi2, int degrees) {
+  // Measured, 1,735 tests in 76 healthy campaigns of two generators of other make: the largest by
+  // name 4 to 40 with one degree of freedom where noise alone gives 6 to 8. With 1 eight of the
+  // campaigns have a test that fails among so many (kNoChance), with 2.4, 3.0 and 3.6 none.
+  constexpr double kHealthyExcess = 3.0;
+  return chi2 > degrees ? degrees + (chi2 - degrees) / kHealthyExcess : chi2;
+}
 
 std::vector<ResidualTest> test_residuals(const Engine& engine, const ModelState& nominal) {
   const Campaign& campaign = engine.campaign();
@@ -153,10 +161,11 @@ std::vector<ResidualTest> test_residuals(const Engine& engine, const ModelState&
       with.pull[n] = 0.0;
       with.precision[n] = 1.0 / (kSizePrior * kSizePrior);
       const Fit fit = fit_linear(summaries, columns, with, none.scatter, kScatterIterations);
-      const double t = fit.step[n] / std::sqrt(fit.covariance(n, n));
+      const double t2 = fit.step[n] * fit.step[n] / fit.covariance(n, n);
       out.push_back(
           {where.acts_on, what.name,
-           estimator::student_p(t, engine.degrees(info.with_scatter, info.without_scatter))});
+           estimator::student_p(std::sqrt(beyond_healthy(t2, 1)),
+                                engine.degrees(info.with_scatter, info.without_scatter))});
     }
   }
   // The balance's slow copies are independent at every second of their samples, as they stand; the

@@ -13,9 +13,13 @@ namespace beltgrip::diagnose {
 struct ResidualTest {
   std::string acts_on;  // friction, ratio, torque; clamp force for the pressure's tracking
   std::string name;
-  double p = 1.0;
+  double p = 1.0;  // the chance of a healthy machine (beyond_healthy)
   double decades = 0.0;  // of whiteness: -log10(p)
 };
+
+// Of a chi-square what it is beyond those of healthy machines, whose residuals follow a little of
+// everything: no equation is theirs to the noise of an hour.
+double beyond_healthy(double chi2, int degrees);
 
 // Whiteness of each residual; step of friction, ratio and torque with the direction of the clamp
 // force, the sign of the torque and the end stop. Call with the engine's last noise model.

@@ -149,7 +149,8 @@ void add_tests(report::HtmlPage& page, const Diagnosis& d) {
                             " % of healthy campaigns";
   page.paragraph(
       "The scatter between experiments of a healthy machine lies beyond the noise, too. Tests of "
-      "these residuals, with that scatter and the noise's autocorrelation counted: " +
+      "these residuals, with that scatter, the noise's autocorrelation and what healthy machines "
+      "depart from any equation counted: " +
       (failed == 0
            ? "none fails (" + least + ")"
            : std::to_string(failed) + " of " + std::to_string(all.count) +
