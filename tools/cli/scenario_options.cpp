@@ -74,8 +74,9 @@ sim::ScenarioLayer layer_of(const std::string& scenario) {
   file.clear();
   const std::string text{std::istreambuf_iterator<char>(file), {}};
   if (says_nothing(text)) {
-    throw Failure{kConfiguration, scenario + ":1: found a file that sets nothing, expected a "
-                                             "scenario, e.g. plant = \"vehicle\" and what differs"};
+    throw Failure{kConfiguration, scenario +
+                                      ":1: found a file that sets nothing, expected a "
+                                      "scenario, e.g. plant = \"vehicle\" and what differs"};
   }
   return bounded({scenario, text});
 }
