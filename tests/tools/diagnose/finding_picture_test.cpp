@@ -49,6 +49,39 @@ TEST(FindingPicture, IsTheCauseOverWhatItFollows) {
   }
 }
 
+Engine healthy_machine();
+
+// A function that is not there: the data ask for none, and what is left with it is its opposite.
+TEST(FindingPicture, OfALearnedFunctionHasWhatTheDataAskFor) {
+  Engine engine = healthy_machine();
+  engine.update_noise();
+  ModelState state = engine.state();
+  estimator::LearnedTerm term;
+  term.point = estimator::LearnedPoint::kTorque;
+  term.variable = estimator::LearnedVariable::kTorque;
+  term.count = 2;
+  term.knot = {-200.0, 200.0};
+  term.value = {-8.0, 8.0};
+  state.learned = {term};
+  LearnedFinding learned;
+  learned.acts_on = "torque";
+  learned.depends_on = {"primary_torque"};
+  const auto points = points_of_learned(engine.campaign(), state, {learned});
+  ASSERT_EQ(points.size(), 1U);
+  ASSERT_EQ(points[0].size(), 2U);
+  const report::Series &asked = points[0][0], &left = points[0][1];
+  ASSERT_GT(asked.x.size(), 3U);
+  double squares = 0.0, asked_slope = 0.0, left_slope = 0.0;  // each experiment has its own zero
+  for (std::size_t i = 0; i < asked.x.size(); ++i) {
+    squares += asked.x[i] * asked.x[i];
+    asked_slope += asked.x[i] * asked.y[i];
+    left_slope += asked.x[i] * left.y[i];
+    EXPECT_NEAR(asked.y[i] - left.y[i], 0.04 * asked.x[i], 1e-2);
+  }
+  EXPECT_NEAR(asked_slope / squares, 0.0, 0.01);
+  EXPECT_NEAR(left_slope / squares, -0.04, 0.01);
+}
+
 Engine healthy_machine() {
   blind::Trial trial;
   trial.seed = 12;

@@ -5,9 +5,12 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
+#include "tools/diagnose/infer/cell_columns.h"
+#include "tools/diagnose/infer/index_variables.h"
 #include "tools/diagnose/model/effects/effect.h"
 #include "tools/diagnose/report/finding_words.h"
 
@@ -24,7 +27,7 @@ constexpr double kInformative = 1e-3;  // of the best point: less says nothing o
 struct Point {
   std::string_view acts_on;
   const char* label;
-  double shown;  // per unit
+  double (*shown)(double of_unit);
   QuantityChange (*unit)(const Residuals& at, const Eigen::VectorXd& nuisance);
 };
 
@@ -68,13 +71,18 @@ QuantityChange of_ratio(const Residuals& at, const Eigen::VectorXd& /*nuisance*/
   return out;
 }
 
+double as_it_is(double value) { return value; }
+double percent_of_ln(double ln) { return 1e2 * std::expm1(ln); }
+double per_mille(double share) { return 1e3 * share; }
+
 constexpr std::array<Point, 6> kActsOn{{
-    {"torque", "torque that the belt does not get, Nm", 1.0, of_torque},
-    {"secondary torque", "torque that the secondary shaft loses, Nm", 1.0, of_secondary_torque},
-    {"clamp force", "clamp force beyond the model's, N", 1.0, of_force},
-    {"friction", "friction beyond the model's, %", 1e2, of_friction},
-    {"ratio", "ratio beyond the model's, 1/1000", 1e3, of_ratio},
-    {"speed", "speed ratio beyond the model's, 1/1000", 1e3, of_ratio},
+    {"torque", "torque that the belt does not get, Nm", as_it_is, of_torque},
+    {"secondary torque", "torque that the secondary shaft loses, Nm", as_it_is,
+     of_secondary_torque},
+    {"clamp force", "clamp force beyond the model's, N", as_it_is, of_force},
+    {"friction", "friction beyond the model's, %", percent_of_ln, of_friction},
+    {"ratio", "ratio beyond the model's, 1/1000", per_mille, of_ratio},
+    {"speed", "speed ratio beyond the model's, 1/1000", per_mille, of_ratio},
 }};
 
 // What a finding may follow.
@@ -165,6 +173,12 @@ struct Sample {
   double x, column, by_finding, left;
 };
 
+void drop_not_finite(std::vector<Sample>& samples) {
+  std::erase_if(samples, [](const Sample& each) {
+    return !std::isfinite(each.x + each.column + each.by_finding + each.left);
+  });
+}
+
 std::vector<Sample> samples_of(const Campaign& campaign, const ModelState& extended, int slot,
                                const Point& point, const Variable& variable) {
   const double size = extended.effects[slot];
@@ -189,9 +203,34 @@ std::vector<Sample> samples_of(const Campaign& campaign, const ModelState& exten
       }
     }
   }
-  std::erase_if(out, [](const Sample& each) {
-    return !std::isfinite(each.x + each.column + each.by_finding + each.left);
-  });
+  drop_not_finite(out);
+  return out;
+}
+
+// Of a function that was learned: a unit of its point, as it is met in practice.
+std::vector<Sample> samples_of(const Campaign& campaign, const ModelState& extended,
+                               const estimator::LearnedTerm& term, const InjectionRow& row,
+                               const IndexVariable& variable) {
+  std::vector<Sample> out;
+  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
+    const ExperimentData& run = campaign.runs[e];
+    const int experiment = static_cast<int>(e);
+    const ArrayXd x = variable.value(run, experiment);
+    if (run.valid_count == 0 || x.size() == 0) continue;
+    Residuals with = residuals_of(campaign, experiment, extended);
+    prepare_derivatives(campaign, experiment, extended, with);
+    const ResidualColumns columns = propagate(
+        campaign, with, unit_change(extended, with, row, ArrayXd::Ones(with.foot.size())));
+    for (const ResidualKind kind : {kFrictionResidual, kBalanceResidual}) {
+      const auto k = static_cast<std::size_t>(kind);
+      for (Eigen::Index i = 0; i < columns[k].size(); ++i) {
+        if (!run.valid[static_cast<std::size_t>(i)] || columns[k][i] == 0.0) continue;
+        out.push_back(
+            {x[i], columns[k][i], columns[k][i] * term.at(x[i]) / row.unit, with.value[k][i]});
+      }
+    }
+  }
+  drop_not_finite(out);
   return out;
 }
 
@@ -245,7 +284,54 @@ std::optional<std::array<double, 2>> band_of(const Slot& slot,
   return std::nullopt;
 }
 
+// What belongs to a finding of the answer; nothing where one of them is missing.
+struct LearnedParts {
+  const estimator::LearnedTerm* term = nullptr;
+  const InjectionRow* row = nullptr;
+  const IndexVariable* variable = nullptr;
+};
+std::optional<LearnedParts> parts_of(const LearnedFinding& learned, const ModelState& extended) {
+  const auto role = estimator::learned_variable(learned.depends_on.front());
+  const auto row =
+      std::find_if(kInjections.begin(), kInjections.end(),
+                   [&](const InjectionRow& each) { return each.acts_on == learned.acts_on; });
+  const std::span<const IndexVariable> all = index_variables();
+  const auto variable = std::find_if(all.begin(), all.end(), [&](const IndexVariable& each) {
+    return each.learnable.has_value() && each.learnable == role;
+  });
+  const auto term = std::find_if(
+      extended.learned.begin(), extended.learned.end(), [&](const estimator::LearnedTerm& each) {
+        return each.variable == role &&
+               estimator::kLearnedPoints[static_cast<std::size_t>(each.point)] == learned.acts_on;
+      });
+  if (row == kInjections.end() || variable == all.end() || term == extended.learned.end()) {
+    return std::nullopt;
+  }
+  return LearnedParts{&*term, &*row, &*variable};
+}
+
 }  // namespace
+
+std::vector<std::vector<Series>> points_of_learned(const Campaign& campaign,
+                                                   const ModelState& extended,
+                                                   const std::vector<LearnedFinding>& learned) {
+  std::vector<std::vector<Series>> out;
+  for (const LearnedFinding& each : learned) {
+    Series before{"asked for by the data", {}, {}, false, false},
+        after{"left with the finding", {}, {}, false, false};
+    if (const auto parts = parts_of(each, extended)) {
+      const auto& [term, row, variable] = *parts;
+      for (const Asked& at : asked_by(samples_of(campaign, extended, *term, *row, *variable))) {
+        before.x.push_back(at.x);
+        after.x.push_back(at.x);
+        before.y.push_back(row->unit * (at.by_finding + at.left));
+        after.y.push_back(row->unit * at.left);
+      }
+    }
+    out.push_back({std::move(before), std::move(after)});
+  }
+  return out;
+}
 
 std::vector<report::Chart> pictures_of(const Campaign& campaign, const ModelState& extended,
                                        const std::vector<Finding>& findings) {
@@ -268,13 +354,12 @@ std::vector<report::Chart> pictures_of(const Campaign& campaign, const ModelStat
         after{"left with the finding", {}, {}, false, false};
     const auto band = band_of(slot, findings);
     for (const Asked& each : asked) {
-      const double size = point->shown * each.by_finding, left = point->shown * each.left;
       for (Series* series : {&law, &low, &high, &before, &after}) series->x.push_back(each.x);
-      law.y.push_back(size);
-      low.y.push_back(size * (band ? (*band)[0] : 1.0));
-      high.y.push_back(size * (band ? (*band)[1] : 1.0));
-      before.y.push_back(size + left);
-      after.y.push_back(left);
+      law.y.push_back(point->shown(each.by_finding));
+      low.y.push_back(point->shown(each.by_finding * (band ? (*band)[0] : 1.0)));
+      high.y.push_back(point->shown(each.by_finding * (band ? (*band)[1] : 1.0)));
+      before.y.push_back(point->shown(each.by_finding + each.left));
+      after.y.push_back(point->shown(each.left));
     }
     std::string title =
         words_of(slot.row->id, slot.row->parameter, extended.effects[static_cast<Eigen::Index>(i)]);

@@ -14,4 +14,10 @@ namespace beltgrip::diagnose {
 std::vector<report::Chart> pictures_of(const Campaign& campaign, const ModelState& extended,
                                        const std::vector<Finding>& findings);
 
+// The same of what was learned, in the order of `learned`: points that the data ask for, and those
+// that are left with all of it in the model, over the variable; both in the unit of the file.
+std::vector<std::vector<report::Series>> points_of_learned(
+    const Campaign& campaign, const ModelState& extended,
+    const std::vector<LearnedFinding>& learned);
+
 }  // namespace beltgrip::diagnose

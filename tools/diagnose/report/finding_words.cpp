@@ -60,7 +60,7 @@ constexpr Words kWords[] = {
      "friction that falls with the oil temperature, by", "% per K", kPercent},
     {"friction_speed", "per_ln_speed", "friction that grows with the logarithm of the speed, by",
      "friction that falls with the logarithm of the speed, by", "% per doubling",
-     kPercent * std::numbers::ln2},
+     kPercent* std::numbers::ln2},
     {"friction_load",
      "exponent",
      "friction that falls with the clamp force, exponent",

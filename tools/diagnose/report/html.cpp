@@ -82,10 +82,10 @@ void add_gain(std::vector<std::string>& row, const std::string& name, const Befo
 }
 
 // The function with its 95 % band over what it follows.
-report::Chart picture_of(const LearnedFinding& learned) {
+report::Chart picture_of(const LearnedFinding& learned, std::vector<report::Series> points) {
   constexpr double kBand = 1.96;
   const Display of_x = display_of(learned.depends_on.front()), of_y = display_of(learned.acts_on);
-  report::Series mean{"learned", {}, {}, true, false};
+  report::Series mean{"as found", {}, {}, true, false};
   report::Series low{"", {}, {}, true, false, true}, high{"95 %", {}, {}, true, false, true};
   const std::size_t n = learned.knots.size();
   for (std::size_t i = 0; i < n; ++i) {
@@ -98,13 +98,20 @@ report::Chart picture_of(const LearnedFinding& learned) {
     high.y.push_back(of_y.per_SI * (learned.values[i] + half));
   }
   const std::string follows = text::joined(learned.depends_on);
-  return {learned.acts_on + " over " + follows,
-          follows + ", " + std::string(of_x.unit),
-          learned.acts_on + ", " + std::string(of_y.unit),
-          {low, high, mean}};
+  report::Chart out{learned.acts_on + " over " + follows,
+                    follows + ", " + std::string(of_x.unit),
+                    learned.acts_on + ", " + std::string(of_y.unit),
+                    {low, high, mean}};
+  for (report::Series& each : points) {
+    for (double& x : each.x) x *= of_x.per_SI;
+    for (double& y : each.y) y *= of_y.per_SI;
+    if (!each.x.empty()) out.series.push_back(std::move(each));
+  }
+  return out;
 }
 
-void add_learned(report::HtmlPage& page, const Diagnosis& d) {
+void add_learned(report::HtmlPage& page, const Diagnosis& d,
+                 const std::vector<std::vector<report::Series>>& points) {
   if (d.learned.empty()) return;
   page.heading("What was learned without a name");
   Rows rows;
@@ -114,7 +121,9 @@ void add_learned(report::HtmlPage& page, const Diagnosis& d) {
     if (!each.aliases.empty()) {
       page.paragraph("These data cannot tell it from " + text::joined(each.aliases) + ".");
     }
-    charts.push_back(picture_of(each));
+    const auto place = static_cast<std::size_t>(&each - d.learned.data());
+    charts.push_back(
+        picture_of(each, place < points.size() ? points[place] : std::vector<report::Series>()));
     if (!each.at_left_out_values) continue;
     rows.push_back({each.name, each.metric});
     add_gain(rows.back(), each.metric, *each.at_left_out_values);
@@ -288,7 +297,7 @@ std::string html_text(const Diagnosis& d, const Plots& plots, const PageFacts& f
   if (d.next_experiment) page.paragraph("Next experiment: " + d.next_experiment->text + ".");
   page.paragraph("In a plot the mouse draws the part to be seen, a double click shows all of it.");
   add_findings(page, d, plots.findings);
-  add_learned(page, d);
+  add_learned(page, d, plots.learned);
   add_left(page, d);
   add_errors(page, d);
   add_tables(page, d);

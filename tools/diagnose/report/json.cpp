@@ -333,9 +333,8 @@ std::string verdict_line(const Diagnosis& d) {
       what = "unexplained";
   }
   return what + " (" + std::to_string(d.experiments) +
-         (d.experiments == 1 ? " experiment, " : " experiments, ") +
-         rounded_text(0.1 * d.samples) + " s usable)" +
-         (d.complete ? "" : ", stopped before the end");
+         (d.experiments == 1 ? " experiment, " : " experiments, ") + rounded_text(0.1 * d.samples) +
+         " s usable)" + (d.complete ? "" : ", stopped before the end");
 }
 
 namespace {
@@ -445,7 +444,8 @@ std::string plain_text(const Diagnosis& d) {
     }
   }
   if (d.unexplained) out += "unexplained: " + sentence(*d.unexplained) + "\n";
-  if (!d.left.empty()) out += "what experiments differ by is judged against " + base_words(d) + "\n";
+  if (!d.left.empty())
+    out += "what experiments differ by is judged against " + base_words(d) + "\n";
   if (!d.held_out.empty()) {
     out += "on experiments not used for the fit (before -> after, 95 % of the difference):\n";
   }

@@ -263,7 +263,7 @@ void draw_orders(const std::vector<SignalTable>& tables, Plots& plots) {
 }  // namespace
 
 Plots make_plots(const Campaign& campaign, const ModelState& nominal, const ModelState& extended,
-                 const std::vector<SignalTable>& tables, const std::vector<Finding>& findings) {
+                 const std::vector<SignalTable>& tables, const Diagnosis& found) {
   std::vector<Fitted> all;
   for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
     if (campaign.runs[e].valid_count == 0) continue;
@@ -274,8 +274,9 @@ Plots make_plots(const Campaign& campaign, const ModelState& nominal, const Mode
   }
   Plots plots;
   if (all.empty()) return plots;
-  const bool with_extended = (extended.effects.array() != 0.0).any();
-  plots.findings = pictures_of(campaign, extended, findings);
+  const bool with_extended = (extended.effects.array() != 0.0).any() || !extended.learned.empty();
+  plots.findings = pictures_of(campaign, extended, found.findings);
+  plots.learned = points_of_learned(campaign, extended, found.learned);
   draw_signals(all, with_extended, plots);
   draw_residuals(campaign, all, with_extended, plots);
   draw_friction(all, nominal, extended, with_extended, plots);

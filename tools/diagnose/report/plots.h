@@ -13,9 +13,10 @@ namespace beltgrip::diagnose {
 
 struct Plots {
   std::vector<report::Chart> findings, signals, over_time, over_variables, friction, orders;
+  std::vector<std::vector<report::Series>> learned;  // points_of_learned
 };
 
 Plots make_plots(const Campaign& campaign, const ModelState& nominal, const ModelState& extended,
-                 const std::vector<SignalTable>& tables, const std::vector<Finding>& findings);
+                 const std::vector<SignalTable>& tables, const Diagnosis& found);
 
 }  // namespace beltgrip::diagnose

@@ -105,7 +105,7 @@ class Run {
     fill(engine, naming, learning);
     if (request_.with_plots) {
       answer_.plots = make_plots(engine.campaign(), naming.nominal.state, naming.hypothesis.state,
-                                 request_.experiments, out().findings);
+                                 request_.experiments, out());
     }
     progress(1.0, "done");
     return std::move(answer_);
