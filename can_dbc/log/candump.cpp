@@ -23,25 +23,25 @@ using log_text::trim_end;
 
 constexpr std::size_t kClassicPayload = 8;
 
-constexpr std::size_t kStandardDigits = 3;
-constexpr std::size_t kExtendedDigits = 8;
+constexpr std::size_t kStandardIdDigits = 3;
+constexpr std::size_t kExtendedIdDigits = 8;
 
 // Identifier digits: three for a standard one, eight for an extended one or an error frame. On the
 // console older candumps pad with blanks, so that there may be fewer.
 bool read_id(std::string_view digits, CanFrame& frame) {
-  if (digits.empty() || digits.size() > kExtendedDigits) return false;
+  if (digits.empty() || digits.size() > kExtendedIdDigits) return false;
   std::uint32_t id = 0;
   for (const char c : digits) {
     const int value = hex_value(c);
     if (value < 0) return false;
     id = (id << 4) | static_cast<std::uint32_t>(value);
   }
-  if (digits.size() == kExtendedDigits) {
+  if (digits.size() == kExtendedIdDigits) {
     frame.error = (id & kErrorFlag) != 0;
     frame.id = {id & kExtendedIdMax, !frame.error};
     return true;
   }
-  frame.id = {id, digits.size() > kStandardDigits};
+  frame.id = {id, digits.size() > kStandardIdDigits};
   return frame.id.value <= (frame.id.extended ? kExtendedIdMax : kStandardIdMax);
 }
 
@@ -111,7 +111,7 @@ class CandumpParser : public LineParser {
 
   // "123#0011", "123#R8", "12345678##10011", "123#00.11".
   LineKind compact_frame(std::string_view word, std::size_t hash, CanFrame& frame) {
-    if ((hash != kStandardDigits && hash != kExtendedDigits) ||
+    if ((hash != kStandardIdDigits && hash != kExtendedIdDigits) ||
         !read_id(word.substr(0, hash), frame)) {
       return bad("unreadable identifier; expected 3 or 8 hexadecimal digits");
     }
