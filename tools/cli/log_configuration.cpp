@@ -47,7 +47,7 @@ daemon::Config load_configuration_for(const std::vector<std::string>& logs, doub
                                    " signals without a time column, expected one (t[s], time_ms) "
                                    "or --rate HZ"};
     }
-    if (head->time_unit_unknown) {
+    if (head->time && head->time_unit_unknown) {
       const table::Column& time = head->columns[*head->time];
       throw Failure{kBadInput, log + ":" + std::to_string(time.unit_line) + ": time in '" +
                                    time.unit + "', expected s, ms, us, ns, min or h, as in t[s]"};

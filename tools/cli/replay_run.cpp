@@ -278,7 +278,7 @@ namespace {
 // Why no value of a role came.
 std::string why_unseen(const daemon::Pipeline& pipeline, const daemon::Config& config,
                        daemon::Role role) {
-  const std::string no_value = "no frame brought a value of it that is in the DBC's range";
+  std::string no_value = "no frame brought a value of it that is in the DBC's range";
   const auto bound = std::find_if(config.roles.begin(), config.roles.end(),
                                   [role](const auto& each) { return each.role == role; });
   if (bound == config.roles.end() || bound->uds) return no_value;

@@ -43,14 +43,17 @@ constexpr std::array kAll{
     IndexVariable{"primary_pressure", value_of<LearnedVariable::kPrimaryPressure>,
                   LearnedVariable::kPrimaryPressure, "Pa"},
     IndexVariable{"torque", value_of<LearnedVariable::kTorque>, LearnedVariable::kTorque, "Nm"},
-    IndexVariable{"acceleration", acceleration},
+    IndexVariable{"acceleration", acceleration, std::nullopt, ""},
     IndexVariable{"pressure_rate",
-                  [](const ExperimentData& r, int) -> ArrayXd { return r.pressure.slow_slope; }},
-    IndexVariable{"time", [](const ExperimentData& r, int) -> ArrayXd { return r.t_s; }},
+                  [](const ExperimentData& r, int) -> ArrayXd { return r.pressure.slow_slope; },
+                  std::nullopt, ""},
+    IndexVariable{"time", [](const ExperimentData& r, int) -> ArrayXd { return r.t_s; },
+                  std::nullopt, ""},
     IndexVariable{"experiment",
                   [](const ExperimentData& r, int e) -> ArrayXd {
                     return ArrayXd::Constant(r.size(), static_cast<double>(e));
-                  }},
+                  },
+                  std::nullopt, ""},
 };
 
 std::vector<double> valid_values(const ExperimentData& run, const ArrayXd& in) {

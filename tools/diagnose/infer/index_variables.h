@@ -14,8 +14,8 @@ namespace beltgrip::diagnose {
 struct IndexVariable {
   const char* name;                                                    // the role, or what it is
   Eigen::ArrayXd (*value)(const ExperimentData& run, int experiment);  // empty: not recorded
-  std::optional<estimator::LearnedVariable> learnable = std::nullopt;
-  std::string_view unit = {};  // of its values, where a function of it may be learned
+  std::optional<estimator::LearnedVariable> learnable;
+  std::string_view unit;  // of its values, where a function of it may be learned
 };
 
 std::span<const IndexVariable> index_variables();
