@@ -173,6 +173,19 @@ struct Sample {
   double x, column, by_finding, left;
 };
 
+// Of both residuals what counts. by_finding(kind, sample): what the finding changes there.
+template <typename ByFinding>
+void add_samples(const ExperimentData& run, const ArrayXd& x, const ResidualColumns& columns,
+                 const Residuals& with, const ByFinding& by_finding, std::vector<Sample>& out) {
+  for (const ResidualKind kind : {kFrictionResidual, kBalanceResidual}) {
+    const auto k = static_cast<std::size_t>(kind);
+    for (Eigen::Index i = 0; i < columns[k].size(); ++i) {
+      if (!run.valid[static_cast<std::size_t>(i)] || columns[k][i] == 0.0) continue;
+      out.push_back({x[i], columns[k][i], by_finding(k, i), with.value[k][i]});
+    }
+  }
+}
+
 void drop_not_finite(std::vector<Sample>& samples) {
   std::erase_if(samples, [](const Sample& each) {
     return !std::isfinite(each.x + each.column + each.by_finding + each.left);
@@ -194,14 +207,10 @@ std::vector<Sample> samples_of(const Campaign& campaign, const ModelState& exten
     // Along the tangent of the friction curve, as the unit: about the peak, the residual without
     // the finding says nothing of its size.
     const ResidualColumns by = secant(campaign, experiment, extended, with, slot, 0.0);
-    for (const ResidualKind kind : {kFrictionResidual, kBalanceResidual}) {
-      const auto k = static_cast<std::size_t>(kind);
-      for (Eigen::Index i = 0; i < columns[k].size(); ++i) {
-        if (!run.valid[static_cast<std::size_t>(i)] || columns[k][i] == 0.0) continue;
-        const double by_finding = by[k].size() > 0 ? size * by[k][i] : 0.0;
-        out.push_back({x[i], columns[k][i], by_finding, with.value[k][i]});
-      }
-    }
+    add_samples(
+        run, x, columns, with,
+        [&](std::size_t k, Eigen::Index i) { return by[k].size() > 0 ? size * by[k][i] : 0.0; },
+        out);
   }
   drop_not_finite(out);
   return out;
@@ -221,14 +230,10 @@ std::vector<Sample> samples_of(const Campaign& campaign, const ModelState& exten
     prepare_derivatives(campaign, experiment, extended, with);
     const ResidualColumns columns = propagate(
         campaign, with, unit_change(extended, with, row, ArrayXd::Ones(with.foot.size())));
-    for (const ResidualKind kind : {kFrictionResidual, kBalanceResidual}) {
-      const auto k = static_cast<std::size_t>(kind);
-      for (Eigen::Index i = 0; i < columns[k].size(); ++i) {
-        if (!run.valid[static_cast<std::size_t>(i)] || columns[k][i] == 0.0) continue;
-        out.push_back(
-            {x[i], columns[k][i], columns[k][i] * term.at(x[i]) / row.unit, with.value[k][i]});
-      }
-    }
+    add_samples(
+        run, x, columns, with,
+        [&](std::size_t k, Eigen::Index i) { return columns[k][i] * term.at(x[i]) / row.unit; },
+        out);
   }
   drop_not_finite(out);
   return out;
