@@ -10,8 +10,8 @@ namespace beltgrip::check {
 // --- frames -------------------------------------------------------------------------------------
 // Derived: a CRC of the wrong data id fits one frame in 256 by chance.
 inline constexpr double kCrcWrongShare = 0.5;
-// Derived: where each frame is there twice the counter stands still in half of them; a frozen sender
-// that recovers does in few. A fifth less or more is as far from both.
+// Derived: where each frame is there twice the counter stands still in half of them; a frozen
+// sender that recovers does in few. A fifth less or more is as far from both.
 inline constexpr double kStillWrongShare = 1.0 / 3.0;
 // Chosen: an id of another car lies close by when it differs by a few in its last digits.
 inline constexpr unsigned kSimilarIdDistance = 0x10;

@@ -149,9 +149,8 @@ LawEvidence judge(const Family& family, const std::vector<CellScore>& scores,
         best = evidence.back();
         const double span = abscissa.high - abscissa.low;
         const std::string_view unit = abscissa.variable ? abscissa.variable->unit : "";
-        out.text =
-            filled(family.text, {fitted.size * row.unit * row.told_per_SI, row.told_unit},
-                   {abscissa.low + shape.place * span, unit}, {shape.width * span, unit});
+        out.text = filled(family.text, {fitted.size * row.unit * row.told_per_SI, row.told_unit},
+                          {abscissa.low + shape.place * span, unit}, {shape.width * span, unit});
       }
     }
   }

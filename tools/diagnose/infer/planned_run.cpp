@@ -95,7 +95,8 @@ class Planner {
     if (count < force_N.size() && count < static_cast<std::size_t>(hold)) return nothing_of();
     force_N.resize(count);
     const auto most = static_cast<std::size_t>(kRecipeLength_s / kPeriod_s);
-    for (double at_N = force_N.back() + ramp_.grip_step_N; at_N < ramp_.start_force_N && force_N.size() < most;
+    for (double at_N = force_N.back() + ramp_.grip_step_N;
+         at_N < ramp_.start_force_N && force_N.size() < most;
          at_N += kRecipeRestore_N_s * kPeriod_s) {
       force_N.push_back(at_N);
     }

@@ -13,7 +13,7 @@ namespace beltgrip::diagnose {
 struct ResidualTest {
   std::string acts_on;  // friction, ratio, torque; clamp force for the pressure's tracking
   std::string name;
-  double p = 1.0;  // the chance of a healthy machine (beyond_healthy)
+  double p = 1.0;        // the chance of a healthy machine (beyond_healthy)
   double decades = 0.0;  // of whiteness: -log10(p)
 };
 
