@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "can_dbc/text/stray_stamps.h"
+
 namespace beltgrip::ports {
 
 namespace {
@@ -13,9 +15,7 @@ constexpr std::int64_t kDisorder_ns = kSecond_ns;
 // comes from years before (chosen). Time then goes on after what stands for a pause.
 constexpr std::int64_t kClockSet_ns = 604'800 * kSecond_ns;
 constexpr std::int64_t kPause_ns = 600 * kSecond_ns;
-// A garbled line is alone, or one of a few; a clock that is set stays so (chosen). Of one stamp are
-// as many frames as a row of a table has cells.
-constexpr std::size_t kStrayStamps = 3;
+// Chosen, a bound on memory: of one stamp are as many frames as a row of a table has cells.
 constexpr std::size_t kStrayFrames = 256;
 }  // namespace
 
@@ -127,7 +127,7 @@ class LogTimeline::Source {
         const bool leaps_too = !is_back || next_ns > last_ns + kDisorder_ns;
         return leaps_too ? count : 0;
       }
-      if (next_ns != last_ns && ++stamps > kStrayStamps) return 0;
+      if (next_ns != last_ns && ++stamps > can::kStrayStamps) return 0;
       last_ns = next_ns;
     }
     return 0;

@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 
+#include "can_dbc/text/stray_stamps.h"
 #include "can_dbc/text/table_row.h"
 #include "can_dbc/text/unit_text.h"
 #include "estimator/statistics/order.h"
@@ -77,22 +78,26 @@ class CsvParser {
       fail(first_wrong_);
     }
     if (rows_ == 0) {
-      line_ = bad_rows_ > 0 ? first_bad_row_ : std::max<std::size_t>(line_, 1);
+      line_ = bad_.count > 0 ? bad_.first_line : std::max<std::size_t>(line_, 1);
       fail(has_decimal_comma_ ? "found decimal commas, expected decimal points"
                               : "no line with numbers after the header");
     }
-    note(long_rows_, first_long_row_, "line", "lines",
-         " with more cells than the header, ignored (decimal commas?)");
-    note(short_rows_, first_short_row_, "line", "lines",
-         " with fewer cells than the header, ignored");
-    note(bad_rows_, first_bad_row_, "line that is not all numbers",
-         "lines that are not all numbers", ", ignored");
-    note(not_finite_, first_not_finite_, "value that is not finite", "values that are not finite",
-         ", left out");
-    note(set_back_, first_set_back_, "time", "times",
-         " the clock was set back: a new stretch begins");
-    note(backward_, first_backward_, "line whose time does not increase",
-         "lines whose time does not increase", ", ignored");
+    const struct {
+      const Tally& of;
+      const char *one, *many, *then;
+    } all[] = {
+        {long_, "line", "lines", " with more cells than the header, ignored (decimal commas?)"},
+        {short_, "line", "lines", " with fewer cells than the header, ignored"},
+        {bad_, "line that is not", "lines that are not", " all numbers, ignored"},
+        {not_finite_, "value that is", "values that are", " not finite, left out"},
+        {set_back_, "time", "times", " the clock was set back: a new stretch begins"},
+        {backward_, "line", "lines", " whose time does not increase, ignored"},
+    };
+    for (const auto& [of, one, many, then] : all) {
+      if (of.count == 0) continue;
+      table_.notes.push_back(name_ + ":" + std::to_string(of.first_line) + ": " +
+                             std::to_string(of.count) + " " + (of.count == 1 ? one : many) + then);
+    }
     return std::move(table_);
   }
 
@@ -100,13 +105,6 @@ class CsvParser {
   [[noreturn]] void fail(const std::string& what) const {
     throw TableError{false, name_ + ":" + std::to_string(line_) + ": " + what};
   }
-  void note(std::size_t count, std::size_t first, const char* one, const char* many,
-            const char* then) {
-    if (count == 0) return;
-    table_.notes.push_back(name_ + ":" + std::to_string(first) + ": " + std::to_string(count) +
-                           " " + (count == 1 ? one : many) + then);
-  }
-
   static bool is_row(std::string_view line) {
     const std::string_view bare = can::bare_cell(line);
     return !bare.empty() && bare.front() != '#';
@@ -190,9 +188,9 @@ class CsvParser {
         first_wrong_row_ = line_;
       }
       if (cells_.size() <= columns_.size()) {
-        count(short_rows_, first_short_row_);
+        count(short_);
       } else {
-        count(long_rows_, first_long_row_);
+        count(long_);
       }
       return;
     }
@@ -203,10 +201,10 @@ class CsvParser {
       switch (parse_number(cells_[i], value)) {
         case Cell::kBad:
           has_decimal_comma_ |= separator_ != ',' && cells_[i].find(',') != std::string_view::npos;
-          count(bad_rows_, first_bad_row_);
+          count(bad_);
           return;
         case Cell::kNotFinite:
-          if (columns_[i].role) count(not_finite_, first_not_finite_);
+          if (columns_[i].role) count(not_finite_);
           break;
         case Cell::kMissing:
           break;
@@ -219,18 +217,18 @@ class CsvParser {
       }
     }
     if (!(std::abs(t_s) <= kLatest_s)) {
-      count(bad_rows_, first_bad_row_);
+      count(bad_);
       return;
     }
     // A clock that is set back begins a new stretch too; a few lines in disorder do not, nor a
     // garbled time.
     if (rows_ > 0 && t_s + shift_s_ < last_t_s_ - kSetBack_s && !goes_on()) {
       shift_s_ = last_t_s_ + kSetBack_s - t_s;
-      count(set_back_, first_set_back_);
+      count(set_back_);
     }
     t_s += shift_s_;
     if (rows_ > 0 && t_s <= last_t_s_) {
-      count(backward_, first_backward_);
+      count(backward_);
       return;
     }
     last_t_s_ = t_s;
@@ -247,7 +245,7 @@ class CsvParser {
   // The time, in one of the next few lines, from where it was before this one.
   bool goes_on() {
     std::string_view rest = rest_;
-    for (std::size_t looked = 0; looked < kStrayRows && !rest.empty();) {
+    for (std::size_t looked = 0; looked < can::kStrayStamps && !rest.empty();) {
       const std::string_view line = next_line(rest);
       if (!is_row(line)) continue;
       ++looked;
@@ -260,8 +258,12 @@ class CsvParser {
     }
     return false;
   }
-  void count(std::size_t& counter, std::size_t& first) const {
-    if (counter++ == 0) first = line_;
+  // What was left out of one kind.
+  struct Tally {
+    std::size_t count = 0, first_line = 0;
+  };
+  void count(Tally& tally) const {
+    if (tally.count++ == 0) tally.first_line = line_;
   }
 
   std::string_view rest_;
@@ -276,16 +278,12 @@ class CsvParser {
   std::array<bool, daemon::kRoleCount> seen_{};
   std::size_t time_ = 0;  // its column
   static constexpr double kSetBack_s = 3.0;
-  // A garbled line is alone, or one of a few; a clock that is set stays so (chosen).
-  static constexpr std::size_t kStrayRows = 3;
   static constexpr double kLatest_s = 1e11;  // beyond, seconds have no microseconds left
-  std::size_t rows_ = 0, bad_rows_ = 0, first_bad_row_ = 0, backward_ = 0, first_backward_ = 0;
-  std::size_t not_finite_ = 0, first_not_finite_ = 0;
+  std::size_t rows_ = 0;
+  Tally bad_, long_, short_, not_finite_, set_back_, backward_;
   bool has_decimal_comma_ = false;
-  std::size_t long_rows_ = 0, first_long_row_ = 0, short_rows_ = 0, first_short_row_ = 0;
   const char* first_wrong_ = nullptr;  // what is wrong with the first line of another width
   std::size_t first_wrong_row_ = 0;
-  std::size_t set_back_ = 0, first_set_back_ = 0;
   double last_t_s_ = 0.0, shift_s_ = 0.0;
 };
 

@@ -173,70 +173,65 @@ struct Sample {
   double x, column, by_finding, left;
 };
 
-// Of both residuals what counts. by_finding(kind, sample): what the finding changes there.
-template <typename ByFinding>
-void add_samples(const ExperimentData& run, const ArrayXd& x, const ResidualColumns& columns,
-                 const Residuals& with, const ByFinding& by_finding, std::vector<Sample>& out) {
-  for (const ResidualKind kind : {kFrictionResidual, kBalanceResidual}) {
-    const auto k = static_cast<std::size_t>(kind);
-    for (Eigen::Index i = 0; i < columns[k].size(); ++i) {
-      if (!run.valid[static_cast<std::size_t>(i)] || columns[k][i] == 0.0) continue;
-      out.push_back({x[i], columns[k][i], by_finding(k, i), with.value[k][i]});
-    }
-  }
-}
+// What a unit at the point and the finding change of the residuals of an experiment.
+struct Changes {
+  ResidualColumns unit, by_finding;
+};
 
-void drop_not_finite(std::vector<Sample>& samples) {
-  std::erase_if(samples, [](const Sample& each) {
-    return !std::isfinite(each.x + each.column + each.by_finding + each.left);
-  });
-}
-
-std::vector<Sample> samples_of(const Campaign& campaign, const ModelState& extended, int slot,
-                               const Point& point, const Variable& variable) {
-  const double size = extended.effects[slot];
+// Of both residuals what counts. changes(experiment, residuals with the finding, the variable).
+template <typename ChangesOf>
+std::vector<Sample> samples_of(const Campaign& campaign, const ModelState& extended,
+                               ArrayXd (*variable)(const ExperimentData& run, int experiment),
+                               const ChangesOf& changes_of) {
   std::vector<Sample> out;
   for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
     const ExperimentData& run = campaign.runs[e];
     const int experiment = static_cast<int>(e);
-    const ArrayXd x = variable.value(run, experiment);
+    const ArrayXd x = variable(run, experiment);
     if (run.valid_count == 0 || x.size() == 0) continue;
     Residuals with = residuals_of(campaign, experiment, extended);
     prepare_derivatives(campaign, experiment, extended, with);
-    const ResidualColumns columns = propagate(campaign, with, point.unit(with, extended.nuisance));
-    // Along the tangent of the friction curve, as the unit: about the peak, the residual without
-    // the finding says nothing of its size.
-    const ResidualColumns by = secant(campaign, experiment, extended, with, slot, 0.0);
-    add_samples(
-        run, x, columns, with,
-        [&](std::size_t k, Eigen::Index i) { return by[k].size() > 0 ? size * by[k][i] : 0.0; },
-        out);
+    const Changes changes = changes_of(experiment, with, x);
+    for (const ResidualKind kind : {kFrictionResidual, kBalanceResidual}) {
+      const auto k = static_cast<std::size_t>(kind);
+      const ArrayXd &unit = changes.unit[k], &by = changes.by_finding[k];
+      for (Eigen::Index i = 0; i < unit.size(); ++i) {
+        if (!run.valid[static_cast<std::size_t>(i)] || unit[i] == 0.0) continue;
+        const Sample each{x[i], unit[i], by.size() > 0 ? by[i] : 0.0, with.value[k][i]};
+        if (std::isfinite(each.x + each.column + each.by_finding + each.left)) out.push_back(each);
+      }
+    }
   }
-  drop_not_finite(out);
   return out;
+}
+
+std::vector<Sample> samples_of(const Campaign& campaign, const ModelState& extended, int slot,
+                               const Point& point, const Variable& variable) {
+  return samples_of(campaign, extended, variable.value,
+                    [&](int experiment, const Residuals& with, const ArrayXd& /*x*/) {
+                      Changes out{
+                          propagate(campaign, with, point.unit(with, extended.nuisance)),
+                          // Along the tangent of the friction curve, as the unit: about the peak,
+                          // the residual without the finding says nothing of its size.
+                          secant(campaign, experiment, extended, with, slot, 0.0)};
+                      for (ArrayXd& each : out.by_finding) each *= extended.effects[slot];
+                      return out;
+                    });
 }
 
 // Of a function that was learned: a unit of its point, as it is met in practice.
 std::vector<Sample> samples_of(const Campaign& campaign, const ModelState& extended,
                                const estimator::LearnedTerm& term, const InjectionRow& row,
                                const IndexVariable& variable) {
-  std::vector<Sample> out;
-  for (std::size_t e = 0; e < campaign.runs.size(); ++e) {
-    const ExperimentData& run = campaign.runs[e];
-    const int experiment = static_cast<int>(e);
-    const ArrayXd x = variable.value(run, experiment);
-    if (run.valid_count == 0 || x.size() == 0) continue;
-    Residuals with = residuals_of(campaign, experiment, extended);
-    prepare_derivatives(campaign, experiment, extended, with);
-    const ResidualColumns columns = propagate(
-        campaign, with, unit_change(extended, with, row, ArrayXd::Ones(with.foot.size())));
-    add_samples(
-        run, x, columns, with,
-        [&](std::size_t k, Eigen::Index i) { return columns[k][i] * term.at(x[i]) / row.unit; },
-        out);
-  }
-  drop_not_finite(out);
-  return out;
+  return samples_of(campaign, extended, variable.value,
+                    [&](int /*experiment*/, const Residuals& with, const ArrayXd& x) {
+                      const ArrayXd units =
+                          x.unaryExpr([&](double at) { return term.at(at) / row.unit; });
+                      const auto change = [&](const ArrayXd& size) {
+                        return propagate(campaign, with, unit_change(extended, with, row, size));
+                      };
+                      return Changes{change(ArrayXd::Ones(x.size())), change(units)};
+                    });
 }
 
 // The sum over some neighbours by weighted least squares: what is asked for at the point.
