@@ -112,7 +112,9 @@ struct Autocorrelation {
 double beyond_healthy(double chi2, int degrees) {
   // Measured, 1,735 tests in 76 healthy campaigns of two generators of other make: the largest by
   // name 4 to 40 with one degree of freedom where noise alone gives 6 to 8. With 1 eight of the
-  // campaigns have a test that fails among so many (kNoChance), with 2.4, 3.0 and 3.6 none.
+  // campaigns have a test that fails among so many (kNoChance), with 2.4, 3.0 and 3.6 none. It
+  // words the page and a note, no verdict: of 99 that are not nothing wrong 74 have one with 1; 66,
+  // 60 and 57 with those.
   constexpr double kHealthyExcess = 3.0;
   return chi2 > degrees ? degrees + (chi2 - degrees) / kHealthyExcess : chi2;
 }
