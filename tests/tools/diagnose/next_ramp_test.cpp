@@ -127,6 +127,30 @@ TEST(NextRamp, TurnsBehindALatePeak) {
   EXPECT_LT(ramp.turn_slip_percent, 8.0);
 }
 
+// By integration over the time since the peak, of a force that falls on: what the belt slips until
+// it is gripped, 0.15 s behind the turn.
+TEST(NextRamp, FallsSoSlowlyThatTheBeltIsGrippedInTime) {
+  const Engine engine = fitted(equal_ramps());
+  for (const double peak_slip : {0.015, 0.03, 0.045}) {
+    ModelState state = engine.state();
+    state.nuisance[kLnPeakSlipOverdrive] = std::log(peak_slip);
+    state.nuisance[kSecondaryInertia_kgm2] = 0.05;
+    state.nuisance[kDeformationPerkN] = state.nuisance[kDeformationPerkN2] = 0.0;
+    const Ramp ramp = ramp_like_first(engine.campaign(), state, Varied::kRate);
+    const double ratio = engine.campaign().variator.ratio_overdrive;
+    const double slips_N = ramp.grip_step_N / 0.3;
+    double slip = peak_slip, rate = 0.0, force_N = slips_N, gripped_s = 1e9;
+    for (double t_s = 0.0; t_s < gripped_s; t_s += 1e-4) {
+      if (slip >= 0.01 * ramp.turn_slip_percent && gripped_s > 1e8) gripped_s = t_s + 0.15;
+      force_N -= 1e-4 * ramp.ramp_N_s;
+      rate += 1e-4 * (1.0 - force_N / slips_N) * ramp.torque_Nm / ratio /
+              (0.05 * ratio * ramp.speed_rad_s);
+      slip += 1e-4 * rate;
+    }
+    EXPECT_LT(slip, 0.092) << peak_slip;
+  }
+}
+
 // Oil that turns fast presses by itself: no ramp of the pressure ends below that.
 TEST(NextRamp, IsNoFasterThanTheTurningOilLetsItSlip) {
   const Engine engine = fitted(equal_ramps());
