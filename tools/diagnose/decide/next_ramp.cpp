@@ -59,7 +59,7 @@ constexpr double kGripShare = 0.3;
 constexpr double kUnpressedMost = 0.85;
 
 // Chosen: a point below the 10 % that damage the belt, for what friction falls behind its peak.
-// Measured, those recipes by 4.0 to 8.7 % of slip, where one slipped by 11.1 and one by 8.6 before
+// Measured, those recipes by 3.5 to 8.7 % of slip, where one slipped by 11.1 and one by 8.6 before
 // their ramps were bounded. A fifth less or more of these four: not run.
 constexpr double kSlipMost = 0.09;
 constexpr double kFallMost_s = 25.0;         // chosen: of the recipe's minute, down and up again
