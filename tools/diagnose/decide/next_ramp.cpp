@@ -59,8 +59,9 @@ constexpr double kGripShare = 0.3;
 constexpr double kUnpressedMost = 0.85;
 
 // Chosen: a point below the 10 % that damage the belt, for what friction falls behind its peak.
-// Measured, those recipes by 3.5 to 8.7 % of slip, where one slipped by 11.1 and one by 8.6 before
-// their ramps were bounded. A fifth less or more of these four: not run.
+// Measured, those ten recipes slip by 3.5 to 8.7 %, where one slipped by 11.1 at 80 rad/s before
+// the bound. A fifth less or more of any of these four, at the speeds chosen with them: all pass a
+// peak, by 8.9 % at most; other rates in one to three of the ten.
 constexpr double kSlipMost = 0.09;
 constexpr double kFallMost_s = 25.0;         // chosen: of the recipe's minute, down and up again
 constexpr double kInertiaLeast_kgm2 = 0.05;  // chosen: of a pulley and its shaft
