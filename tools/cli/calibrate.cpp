@@ -225,7 +225,7 @@ void run_calibrate(const CalibrateOptions& options) {
   Inputs inputs(options.logs);
   inputs.add(config.files);
   std::optional<OutputFile> json, out;
-  if (!options.json.empty()) json.emplace(options.json, inputs);
+  if (!options.json.empty()) json.emplace(options.json, inputs, Existing::kReplaceResult);
   if (!options.out.empty()) out.emplace(options.out, inputs, unless_forced(options.force));
   std::vector<diagnose::SignalTable> logs;
   Progress progress(!options.quiet);

@@ -208,7 +208,7 @@ void run_check(const CheckOptions& options) {
   Inputs inputs(options.logs);
   inputs.add(config.files);
   std::optional<OutputFile> json;
-  if (!options.json.empty()) json.emplace(options.json, inputs);
+  if (!options.json.empty()) json.emplace(options.json, inputs, Existing::kReplaceResult);
 
   check::RoleWatch watch(config);
   DriveView seen;

@@ -158,7 +158,7 @@ void run_diagnose(const DiagnoseOptions& options) {
   inputs.add(options.held_out);
   inputs.add(config.files);
   inputs.add(options.model);
-  const auto output = [&](const std::string& path, Existing existing = Existing::kReplace) {
+  const auto output = [&](const std::string& path, Existing existing = Existing::kReplaceResult) {
     return path.empty() ? nullptr : std::make_unique<OutputFile>(path, inputs, existing);
   };
   const auto json = output(options.json);

@@ -272,7 +272,7 @@ void run_history(const HistoryOptions& options) {
       (std::filesystem::path(history.path).parent_path() / daemon::kCarriedFile).string()};
   inputs.add(options.from);
   std::optional<OutputFile> json_file, csv_file;
-  if (!options.json.empty()) json_file.emplace(options.json, inputs);
+  if (!options.json.empty()) json_file.emplace(options.json, inputs, Existing::kReplaceResult);
   if (!options.csv.empty()) csv_file.emplace(options.csv, inputs);
   if (json_file) json_file->write(json_lines(history));
   if (csv_file) csv_file->write(csv(history));

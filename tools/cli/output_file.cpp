@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -46,6 +47,12 @@ std::set<std::string>& places_taken() {
   return places;
 }
 
+bool is_named_as_recording(const std::string& target) {
+  constexpr std::array kEndings{".csv", ".log", ".asc", ".trc", ".blf", ".mf4", ".pcap", ".pcapng"};
+  const std::string ending = fs::path(target).extension().string();
+  return std::find(kEndings.begin(), kEndings.end(), ending) != kEndings.end();
+}
+
 }  // namespace
 
 void Inputs::add(const std::string& path) {
@@ -75,7 +82,7 @@ void Inputs::demand_apart(const std::string& path) const {
 }
 
 OutputFile::OutputFile(const std::string& path, const Inputs& inputs, Existing existing)
-    : path_(path), slot_(kNoSlot), replace_(existing == Existing::kReplace) {
+    : path_(path), slot_(kNoSlot), replace_(existing != Existing::kKeep) {
   inputs.demand_apart(path);
   if (path == "-") {
     file_ = stdout;
@@ -92,6 +99,11 @@ OutputFile::OutputFile(const std::string& path, const Inputs& inputs, Existing e
     throw Failure{kCannotCreate, path + ": found a file, expected none (--force replaces it)"};
   }
   target_ = behind_links(path);
+  if (exists && existing == Existing::kReplaceResult && is_named_as_recording(target_)) {
+    throw Failure{kUsage, path +
+                              ": found a recording, expected the name of the result (of run*.csv "
+                              "a shell makes several names)"};
+  }
   if (!places_taken().insert(place_of(target_)).second) {
     throw Failure{kUsage, path + ": found as the file of two outputs, expected a file for each"};
   }

@@ -38,13 +38,15 @@ class Inputs {
 };
 
 // What is done with a file that exists. A result is replaced; what somebody may have edited is not,
-// but with --force: Failure 73.
-enum class Existing { kReplace, kKeep };
+// but with --force: Failure 73. What is named like a recording is no result: a shell that puts
+// run*.csv behind an option makes the first of them its file. Failure 64.
+enum class Existing { kReplace, kKeep, kReplaceResult };
 inline Existing unless_forced(bool force) { return force ? Existing::kReplace : Existing::kKeep; }
 
 class OutputFile {
  public:
-  // Failure: 64 it is an input or another output, 73 it cannot be created or must not be replaced.
+  // Failure: 64 it is an input, a recording or another output, 73 it cannot be created or must not
+  // be replaced.
   OutputFile(const std::string& path, const Inputs& inputs, Existing existing = Existing::kReplace);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;

@@ -362,7 +362,7 @@ void run_replay(const ReplayOptions& options) {
   if (options.resume) {
     resumed.emplace(options.json, inputs);
   } else if (!options.json.empty()) {
-    json.emplace(options.json, inputs);
+    json.emplace(options.json, inputs, Existing::kReplaceResult);
   }
   ResumedLines* const earlier = resumed ? &*resumed : nullptr;
   std::vector<Task> tasks = tasks_of(options, earlier);

@@ -125,13 +125,14 @@ void report_logs(const ReportOptions& options) {
   for (report::Drive& drive : drives) report::add_drive(page, std::move(drive));
   report::add_experiments(page, experiments, phases, thresholds);
   if (last_value) add_least_loss(page, config, *last_value);
-  write_file(options.out, inputs, page.text());
+  write_file(options.out, inputs, page.text(), Existing::kReplaceResult);
   text::print(stdout, counted(experiments.size(), "experiment") + ": " + options.out + "\n");
 }
 
 void report_history(const ReportOptions& options) {
   const History history = read_history(options.history, options.config);
-  write_file(options.out, {options.config, history.path}, history_page(history));
+  write_file(options.out, {options.config, history.path}, history_page(history),
+             Existing::kReplaceResult);
   text::print(stdout, counted(history.rows.size(), "experiment") + ": " + options.out + "\n");
 }
 

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <iterator>
 #include <set>
 #include <sstream>
 
@@ -182,6 +184,29 @@ TEST_P(OutputFiles, AnInputIsRefusedUnderAnyName) {
   expect_no_parts();
 }
 
+// What a list of recordings may follow, and that is no recording itself.
+const std::set<std::string> kResults{"report --out",    "calibrate --json",  "replay --json",
+                                     "diagnose --json", "diagnose --report", "diagnose --next-out",
+                                     "history --json"};
+std::vector<Output> results() {
+  std::vector<Output> out;
+  std::copy_if(kOutputs.begin(), kOutputs.end(), std::back_inserter(out),
+               [](const Output& each) { return kResults.contains(each.title()); });
+  return out;
+}
+class Results : public OutputFiles {};
+
+// What `--json run*.csv` comes to in a shell: the first recording is the file of the result.
+TEST_P(Results, NoRecordingIsReplaced) {
+  place.write("other.csv", kMark);
+  const RunResult result = run_to(place.path("other.csv"));
+  EXPECT_EQ(result.status, 64) << result.err;
+  EXPECT_NE(result.err.find("other.csv: found a recording"), std::string::npos) << result.err;
+  EXPECT_EQ(lines(result.err), 1) << result.err;
+  EXPECT_EQ(place.read("other.csv"), kMark);
+  expect_no_parts();
+}
+
 TEST_P(OutputFiles, AFileThatExistsIsReplacedWhereItMayBe) {
   place.write(fs::relative(target, place.path("")).string(), kMark);
   ASSERT_EQ(chmod(target.c_str(), 0640), 0);
@@ -232,6 +257,7 @@ std::string name_of(const testing::TestParamInfo<Output>& info) {
   return name;
 }
 INSTANTIATE_TEST_SUITE_P(, OutputFiles, testing::ValuesIn(kOutputs), name_of);
+INSTANTIATE_TEST_SUITE_P(, Results, testing::ValuesIn(results()), name_of);
 
 // The table above is whole: each option of the program that takes a file or folder is known.
 TEST(OutputTable, HasEveryOption) {
