@@ -151,6 +151,24 @@ TEST(NextRamp, FallsSoSlowlyThatTheBeltIsGrippedInTime) {
   }
 }
 
+// A peak behind all slip that a belt may have: the ramp turns before it, and takes no longer than
+// any other.
+TEST(NextRamp, EndsWhereThePeakIsFarBehind) {
+  const Engine engine = fitted(equal_ramps());
+  ModelState state = engine.state();
+  for (const double peak_slip : {0.07, 0.1, 0.5}) {
+    state.nuisance[kLnPeakSlipOverdrive] = std::log(peak_slip);
+    Ramp ramp = ramp_like_first(engine.campaign(), state, Varied::kRepeat);
+    ASSERT_GE(ramp.ramp_N_s, 20.0) << peak_slip;
+    EXPECT_LT(ramp.turn_slip_percent, 9.0) << peak_slip;
+    for (const double ramp_N_s : {ramp.ramp_N_s, 0.01, 0.0}) {
+      ramp.ramp_N_s = ramp_N_s;
+      const Campaign planned = planned_next(engine.campaign(), ramp, state);
+      EXPECT_LE(planned.runs[engine.campaign().runs.size()].size(), 600) << peak_slip;
+    }
+  }
+}
+
 // Oil that turns fast presses by itself: no ramp of the pressure ends below that.
 TEST(NextRamp, IsNoFasterThanTheTurningOilLetsItSlip) {
   const Engine engine = fitted(equal_ramps());

@@ -63,18 +63,20 @@ constexpr double kUnpressedMost = 0.85;
 // the bound. A fifth less or more of any of these four, at the speeds chosen with them: all pass a
 // peak, by 8.9 % at most; other rates in one to three of the ten.
 constexpr double kSlipMost = 0.09;
+static_assert(kTurnMost < kSlipMost);
 constexpr double kFallMost_s = 25.0;         // chosen: of the recipe's minute, down and up again
 constexpr double kInertiaLeast_kgm2 = 0.05;  // chosen: of a pulley and its shaft
 constexpr double kUntilGrip_s = 0.15;  // chosen: an operator's tenth of a second and a valve's lag
 
 // The fastest ramp with which slip stays below kSlipMost until the belt is gripped again. Behind
 // the peak the force lacks what it has fallen since, and slip grows by the square of the time; from
-// the turn on it does for kUntilGrip_s more.
+// the turn on it does for kUntilGrip_s more. A peak behind the turn is where the belt turns: it may
+// lie before it in truth.
 double ramp_most_N_s(double peak_slip, double turn_slip, double force_N, double torque_s_Nm,
                      double inertia_kgm2, double omega_s_rad_s) {
-  const double beyond = std::sqrt(std::max(turn_slip - peak_slip, 0.0));
-  const double room = std::sqrt(std::max(kSlipMost - peak_slip, 0.0)) - beyond;
-  const double growth_1_s2 = 2.0 * std::pow(std::max(room, 0.0) / kUntilGrip_s, 2.0);
+  const double from = std::min(peak_slip, turn_slip);
+  const double room = std::sqrt(kSlipMost - from) - std::sqrt(turn_slip - from);
+  const double growth_1_s2 = 2.0 * std::pow(room / kUntilGrip_s, 2.0);
   return growth_1_s2 * inertia_kgm2 * omega_s_rad_s * force_N / torque_s_Nm;
 }
 

@@ -84,7 +84,9 @@ class Planner {
     const auto hold = static_cast<int>(kRecipeHold_s / kPeriod_s);
     force_N.assign(static_cast<std::size_t>(hold), ramp_.start_force_N);
     const double least_N = like_.variator.secondary_spring_force_N;
-    for (double at_N = ramp_.start_force_N; at_N > least_N; at_N -= ramp_.ramp_N_s * kPeriod_s) {
+    const auto most = static_cast<std::size_t>(kRecipeLength_s / kPeriod_s);
+    for (double at_N = ramp_.start_force_N; at_N > least_N && force_N.size() < most;
+         at_N -= ramp_.ramp_N_s * kPeriod_s) {
       force_N.push_back(at_N);
     }
     prepare(made, force_N);
@@ -94,7 +96,6 @@ class Planner {
         static_cast<std::size_t>(std::find(grips_.begin(), grips_.end(), false) - grips_.begin());
     if (count < force_N.size() && count < static_cast<std::size_t>(hold)) return nothing_of();
     force_N.resize(count);
-    const auto most = static_cast<std::size_t>(kRecipeLength_s / kPeriod_s);
     for (double at_N = force_N.back() + ramp_.grip_step_N;
          at_N < ramp_.start_force_N && force_N.size() < most;
          at_N += kRecipeRestore_N_s * kPeriod_s) {
