@@ -1,5 +1,5 @@
 // Play between the measured pressure and the clamp force: found in its true size, whatever went
-// before the recording.
+// before the recording, and none of the size that any cylinder has.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -13,12 +13,12 @@ namespace {
 constexpr double kForce_N = 240.0;
 
 // A machine and a plan; before: where the clamp force comes from, 0 to 2 (the generator's).
-blind::Trial trial_of(std::uint64_t machine, std::uint64_t before) {
+blind::Trial trial_of(std::uint64_t machine, std::uint64_t before, double force_N = kForce_N) {
   blind::Random random(machine);
   blind::Trial trial;
   trial.machine = blind::draw_machine(random);
   trial.plan = blind::draw_plan(random, trial.machine.setting, 12);
-  trial.planted.push_back({"clamp_hysteresis", {{"force_N", kForce_N}}, {}});
+  trial.planted.push_back({"clamp_hysteresis", {{"force_N", force_N}}, {}});
   trial.seed = 3 * machine + before;
   return trial;
 }
@@ -39,6 +39,15 @@ TEST_P(Hysteresis, IsFoundInItsSize) {
 }
 
 INSTANTIATE_TEST_SUITE_P(WhateverWentBefore, Hysteresis, testing::Range<std::uint64_t>(0, 3));
+
+TEST(Play, OfAnyCylinderIsNoFinding) {
+  for (const double force_N : {24.0, 60.0}) {
+    SCOPED_TRACE(force_N);
+    Engine engine(campaign_of(trial_of(1, 1, force_N)));
+    const Naming naming = name_effects(engine, [] { return false; });
+    EXPECT_EQ(naming.accepted.size(), force_N > 30.0 ? 1U : 0U);
+  }
+}
 
 }  // namespace
 }  // namespace beltgrip::diagnose

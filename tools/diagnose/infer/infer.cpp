@@ -316,6 +316,10 @@ bool parts_experiments(const Scatter& without, const Scatter& with) {
   return (with.variance / without.variance).min(grown.max(1.0)).prod() > kMore;
 }
 
+bool gathers_experiments(const Scatter& without, const Scatter& with) {
+  return (is_unusual(without) && !is_unusual(with)).any();
+}
+
 Whitening identity_whitening(const Campaign& campaign) {
   Whitening out;
   for (auto& filter : out.filter) {

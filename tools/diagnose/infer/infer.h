@@ -76,6 +76,8 @@ Eigen::Array<bool, kRandomEffects, 1> is_unusual(const Scatter& scatter);
 // A cause that acts in every experiment makes them more alike. What fits within each of them and
 // drives them apart is none: a noise in the regressors that it happens to divide.
 bool parts_experiments(const Scatter& without, const Scatter& with);
+// What differed by more than experiments with one machine do, in any kind, no longer does.
+bool gathers_experiments(const Scatter& without, const Scatter& with);
 
 // Parameters in play: their columns in the summaries, the prior (in scaled units around the
 // linearisation point).

@@ -54,7 +54,7 @@ double gain_of_noise(const Engine& engine, const Hypothesis& without, const Hypo
 bool mends_machine(const Hypothesis& without, const Hypothesis& with) {
   const bool straightens =
       !Engine::curve_is_possible(without.state) && Engine::curve_is_possible(with.state);
-  return straightens || (is_unusual(without.fit.scatter) && !is_unusual(with.fit.scatter)).any();
+  return straightens || gathers_experiments(without.fit.scatter, with.fit.scatter);
 }
 
 }  // namespace beltgrip::diagnose
