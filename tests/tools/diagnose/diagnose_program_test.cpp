@@ -541,6 +541,28 @@ TEST_F(Diagnose, WhatNoVariatorDoesIsSaidAndNotNamed) {
   expect(with(0, kPressure, [](double v) { return 10.0 * v; }), "far beyond the slip of belts");
 }
 
+// A drag between both torques that turns the one behind the belt round is what they differ by.
+TEST_F(Diagnose, TorquesThatFightBecauseOfADragAreThatDrags) {
+  enum Column : std::size_t { kSpeedOut = 2, kTorqueOut = 5 };
+  blind::Trial trial = rig(5);
+  trial.plan[0].low = false;
+  trial.plan[0].speed_rad_s = 220.0;
+  trial.plan[0].torque_Nm = 30.0;
+  std::vector<std::string> tables = record(trial).csv;
+  for (std::string& table : tables) {
+    table = changed(table, [](auto& cells) {
+      cells[kTorqueOut] =
+          std::to_string(number(cells[kTorqueOut]) - 0.06 * number(cells[kSpeedOut]));
+      return true;
+    });
+  }
+  const json result = of(tables);
+  EXPECT_EQ(result.at("verdict"), "explained") << result.at("headline");
+  ASSERT_EQ(result.at("findings").size(), 1U) << result.dump(1);
+  EXPECT_EQ(result.at("findings")[0].at("effect"), "secondary_loss");
+  EXPECT_EQ(notes(result).find("opposite sign"), std::string::npos) << notes(result);
+}
+
 // The others tell what they do all the same.
 TEST_F(Diagnose, AChannelThatSomeExperimentsLackHidesNothing) {
   auto recording = record(rig(8, {{"torque_loss", {{"per_kN_Nm", 0.9}}, ""}}));

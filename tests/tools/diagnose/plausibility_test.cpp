@@ -42,6 +42,8 @@ ExperimentData run_with(double acceleration_rad_s2, double behind_there_Nm) {
 std::string doubt_of(const ExperimentData& run) {
   Implausible doubts;
   check_torques({run}, doubts);
+  EXPECT_FALSE(doubts.impossible) << "a cause may be between them";
+  torques_are_impossible(doubts);
   EXPECT_EQ(doubts.impossible.has_value(), !doubts.notes.empty());
   return doubts.notes.empty() ? "" : doubts.notes.front();
 }

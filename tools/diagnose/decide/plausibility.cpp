@@ -217,10 +217,14 @@ void check_torques(const std::vector<ExperimentData>& runs, Implausible& doubts)
   for (const ExperimentData& run : runs) {
     if (!run.torque_s.present) continue;
     const std::string what = contradiction(torque_pair(run));
-    if (what.empty()) continue;
-    doubts.impossible = Unexplained{"torque", {"secondary_torque"}, 1.0};
-    doubts.notes.push_back(run.name + ": " + what);
+    if (!what.empty()) doubts.torques.push_back(run.name + ": " + what);
   }
+}
+
+void torques_are_impossible(Implausible& doubts) {
+  if (doubts.torques.empty()) return;
+  doubts.impossible = Unexplained{"torque", {"secondary_torque"}, 1.0};
+  doubts.notes.insert(doubts.notes.end(), doubts.torques.begin(), doubts.torques.end());
 }
 
 void check_friction(const std::vector<ExperimentData>& runs,

@@ -15,6 +15,8 @@ namespace beltgrip::diagnose {
 struct Implausible {
   std::vector<std::string> notes;
   std::optional<Unexplained> impossible;
+  // Experiments whose two torques cannot be of one variator; with a cause between them they may.
+  std::vector<std::string> torques;
 };
 
 // The same data under two names would count as two experiments that agree in everything.
@@ -30,6 +32,8 @@ void drop_uneven_channels(std::vector<ExperimentData>& runs, Implausible& doubts
 void check_same_machine(const std::vector<ExperimentData>& runs,
                         const estimator::VariatorParameters& variator, Implausible& doubts);
 void check_torques(const std::vector<ExperimentData>& runs, Implausible& doubts);
+// Where nothing that was named makes them those of one variator.
+void torques_are_impossible(Implausible& doubts);
 // By what was measured alone: the fitted mu_max may lie far beyond what the data reached.
 void check_friction(const std::vector<ExperimentData>& runs,
                     const estimator::VariatorParameters& variator, Implausible& doubts);

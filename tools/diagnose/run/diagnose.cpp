@@ -86,6 +86,7 @@ class Run {
     check_same_machine(runs, request_.model.variator, implausible_);
     check_torques(runs, implausible_);
     if (out().samples < kSamplesMin) {
+      torques_are_impossible(implausible_);
       answer_.impossible = too_little();
       return std::move(answer_);
     }
@@ -364,8 +365,8 @@ class Run {
   }
 
   void learn_in_turn(Engine& engine, Naming& naming, Learning& out) {
-    const bool sensible =
-        !implausible_.impossible && used_runs(engine.campaign()) >= kLearningRunsMin;
+    const bool sensible = !implausible_.impossible && implausible_.torques.empty() &&
+                          used_runs(engine.campaign()) >= kLearningRunsMin;
     for (int round = 0; round < kRoundsMax && sensible && !out.left.passed(); ++round) {
       Learning more = learn(
           engine, out.left, stop(),
@@ -414,6 +415,10 @@ class Run {
     note_torque_ratio();
     note_torque_from_nothing(campaign);
     tell_turning_oil(engine);
+    // A cause with which all tests pass is what both torques differ by.
+    const bool is_caused =
+        learning.left.passed() && learning.terms.empty() && !naming.accepted.empty();
+    if (!is_caused) torques_are_impossible(implausible_);
     check_fitted_friction(out().machine, implausible_);
     note_implausible();
     fill_baseline(engine, naming);
