@@ -21,22 +21,22 @@ TEST(StandsBeside, ARivalThatMayBeTheCauseCounts) {
 }
 
 TEST(StandsBeside, WhatIsTooSmallOrImpossibleDoesNotCount) {
-  EXPECT_TRUE(beside({.is_too_small = true}, kSure));
+  EXPECT_TRUE(beside({.is_no_name = true}, kSure));
   EXPECT_TRUE(beside({.is_possible = false}, kSure));
-  EXPECT_TRUE(beside({.is_too_small = true, .is_possible = false}, kSure));
+  EXPECT_TRUE(beside({.is_no_name = true, .is_possible = false}, kSure));
 }
 
 TEST(StandsBeside, OnlyWhereTheNameIsThereBesideIt) {
-  EXPECT_FALSE(beside({.is_too_small = true}, kUnsure));
+  EXPECT_FALSE(beside({.is_no_name = true}, kUnsure));
   EXPECT_FALSE(beside({.is_possible = false}, kUnsure));
-  EXPECT_FALSE(beside({.is_too_small = true}, kSure, false));
+  EXPECT_FALSE(beside({.is_no_name = true}, kSure, false));
   EXPECT_FALSE(beside({.is_possible = false}, kSure, false));
 }
 
 // Of one ramp what no machine has is several constants at once; what is small is small there too.
 TEST(StandsBeside, WhatIsImpossibleCountsWhereOneRampIsRepeated) {
   EXPECT_FALSE(beside({.is_possible = false, .repeats_one = true}, kSure));
-  EXPECT_TRUE(beside({.is_too_small = true, .repeats_one = true}, kSure));
+  EXPECT_TRUE(beside({.is_no_name = true, .repeats_one = true}, kSure));
 }
 
 TEST(StandsBeside, AsksForTheFitOnlyWhereItDecides) {
@@ -48,7 +48,7 @@ TEST(StandsBeside, AsksForTheFitOnlyWhereItDecides) {
   stands_beside({}, fit);
   stands_beside({.is_possible = false, .repeats_one = true}, fit);
   EXPECT_EQ(asked, 0);
-  stands_beside({.is_too_small = true}, fit);
+  stands_beside({.is_no_name = true}, fit);
   EXPECT_EQ(asked, 1);
 }
 

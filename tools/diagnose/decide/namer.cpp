@@ -407,12 +407,12 @@ bool repeats_one(const Campaign& campaign) {
 
 // Whether the name `slot` stands beside this rival in its place. ln_odds: of the rival over
 // nothing.
-bool stands_beside(const Engine& engine, const Hypothesis& rival, int of_rival, double ln_odds,
-                   int slot) {
+bool stands_beside(const Engine& engine, const Hypothesis& rival, int of_rival, bool in_curve,
+                   double ln_odds, int slot) {
   const double size = rival.state.effects[of_rival];
-  const Rival what{.is_too_small = !is_beyond_holding(engine, of_rival, size) ||
-                                   !is_beyond_sensors(engine, of_rival, size) ||
-                                   !is_worth_a_name(engine, of_rival, size, ln_odds),
+  const Rival what{.is_no_name = in_curve || !is_beyond_holding(engine, of_rival, size) ||
+                                 !is_beyond_sensors(engine, of_rival, size) ||
+                                 !is_worth_a_name(engine, of_rival, size, ln_odds),
                    .is_possible = credible(engine, rival),
                    .repeats_one = repeats_one(engine.campaign())};
   return stands_beside(what, [&] {
@@ -493,7 +493,10 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
       const double bar =
           promoted ? promoted->by_course : whole.log_evidence + std::log(kPromotedOdds);
       const double ln_odds = other.log_evidence - without.log_evidence;
-      if (by_course > bar && credible(engine, other) &&
+      const bool stands =
+          by_course > whole.log_evidence &&
+          stands_beside(engine, other, ranked[i].second, in_curve, ln_odds, out.slot);
+      if (by_course > bar && credible(engine, other) && !(in_curve && stands) &&
           is_worth_a_name(engine, ranked[i].second, other.state.effects[ranked[i].second],
                           ln_odds)) {
         promoted = Promotion{other, by_course, ranked[i].second, out.slot};
@@ -501,10 +504,7 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
       out.is_of_sensors |=
           !is_beyond_sensors(engine, ranked[i].second, other.state.effects[ranked[i].second]) &&
           by_course > whole.log_evidence - std::log(kClassOdds);
-      if (by_course > whole.log_evidence &&
-          stands_beside(engine, other, ranked[i].second, ln_odds, out.slot)) {
-        continue;
-      }
+      if (stands) continue;
       evidence[id_of(engine, ranked[i].second)].push_back(by_course);
       if (id_of(engine, ranked[i].second) != id_of(engine, out.slot) &&
           by_course > whole.log_evidence - std::log(kClassOdds)) {

@@ -10,7 +10,7 @@ namespace beltgrip::diagnose {
 inline constexpr double kThereOdds = 20.0;
 
 struct Rival {
-  bool is_too_small = false;  // to be a name itself
+  bool is_no_name = false;  // itself: too small, or what the friction curve could do as well
   bool is_possible = true;    // sizes and constants that a machine can have
   bool repeats_one = false;   // all experiments are the same ramp
 };
@@ -21,7 +21,7 @@ struct Beside {
   bool is_possible = true;
 };
 
-// A cause that is too small to be a name, or that no machine has, is in the place of another: it
+// A cause that is no name itself, or that no machine has, is in the place of another: it
 // says nothing against a name that is there beside it as well. Where all experiments repeat one
 // ramp, what no machine has may be several constants of the machine at once, and says that nothing
 // holds. beside: a fit, asked for only where it decides.
