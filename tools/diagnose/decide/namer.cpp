@@ -768,9 +768,11 @@ void add_effects(Engine& engine, Naming& out, double& first_gain,
     bool found = false;
     const double gain_least = std::max(out.threshold, worth_beside(first_gain));
     const double worth = base.log_likelihood + 0.5 * gain_least;
-    // What a curve could do that runs as friction does.
+    // What a curve could do that runs as friction does. A ratio of friction is none, whatever its
+    // derivative says: the curve's form is one for both end stops.
     const auto is_of_curve = [&](int slot) {
-      return possible && std::any_of(scores.begin(), scores.end(), [&](const Score& score) {
+      return possible && id_of(engine, slot) != "friction_ratio" &&
+             std::any_of(scores.begin(), scores.end(), [&](const Score& score) {
                return score.slot == slot && score.in_curve >= kInCurveMax;
              });
     };
