@@ -61,8 +61,8 @@ constexpr double kHeld = 0.5;
 constexpr double kStatedSigmas = 3.0;
 // Friction of a cylinder in the clamp force's way that any machine has. The literature's is 30 to
 // 300 N. Measured in campaigns of other make: with none at all 13 of 116 healthy ones are named, by
-// plays of 11 to 26 N (of 7 to 15 N there); with it, or a fifth less or more, none of them, and five
-// that are planted, of 45 to 500 N, keep their name.
+// plays of 11 to 26 N (of 7 to 15 N there); with it, or a fifth less or more, none of them, and
+// five that are planted, of 45 to 500 N, keep their name.
 constexpr double kPlayLeast_N = 30.0;
 constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
 // Log odds that what is of no consequence is there. How small it is says what it matters, not
