@@ -21,7 +21,10 @@
 namespace beltgrip::diagnose {
 namespace {
 
-// Chance of a name on data without an effect, and of an unknown cause.
+// Chance of a name on data without an effect, by the likelihood as by what experiments agree on;
+// and of an unknown cause. Measured in campaigns of other make: of eight findings whose experiments
+// agree on less one is there. A fifth less or more of the second: the same names in those and the
+// six next to them.
 constexpr double kFalseName = 0.005;
 constexpr double kFalseUnknown = 0.005;
 constexpr int kRefined = 9;           // candidates refitted per step
@@ -72,7 +75,6 @@ constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
 constexpr double kSmallLnOdds = 12.0;
 // Where something else is so much more probable that cannot be, for its size, neither is it.
 constexpr double kUnlikely = 0.01;
-constexpr double kDisagreement = 0.05;   // p of a size that experiments do not agree on
 constexpr double kLeftOutMin = 0.0;      // of the log predictive density
 constexpr double kLeftOutPlain = 200.0;  // the same: beyond doubt, however few experiments show it
 // The same at the lower end of its interval over the experiments, nats. Derived: odds of 20 to 1,
@@ -577,7 +579,7 @@ void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& 
                  !credible(engine, each.slot, size) ||
                  !is_worth_a_name(engine, each.slot, size, each.ln_odds) ||
                  each.probability < kUnlikely ||
-                 estimator::student_p(size / each.sigma, each.degrees) > kDisagreement;
+                 estimator::student_p(size / each.sigma, each.degrees) > kFalseName;
         });
     if (doubtful == naming.accepted.end()) return;
     naming.not_confirmed.push_back(doubtful->slot);
