@@ -99,9 +99,22 @@ class Run {
     if (is_no_belts(fitted_mu_max(naming)) && !stop()())
       name_with_usual_losses(campaign, engine, naming);
     progress(0.6, "tests");
-    Learning learning = criticise_and_learn(engine, naming);
-    if (things_in(engine, learning) > 0 && !stop()())
-      explain_by_machine(campaign, engine, naming, learning);
+    Learning learning = criticised(engine, naming);
+    // Another machine has a constant or two more, a function one at each of its knots: it is asked
+    // for first.
+    std::vector<Machine> others;
+    const bool is_left = !learning.left.passed() && !stop()();
+    if (is_left) {
+      others = other_machines(campaign, engine, naming, learning);
+      take_better_of(others, engine, naming, learning);
+    }
+    if (!is_left || !learning.left.passed()) {
+      learn_what_is_left(engine, naming, learning);
+      if (!is_left && things_in(engine, learning) > 0 && !stop()())
+        others = other_machines(campaign, engine, naming, learning);
+      for (Machine& each : others) learn_what_is_left(each.engine, each.naming, each.learning);
+      take_better_of(others, engine, naming, learning);
+    }
     progress(0.8, "gain");
     fill(engine, naming, learning);
     if (request_.with_plots) {
@@ -225,44 +238,66 @@ class Run {
     return engine.accepted().size() + learning.terms.size() + (learning.left.passed() ? 0 : 1);
   }
 
-  // Is it but another machine? Only where the tests then pass with fewer causes, which explain no
-  // more.
-  void explain_by_machine(const Campaign& campaign, Engine& engine, Naming& naming,
-                          Learning& learning) {
-    const auto is_explained_by = [&](Engine other) {
-      Naming named = name_fitted(other, stop());
+  struct Machine {
+    Engine engine;
+    Naming naming;
+    Learning learning;
+  };
+
+  // What may be there instead of causes, with the names that it has.
+  std::vector<Machine> other_machines(const Campaign& campaign, const Engine& engine,
+                                      const Naming& naming, const Learning& learning) {
+    std::vector<Machine> out;
+    const auto add = [&](Engine other) {
       if (stop()()) return;
-      Learning learned = criticise_and_learn(other, named);
-      if (!learned.left.passed()) return;
-      const std::size_t causes = things_in(other, learned), before = things_in(engine, learning);
-      // A function that explains a little more fails no test beside it.
-      const bool is_better = causes < before
-                                 ? engine.accepted().empty() || !explain_more_than(other, engine)
-                                 : causes == before && explain_more_than(engine, other);
-      if (!is_better) return;
-      engine = std::move(other);
-      naming = std::move(named);
-      learning = std::move(learned);
+      Naming named = name_fitted(other, stop());
+      Learning left = criticised(other, named);
+      out.push_back({std::move(other), std::move(named), std::move(left)});
     };
     if (loses_unusually(campaign, naming)) {
       Engine usual(campaign, request_.jobs, Losses::kUsual);
       usual.fit_machine();
-      is_explained_by(std::move(usual));
+      add(std::move(usual));
     }
-    if (things_in(engine, learning) == 0 || !campaign.has_balance || stop()()) return;
+    if (!campaign.has_balance || stop()()) return out;
     Engine stays(campaign, request_.jobs, Losses::kAsFitted, TorqueRatio::kMayStay);
     stays.fit_machine();
-    if (stays.state().nuisance[kDeformationLost] > kStays && !is_settled(engine, learning, stays))
-      is_explained_by(std::move(stays));
+    Engine noisy = stays;
+    noisy.update_noise();
+    const double beside =
+        noisy.refine_from(engine.state(), engine.accepted()).state.nuisance[kDeformationLost];
+    const double alone = stays.state().nuisance[kDeformationLost];
+    const bool is_there = std::max(alone, beside) > kStays;
+    if (is_there && (beside > kStays || !is_settled(engine, learning, noisy)))
+      add(std::move(stays));
+    return out;
+  }
+
+  // Is it but another machine? Only where the tests then pass with fewer causes, which explain no
+  // more.
+  void take_better_of(std::vector<Machine>& others, Engine& engine, Naming& naming,
+                      Learning& learning) const {
+    for (Machine& other : others) {
+      if (stop()()) return;
+      const std::size_t causes = things_in(other.engine, other.learning);
+      const std::size_t before = things_in(engine, learning);
+      if (!other.learning.left.passed() || before == 0) continue;
+      // A function that explains a little more fails no test beside it.
+      const bool is_better =
+          causes < before ? engine.accepted().empty() || !explain_more_than(other.engine, engine)
+                          : causes == before && explain_more_than(engine, other.engine);
+      if (!is_better) continue;
+      engine = other.engine;
+      naming = other.naming;
+      learning = other.learning;
+    }
   }
 
   // One name with which all tests pass, and that does what the torque ratio that stays cannot: that
-  // explains less in its place, and is not there beside it.
-  static bool is_settled(const Engine& engine, const Learning& learning, Engine stays) {
-    if (engine.accepted().size() != 1 || things_in(engine, learning) != 1) return false;
-    stays.update_noise();
-    const Hypothesis beside = stays.refine_from(engine.state(), engine.accepted());
-    return beside.state.nuisance[kDeformationLost] <= kStays && explain_more_than(stays, engine);
+  // explains less in its place.
+  static bool is_settled(const Engine& engine, const Learning& learning, const Engine& stays) {
+    return engine.accepted().size() == 1 && things_in(engine, learning) == 1 &&
+           explain_more_than(stays, engine);
   }
 
   static bool loses_unusually(const Campaign& campaign, const Naming& naming) {
@@ -302,17 +337,22 @@ class Run {
     return out;
   }
 
-  // What fails the tests is learned where it can be; with it the whole analysis anew, until nothing
-  // changes.
-  Learning criticise_and_learn(Engine& engine, Naming& naming) {
+  // What names leave.
+  Learning criticised(Engine& engine, Naming& naming) {
     Learning out;
     if (stop()()) return out;
     out.left = criticise_with_needed_scatter(engine, naming);
     name_until_settled(engine, naming, out.left);
-    if (out.left.passed()) return out;
+    return out;
+  }
+
+  // What fails the tests is learned where it can be; with it the whole analysis anew, until nothing
+  // changes.
+  void learn_what_is_left(Engine& engine, Naming& naming, Learning& out) {
+    if (out.left.passed() || stop()()) return;
     if (engine.accepted().empty()) {
       learn_in_turn(engine, naming, out);
-      return out;
+      return;
     }
     // Names that leave something: are they needed beside a function, or its shadows?
     Engine bare = engine;
@@ -321,7 +361,7 @@ class Run {
     Learning alone;
     alone.left = criticise_with_needed_scatter(bare, forgotten);
     const Criticism nothing = alone.left;
-    if (nothing.passed() && passes_with_fewer(engine, naming, out.left)) return out;
+    if (nothing.passed() && passes_with_fewer(engine, naming, out.left)) return;
     learn_in_turn(bare, forgotten, alone);
     const bool is_alone =
         !alone.terms.empty() && alone.left.passed() && !explain_more_than(bare, engine);
@@ -329,10 +369,10 @@ class Run {
     const bool are_shadows =
         is_alone || (!out.left.passed() &&
                      is_shadowed(engine.campaign(), engine.accepted(), nothing, out.left));
-    if (!are_shadows) return out;
+    if (!are_shadows) return;
     engine = std::move(bare);
     naming = std::move(forgotten);
-    return alone;
+    out = std::move(alone);
   }
 
   // Where the tests pass without any name, what fails with them is theirs, and no function is to
