@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "tests/tools/diagnose/recorded_runs.h"
 
@@ -54,6 +55,27 @@ TEST(TorqueRatio, ThatStaysHidesNoCause) {
   const Diagnosis answer = diagnose(request_of(trial)).diagnosis;
   ASSERT_EQ(answer.findings.size(), 1U);
   EXPECT_EQ(answer.findings.front().effect, "torque_gain");
+}
+
+// Where names leave something, the other machine is asked before a function is learned: that has a
+// constant at each of its knots, and explains a little more.
+TEST(TorqueRatio, ThatStaysLeavesNoFunctionBesideACause) {
+  blind::Trial trial = soft_pulleys(true);
+  trial.planted.push_back({"torque_bias", {{"bias_Nm", 6.0}}, {}});
+  Request request = request_of(trial);
+  const auto told = [&](Role role, double bias, double gain) {
+    request.accuracies[static_cast<std::size_t>(role)].bias = bias;
+    request.accuracies[static_cast<std::size_t>(role)].gain = gain;
+  };
+  told(Role::kPrimarySpeed, 0.0, 5e-4);
+  told(Role::kSecondarySpeed, 0.0, 5e-4);
+  told(Role::kPrimaryTorque, 0.5, 3e-3);
+  told(Role::kSecondaryTorque, 0.3, 5e-3);
+  told(Role::kSecondaryPressure, 5e3, 5e-3);
+  const Diagnosis answer = diagnose(std::move(request)).diagnosis;
+  EXPECT_EQ(answer.verdict, Verdict::kExplained);
+  EXPECT_EQ(answer.findings.size(), 1U);
+  EXPECT_TRUE(answer.learned.empty());
 }
 
 }  // namespace
