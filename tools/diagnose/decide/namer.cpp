@@ -21,10 +21,7 @@
 namespace beltgrip::diagnose {
 namespace {
 
-// Chance of a name on data without an effect, by the likelihood as by what experiments agree on;
-// and of an unknown cause. Measured in campaigns of other make: of eight findings whose experiments
-// agree on less one is there. A fifth less or more of the second: the same names in those and the
-// six next to them.
+// Chance of a name on data without an effect, and of an unknown cause.
 constexpr double kFalseName = 0.005;
 constexpr double kFalseUnknown = 0.005;
 constexpr int kRefined = 9;           // candidates refitted per step
@@ -75,6 +72,7 @@ constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
 constexpr double kSmallLnOdds = 12.0;
 // Where something else is so much more probable that cannot be, for its size, neither is it.
 constexpr double kUnlikely = 0.01;
+constexpr double kDisagreement = 0.05;   // p of a size that experiments do not agree on
 constexpr double kLeftOutMin = 0.0;      // of the log predictive density
 constexpr double kLeftOutPlain = 200.0;  // the same: beyond doubt, however few experiments show it
 // The same at the lower end of its interval over the experiments, nats. Derived: odds of 20 to 1,
@@ -575,11 +573,12 @@ void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& 
     const auto doubtful =
         std::find_if(naming.accepted.begin(), naming.accepted.end(), [&](const Accepted& each) {
           const double size = naming.hypothesis.state.effects[each.slot];
-          return each.ln_odds < std::log(kThereOdds) || each.is_of_sensors ||
-                 !credible(engine, each.slot, size) ||
+          // By the noise that it leaves, a name may be what chance gives.
+          return each.chi2 < naming.threshold || each.ln_odds < std::log(kThereOdds) ||
+                 each.is_of_sensors || !credible(engine, each.slot, size) ||
                  !is_worth_a_name(engine, each.slot, size, each.ln_odds) ||
                  each.probability < kUnlikely ||
-                 estimator::student_p(size / each.sigma, each.degrees) > kFalseName;
+                 estimator::student_p(size / each.sigma, each.degrees) > kDisagreement;
         });
     if (doubtful == naming.accepted.end()) return;
     naming.not_confirmed.push_back(doubtful->slot);
