@@ -59,11 +59,13 @@ constexpr double kHeld = 0.5;
 // sensors' own (kReach of the engine). A fifth less or more: the same in two healthy campaigns of
 // other make that it is for (25, 174); more also in one whose spring is there (115).
 constexpr double kStatedSigmas = 3.0;
-// Friction of a cylinder in the clamp force's way that any machine has. The literature's is 30 to
-// 300 N. Measured in campaigns of other make: with none at all 13 of 116 healthy ones are named, by
-// plays of 11 to 26 N (of 7 to 15 N there); with it, or a fifth less or more, none of them, and
-// five that are planted, of 45 to 500 N, keep their name.
-constexpr double kPlayLeast_N = 30.0;
+// Derived: the least that the literature gives of the friction of a cylinder in the clamp force's
+// way (30 to 300 N), which any machine may have. Measured in campaigns of other make: with none 13
+// of 116 healthy ones are named, by plays of 11 to 26 N (of 7 to 15 N there), with it none of them.
+// A fifth less or more (24, 36 N): the same answers of 13 healthy ones and of four with a play that
+// is planted, of 45 to 422 N. Not run: at 10 N it would name those of 11 N and more again; from 45
+// N on it would lose what is planted.
+constexpr double kUsualPlay_N = 30.0;
 constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
 // Log odds that what is of no consequence is there. How small it is says what it matters, not
 // whether it is there; but what the form of the friction leaves in healthy machines is small as
@@ -241,8 +243,8 @@ bool is_beyond_holding(const Engine& engine, int slot, double size) {
          (!shifts_pressure(which) || std::abs(size) >= late_of_passed_s(engine.campaign()));
 }
 
-// One sigma of a constant error that was stated of the sensor whose error this slot is, or of what
-// any machine has of it, in its unit; 0: nothing was.
+// One sigma of a constant error that was stated of the sensor whose error this slot is, in its
+// unit; 0: nothing was.
 double stated_sigma(const Campaign& campaign, const Slot& slot) {
   const auto of = [&](Role role) { return campaign.accuracies[static_cast<std::size_t>(role)]; };
   const std::string_view id = slot.row->id;
@@ -251,7 +253,6 @@ double stated_sigma(const Campaign& campaign, const Slot& slot) {
     return campaign.variator.secondary_piston_area_m2 * of(Role::kSecondaryPressure).bias;
   }
   if (id == "pressure_gain") return of(Role::kSecondaryPressure).gain;
-  if (id == "clamp_hysteresis") return kPlayLeast_N / kStatedSigmas;
   if (id == "torque_bias") {
     const bool is_engine = campaign.runs.size() > 0 && campaign.runs[0].torque_is_engine;
     return of(is_engine ? Role::kEngineTorque : Role::kPrimaryTorque).bias;
@@ -262,10 +263,13 @@ double stated_sigma(const Campaign& campaign, const Slot& slot) {
   return 0.0;
 }
 
-// What a sensor may be off by, as stated, is no finding.
-bool is_beyond_sensors(const Engine& engine, int slot, double size) {
+// What a sensor may be off by, as stated, or any machine has, is no finding.
+bool is_beyond_usual(const Engine& engine, int slot, double size) {
   const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
-  return std::abs(size) >= kStatedSigmas * stated_sigma(engine.campaign(), which);
+  const double usual = which.row->id == "clamp_hysteresis"
+                           ? kUsualPlay_N
+                           : kStatedSigmas * stated_sigma(engine.campaign(), which);
+  return std::abs(size) >= usual;
 }
 
 bool is_of_consequence(const Engine& engine, int slot, double size) {
@@ -283,8 +287,7 @@ bool is_worth_a_name(const Engine& engine, int slot, double size, double ln_odds
 bool credible(const Engine& engine, int slot, double size) {
   const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
   const EffectRow& row = *which.row;
-  if (!is_beyond_holding(engine, slot, size) || !is_beyond_sensors(engine, slot, size))
-    return false;
+  if (!is_beyond_holding(engine, slot, size) || !is_beyond_usual(engine, slot, size)) return false;
   if (row.id == "radius_tilt" && !engine.campaign().torque_varies) return false;
   if (row.id == "torque_delay" && !engine.campaign().torque_moves) return false;
   const bool follows_pressure = row.id == "clamp_hysteresis" || shifts_pressure(which);
@@ -411,7 +414,7 @@ bool stands_beside(const Engine& engine, const Hypothesis& rival, int of_rival, 
                    double ln_odds, int slot) {
   const double size = rival.state.effects[of_rival];
   const Rival what{.is_no_name = in_curve || !is_beyond_holding(engine, of_rival, size) ||
-                                 !is_beyond_sensors(engine, of_rival, size) ||
+                                 !is_beyond_usual(engine, of_rival, size) ||
                                  !is_worth_a_name(engine, of_rival, size, ln_odds),
                    .is_possible = credible(engine, rival),
                    .repeats_one = repeats_one(engine.campaign())};
@@ -501,8 +504,8 @@ std::optional<Promotion> compare_classes(Engine& engine, Naming& naming,
                           ln_odds)) {
         promoted = Promotion{other, by_course, ranked[i].second, out.slot};
       }
-      out.is_of_sensors |=
-          !is_beyond_sensors(engine, ranked[i].second, other.state.effects[ranked[i].second]) &&
+      out.is_usual |=
+          !is_beyond_usual(engine, ranked[i].second, other.state.effects[ranked[i].second]) &&
           by_course > whole.log_evidence - std::log(kClassOdds);
       if (stands) continue;
       evidence[id_of(engine, ranked[i].second)].push_back(by_course);
@@ -575,7 +578,7 @@ void drop_doubtful(Engine& engine, Naming& naming, const std::function<bool()>& 
           const double size = naming.hypothesis.state.effects[each.slot];
           // By the noise that it leaves, a name may be what chance gives.
           return each.chi2 < naming.threshold || each.ln_odds < std::log(kThereOdds) ||
-                 each.is_of_sensors || !credible(engine, each.slot, size) ||
+                 each.is_usual || !credible(engine, each.slot, size) ||
                  !is_worth_a_name(engine, each.slot, size, each.ln_odds) ||
                  each.probability < kUnlikely ||
                  estimator::student_p(size / each.sigma, each.degrees) > kDisagreement;

@@ -22,7 +22,8 @@ struct Accepted {
   double ln_odds = 0.0;                  // against its not being there, nor anything in its place
   std::vector<int> aliases;              // slots of other effects that fit as well
   std::vector<Hypothesis> in_its_place;  // with each of these instead
-  bool is_of_sensors = false;            // one of them is an error that was stated of a sensor
+  bool is_usual = false;                 // one of them is what sensors were stated to be off by,
+                                         // or any machine has
   double left_out_gain = 0.0;  // of the log predictive density of experiments left out of the fit
 };
 
