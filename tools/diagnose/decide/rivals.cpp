@@ -6,8 +6,7 @@
 namespace beltgrip::diagnose {
 
 bool stands_beside(const Rival& rival, const std::function<Beside()>& beside) {
-  const bool is_in_anothers_place =
-      rival.is_no_name || (!rival.is_possible && !rival.repeats_one);
+  const bool is_in_anothers_place = rival.is_no_name || (!rival.is_possible && !rival.repeats_one);
   if (!is_in_anothers_place) return false;
   const Beside both = beside();
   return both.is_possible && both.ln_odds > std::log(kThereOdds);

@@ -10,9 +10,9 @@ namespace beltgrip::diagnose {
 inline constexpr double kThereOdds = 20.0;
 
 struct Rival {
-  bool is_no_name = false;  // itself: too small, or what the friction curve could do as well
-  bool is_possible = true;    // sizes and constants that a machine can have
-  bool repeats_one = false;   // all experiments are the same ramp
+  bool is_no_name = false;   // itself: too small, or what the friction curve could do as well
+  bool is_possible = true;   // sizes and constants that a machine can have
+  bool repeats_one = false;  // all experiments are the same ramp
 };
 
 // The name beside the rival.
