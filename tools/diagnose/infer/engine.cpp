@@ -46,6 +46,8 @@ constexpr double kBeyondPromise = 10.0;
 // would be given up. 15 with 1.6 times what the linear promises, 10 with 2.4; 18 with 3 times the
 // last step, 8 with 5.
 constexpr double kBeyondLast = 4.0, kBeyondPromiseThen = 2.0;
+// Derived, scaled: beyond what data say of any constant (1e8), so that none moves what has it.
+constexpr double kHeldPrecision = 1e14;
 constexpr double kSameStep = 1e-3;  // apart by less of their length: both fail; +-20 %: same bytes
 // One sigma of curve_faults(), chosen. A fifth more: the same answers in all 24. A fifth less: in
 // one, whose fit has two places to end, the effect that is there is found and nothing is left.
@@ -195,9 +197,14 @@ class Descent {
     }
     best_.objective = standing(best_.state, best_.summaries, best_.fit.scatter);
   }
+  VectorXd step_by(const NormalEquations& equations, const Prior& prior) const {
+    return engine_.step_within_ranges(parameters_, best_.state, prior, [&](const Prior& held) {
+      return fit_linear(equations, held, best_.fit.scatter).step;
+    });
+  }
   bool can_reach(double worth, int left, const NormalEquations& equations,
                  const Prior& here) const {
-    const VectorXd step = fit_linear(equations, here, best_.fit.scatter).step;
+    const VectorXd step = step_by(equations, here);
     const double promised = promise(equations, here, step);
     const double most =
         std::min(kBeyondPromise * promised,
@@ -216,7 +223,7 @@ class Descent {
       Prior damped = here;
       damped.precision += damping_ * diagonal;
       damped.pull = here.pull.cwiseProduct(here.precision).cwiseQuotient(damped.precision);
-      const VectorXd step = fit_linear(equations, damped, best_.fit.scatter).step;
+      const VectorXd step = step_by(equations, damped);
       if (promise(equations, here, step) < kPromisesNothing) break;
       if ((step - failed).norm() < kSameStep * failed.norm()) {
         damp(kDampingFactor);
@@ -386,7 +393,7 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model,
 }
 
 Engine::Engine(Campaign campaign, int jobs, Losses losses, TorqueRatio torque_ratio)
-    : jobs_(jobs), losses_(losses), campaign_(std::move(campaign)) {
+    : jobs_(jobs), losses_(losses), torque_ratio_(torque_ratio), campaign_(std::move(campaign)) {
   for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
     if (campaign_.runs[e].valid_count > 0) used_.push_back(static_cast<int>(e));
   }
@@ -901,6 +908,31 @@ void Engine::add_curve_bounds(const ModelState& state, const std::vector<int>& p
   for (Summary& each : summaries) each.aa += all;
 }
 
+Range Engine::range(int parameter) const {
+  constexpr double kAny = std::numeric_limits<double>::infinity();
+  if (parameter >= kNuisanceCount) {
+    const int slot = parameter - kNuisanceCount;
+    const double on = campaign_.switched_on[slot];
+    const EffectRow& row = *campaign_.slots[static_cast<std::size_t>(slot)].row;
+    return {std::min(0.0, least_size(campaign_, slot) - on), std::max(0.0, row.high - on)};
+  }
+  if (parameter == kSecondaryInertia_kgm2) return {0.0, kAny};
+  if (parameter == kDeformationLost) return {0.0, 1.0};
+  // The data hold it far better than the usual values do: without a bound any drag would be the
+  // machine's own, and what it explains would be no gain.
+  constexpr std::array kBounded{kLossPerkN_Nm, kSecondaryLossPerkN_Nm, kSecondaryTorqueGain,
+                                kPressureBias_Pa, kCentrifugalOff_N_s2};
+  constexpr std::array kLosses{kLossConstant_Nm, kLossPerSpeed_Nms, kSecondaryLoss_Nm,
+                               kSecondaryLossPerSpeed_Nms};
+  const auto is_among = [&](const auto& these) {
+    return std::find(these.begin(), these.end(), parameter) != these.end();
+  };
+  if (!is_among(kBounded) && !(losses_ == Losses::kUsual && is_among(kLosses)))
+    return {-kAny, kAny};
+  const NuisanceRow& row = campaign_.nuisances[static_cast<std::size_t>(parameter)];
+  return {row.nominal - kReach * row.tolerance, row.nominal + kReach * row.tolerance};
+}
+
 void Engine::move(const std::vector<int>& parameters, const VectorXd& step, double share,
                   ModelState& state) const {
   for (std::size_t j = 0; j < parameters.size(); ++j) {
@@ -909,33 +941,38 @@ void Engine::move(const std::vector<int>& parameters, const VectorXd& step, doub
       const VectorXd change = by * curve_modes().col(parameters[j] - first);
       state.nuisance.segment(first, kShapeKnots) += change;
       if (first == kShapeOverdrive) state.nuisance.segment(kShapeLow, kShapeKnots) += change;
-    } else if (parameters[j] < kNuisanceCount) {
-      double& value = state.nuisance[parameters[j]];
-      value += by;
-      if (parameters[j] == kSecondaryInertia_kgm2) value = std::max(value, 0.0);
-      if (parameters[j] == kDeformationLost) value = std::clamp(value, 0.0, 1.0);
-      // The data hold it far better than the usual values do: without a bound any drag would be the
-      // machine's own, and what it explains would be no gain.
-      constexpr std::array kBounded{kLossPerkN_Nm, kSecondaryLossPerkN_Nm, kSecondaryTorqueGain,
-                                    kPressureBias_Pa, kCentrifugalOff_N_s2};
-      constexpr std::array kLosses{kLossConstant_Nm, kLossPerSpeed_Nms, kSecondaryLoss_Nm,
-                                   kSecondaryLossPerSpeed_Nms};
-      const auto is_among = [&](const auto& these) {
-        return std::find(these.begin(), these.end(), parameters[j]) != these.end();
-      };
-      if (is_among(kBounded) || (losses_ == Losses::kUsual && is_among(kLosses))) {
-        const NuisanceRow& row = campaign_.nuisances[static_cast<std::size_t>(parameters[j])];
-        value = std::clamp(value, row.nominal - kReach * row.tolerance,
-                           row.nominal + kReach * row.tolerance);
-      }
-    } else {
-      const int slot = parameters[j] - kNuisanceCount;
-      const double on = campaign_.switched_on[slot];
-      const EffectRow& row = *campaign_.slots[static_cast<std::size_t>(slot)].row;
-      state.effects[slot] =
-          std::clamp(state.effects[slot] + by, std::min(0.0, least_size(campaign_, slot) - on),
-                     std::max(0.0, row.high - on));
+      continue;
     }
+    double& value = parameters[j] < kNuisanceCount ? state.nuisance[parameters[j]]
+                                                   : state.effects[parameters[j] - kNuisanceCount];
+    const Range within = range(parameters[j]);
+    value = std::clamp(value + by, within.least, within.most);
+  }
+}
+
+VectorXd Engine::step_within_ranges(const std::vector<int>& parameters, const ModelState& from,
+                                    const Prior& prior,
+                                    const std::function<VectorXd(const Prior&)>& solved) const {
+  Prior held = prior;
+  std::vector<bool> is_held(parameters.size(), false);
+  for (;;) {
+    const VectorXd step = solved(held);
+    bool leaves = false;
+    for (std::size_t j = 0; j < parameters.size(); ++j) {
+      const int parameter = parameters[j];
+      if (is_held[j] || first_knot(parameter) >= 0) continue;
+      const auto i = static_cast<Index>(j);
+      const Range within = range(parameter);
+      const double here = parameter < kNuisanceCount ? from.nuisance[parameter]
+                                                     : from.effects[parameter - kNuisanceCount];
+      const double down = (within.least - here) / scale(parameter);
+      const double up = (within.most - here) / scale(parameter);
+      if (step[i] >= down && step[i] <= up) continue;
+      held.pull[i] = step[i] < down ? down : up;
+      held.precision[i] = kHeldPrecision;
+      is_held[j] = leaves = true;
+    }
+    if (!leaves) return step;
   }
 }
 

@@ -70,6 +70,10 @@ enum class Losses { kAsFitted, kUsual };
 // by slip.
 enum class TorqueRatio { kFollows, kMayStay };
 
+struct Range {
+  double least = 0.0, most = 0.0;
+};
+
 class Engine {
  public:
   // Chosen, tolerances of a constant of the machine: no healthy one is farther off. As what asks
@@ -80,6 +84,7 @@ class Engine {
                   TorqueRatio torque_ratio = TorqueRatio::kFollows);
 
   int jobs() const { return jobs_; }
+  TorqueRatio torque_ratio() const { return torque_ratio_; }
   const Campaign& campaign() const { return campaign_; }
   const std::vector<int>& used() const { return used_; }  // experiments with valid samples
   const ModelState& state() const { return state_; }
@@ -156,9 +161,17 @@ class Engine {
   void add_curve_bounds(const ModelState& state, const std::vector<int>& parameters,
                         std::vector<Summary>& summaries) const;
 
-  // Adds a scaled step, effects kept within their bounds.
+  // Where a constant of the machine, but the form of its friction curve, or a size may lie.
+  Range range(int parameter) const;
+  // Adds a scaled step, each parameter kept within its range.
   void move(const std::vector<int>& parameters, const Eigen::VectorXd& step, double share,
             ModelState& state) const;
+  // The scaled step of equations by which nothing leaves its range: what would goes to its end, and
+  // the others where they fit best with that. Without it they go where they would fit with what is
+  // never reached. solved: the step of the equations by a prior.
+  Eigen::VectorXd step_within_ranges(
+      const std::vector<int>& parameters, const ModelState& from, const Prior& prior,
+      const std::function<Eigen::VectorXd(const Prior&)>& solved) const;
 
  private:
   // Levenberg-Marquardt on the marginal likelihood, scatter re-estimated on the way.
@@ -183,6 +196,7 @@ class Engine {
 
   int jobs_;
   Losses losses_;
+  TorqueRatio torque_ratio_;
   Campaign campaign_;
   std::vector<int> used_;
   std::vector<Campaign> coarse_;  // the same with more noise, falling
