@@ -75,6 +75,18 @@ TEST(OwnShape, IsTheBestOfWhatANamedEffectFollows) {
   EXPECT_EQ(own_shape(campaign, {0}, {cells[0]}), nullptr);
 }
 
+// The friction curve follows the torque as well: what it leaves beside a gain of the torque is no
+// other course of that.
+TEST(OwnShape, OverTheTorqueIsWhatActsWhereTheEffectDoes) {
+  Campaign campaign = with_effects({"torque_gain"});
+  campaign.has_balance = true;
+  ASSERT_EQ(campaign.slots[0].row->depends_on, "torque");
+  const std::vector<Cell> cells{cell(Injection::kFriction, "torque", 20.0, 0.1, 0.1),
+                                cell(Injection::kTorque, "torque", 9.0, 0.1, 0.1)};
+  EXPECT_EQ(own_shape(campaign, {0}, cells), &cells[1]);
+  EXPECT_EQ(own_shape(campaign, {0}, {cells[0]}), nullptr);
+}
+
 TEST(OwnShape, AloneIsToldAsWhatItFollows) {
   Criticism left = failing({"own_shape"});
   left.own = cell(Injection::kFriction, "oil_temperature", 9.0, 0.1, 0.1);

@@ -110,15 +110,30 @@ double replicate_limit(std::size_t experiments, double degrees) {
   return std::sqrt(low);
 }
 
+bool acts_there(const EffectRow& row, std::string_view point, const Campaign& campaign) {
+  const bool is_friction = row.acts_on == "friction", is_force = row.acts_on == "clamp force";
+  const bool is_torque = row.acts_on == "torque";
+  const bool is_grip = point == "friction" || point == "clamp_force" || point == "torque_gain";
+  if (!campaign.has_balance && is_grip && (is_friction || is_force || row.id == "torque_gain")) {
+    return true;
+  }
+  if (point == "torque" || point == "torque_gain") return is_torque;
+  if (point == "ratio") return row.acts_on == "ratio" || row.acts_on == "speed";
+  return point == "friction" ? is_friction : is_force;
+}
+
 const Cell* own_shape(const Campaign& campaign, const std::vector<int>& accepted,
                       const std::vector<Cell>& cells) {
   const Cell* out = nullptr;
   for (const Cell& cell : cells) {
-    // The friction curve follows the pressure too, and what it leaves is nothing of the effect's.
-    if (std::string_view(cell.abscissa.variable->name) == "secondary_pressure") continue;
+    // The friction curve follows pressure and torque too, and what it leaves is nothing of the
+    // effect's.
+    const std::string_view follows = cell.abscissa.variable->name;
+    if (follows == "secondary_pressure") continue;
     const bool is_own = std::any_of(accepted.begin(), accepted.end(), [&](int slot) {
-      return campaign.slots[static_cast<std::size_t>(slot)].row->depends_on ==
-             cell.abscissa.variable->name;
+      const EffectRow& row = *campaign.slots[static_cast<std::size_t>(slot)].row;
+      return row.depends_on == follows &&
+             (follows != "torque" || acts_there(row, cell.injection->acts_on, campaign));
     });
     if (is_own && (out == nullptr || cell.gain() > out->gain())) out = &cell;
   }

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "tools/diagnose/data/diagnosis.h"
@@ -41,6 +42,10 @@ double replicate_limit(std::size_t experiments, double degrees);
 
 // At the engine's state.
 Criticism criticise(const Engine& engine);
+
+// Whether an effect does what a function at this point does. Without the torque behind the belt
+// friction, gain of the torque and clamp force are one.
+bool acts_there(const EffectRow& row, std::string_view point, const Campaign& campaign);
 
 // A function of what a named effect follows, beside it; the one with the largest gain. Where that
 // is there still, the cause follows the same and is another. Null: no effect is named that follows

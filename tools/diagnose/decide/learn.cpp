@@ -107,19 +107,6 @@ void drop_superseded(Engine& engine, const Cell& cell) {
   engine.update_noise();
 }
 
-// Without the torque behind the belt friction, gain of the torque and clamp force are one.
-bool acts_there(const EffectRow& row, std::string_view point, const Campaign& campaign) {
-  const bool is_friction = row.acts_on == "friction", is_force = row.acts_on == "clamp force";
-  const bool is_torque = row.acts_on == "torque";
-  const bool is_grip = point == "friction" || point == "clamp_force" || point == "torque_gain";
-  if (!campaign.has_balance && is_grip && (is_friction || is_force || row.id == "torque_gain")) {
-    return true;
-  }
-  if (point == "torque" || point == "torque_gain") return is_torque;
-  if (point == "ratio") return row.acts_on == "ratio" || row.acts_on == "speed";
-  return point == "friction" ? is_friction : is_force;
-}
-
 // Which random effect a function at this point could be.
 std::string_view scatter_of(Injection injection) {
   if (injection == Injection::kTorque) return "torque";
