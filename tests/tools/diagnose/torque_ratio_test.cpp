@@ -48,13 +48,18 @@ TEST(TorqueRatio, ThatFollowsIsTheUsualOne) {
   EXPECT_FALSE(answer.machine.contains("deformation_lost_share"));
 }
 
-// What is wrong beside it is named. Its size takes in what the ratio lacks: 0.087 for 0.06.
+// What is wrong beside it is named, in its size: where the ratio was one that follows, that took in
+// what it lacks, and was 0.087 for 0.06.
 TEST(TorqueRatio, ThatStaysHidesNoCause) {
   blind::Trial trial = soft_pulleys(true);
   trial.planted.push_back({"torque_gain", {{"gain", 0.06}}, {}});
   const Diagnosis answer = diagnose(request_of(trial)).diagnosis;
   ASSERT_EQ(answer.findings.size(), 1U);
   EXPECT_EQ(answer.findings.front().effect, "torque_gain");
+  const Interval& gain = answer.findings.front().parameters.at("gain");
+  EXPECT_GT(0.06, gain.low);
+  EXPECT_LT(0.06, gain.high);
+  EXPECT_NEAR(gain.value, 0.06, 0.01);
 }
 
 // Where names leave something, the other machine is asked before a function is learned: that has a

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "estimator/physics/assumed_constants.h"
 #include "estimator/physics/clamp_force.h"
@@ -94,8 +95,8 @@ class Run {
     note_assumed(runs);
     progress(0.1, "fit");
     const Campaign campaign = make_campaign(std::move(runs), request_.model, request_.accuracies);
-    Engine engine(campaign, request_.jobs);
-    Naming naming = name_effects(engine, stop());
+    Engine engine = fitted_machine(campaign);
+    Naming naming = name_fitted(engine, stop());
     if (is_no_belts(fitted_mu_max(naming)) && !stop()())
       name_with_usual_losses(campaign, engine, naming);
     progress(0.6, "tests");
@@ -226,7 +227,7 @@ class Run {
   }
   // Where that leaves friction that belts have.
   void name_with_usual_losses(const Campaign& campaign, Engine& engine, Naming& naming) const {
-    Engine usual(campaign, request_.jobs, Losses::kUsual);
+    Engine usual(campaign, request_.jobs, Losses::kUsual, engine.torque_ratio());
     Naming other = name_effects(usual, stop());
     if (stop()() || is_no_belts(fitted_mu_max(other))) return;
     engine = std::move(usual);
@@ -244,6 +245,24 @@ class Run {
     Learning learning;
   };
 
+  // The torque ratio is that which the data are more probable with, whatever may be wrong beside
+  // it: on the wrong machine names take up what its ratio lacks, and do not give it back. The other
+  // one is asked where something is left or named.
+  Engine fitted_machine(const Campaign& campaign) {
+    Engine follows(campaign, request_.jobs);
+    follows.fit_machine();
+    if (!campaign.has_balance || stop()()) return follows;
+    Engine stays(campaign, request_.jobs, Losses::kAsFitted, TorqueRatio::kMayStay);
+    stays.fit_machine();
+    Engine by_follows = follows, by_stays = stays;
+    by_follows.update_noise();
+    by_stays.update_noise();
+    const bool is_there = stays.state().nuisance[kDeformationLost] > kStays &&
+                          explain_more_than(by_follows, by_stays);
+    other_ratio_ = is_there ? follows : stays;
+    return is_there ? stays : follows;
+  }
+
   // What may be there instead of causes, with the names that it has.
   std::vector<Machine> other_machines(const Campaign& campaign, const Engine& engine,
                                       const Naming& naming, const Learning& learning) {
@@ -255,21 +274,22 @@ class Run {
       out.push_back({std::move(other), std::move(named), std::move(left)});
     };
     if (loses_unusually(campaign, naming)) {
-      Engine usual(campaign, request_.jobs, Losses::kUsual);
+      Engine usual(campaign, request_.jobs, Losses::kUsual, engine.torque_ratio());
       usual.fit_machine();
       add(std::move(usual));
     }
-    if (!campaign.has_balance || stop()()) return out;
-    Engine stays(campaign, request_.jobs, Losses::kAsFitted, TorqueRatio::kMayStay);
-    stays.fit_machine();
-    Engine noisy = stays;
+    if (!other_ratio_ || stop()()) return out;
+    Engine noisy = *other_ratio_;
     noisy.update_noise();
-    const double beside =
-        noisy.refine_from(engine.state(), engine.accepted()).state.nuisance[kDeformationLost];
-    const double alone = stays.state().nuisance[kDeformationLost];
-    const bool is_there = std::max(alone, beside) > kStays;
-    if (is_there && (beside > kStays || !is_settled(engine, learning, noisy)))
-      add(std::move(stays));
+    const auto share = [](const ModelState& state) { return state.nuisance[kDeformationLost]; };
+    const bool has_it = engine.torque_ratio() == TorqueRatio::kMayStay;
+    // Where the names leave little that stays, or where they leave much, the other machine is
+    // there.
+    const bool is_there =
+        has_it ? share(engine.state()) <= kStays
+               : share(noisy.refine_from(engine.state(), engine.accepted()).state) > kStays;
+    const bool may_be_there = has_it || share(other_ratio_->state()) > kStays;
+    if (is_there || (may_be_there && !is_settled(engine, learning, noisy))) add(*other_ratio_);
     return out;
   }
 
@@ -1159,9 +1179,10 @@ class Run {
   Request request_;
   Answer answer_;
   Implausible implausible_;
-  Eigen::VectorXd mu_height_;  // change of ln mu_max per column of the fit
-  LeftOpen open_;              // of mu_max; empty where other errors are larger
-  Sensors sensors_;            // by what is fitted and what is held out
+  std::optional<Engine> other_ratio_;  // the machine with the other torque ratio, where one is seen
+  Eigen::VectorXd mu_height_;          // change of ln mu_max per column of the fit
+  LeftOpen open_;                      // of mu_max; empty where other errors are larger
+  Sensors sensors_;                    // by what is fitted and what is held out
 };
 
 }  // namespace
