@@ -53,6 +53,19 @@ TEST(ExcessLeft, IsNoneWhereNothingFailed) {
   EXPECT_EQ(excess_left(fine, tests({{"law_cell", 99.0, 35.0}})), 0.0);
 }
 
+// A name that gains much on a machine that is wrong still makes none of what fails without it pass.
+TEST(PassesAny, OneThatFailedAndDoesNotAnyMore) {
+  const Criticism before =
+      tests({{"law_cell", 135.0, 35.0}, {"line", 10.0, 5.0}, {"whiteness", 1.0, 9.0}});
+  EXPECT_FALSE(passes_any(before, before));
+  EXPECT_FALSE(passes_any(
+      before, tests({{"law_cell", 50.0, 35.0}, {"line", 9.0, 5.0}, {"whiteness", 1.0, 9.0}})));
+  EXPECT_TRUE(passes_any(
+      before, tests({{"law_cell", 135.0, 35.0}, {"line", 5.0, 5.0}, {"whiteness", 1.0, 9.0}})));
+  const Criticism fine = tests({{"law_cell", 3.0, 35.0}});
+  EXPECT_FALSE(passes_any(fine, tests({{"law_cell", 1.0, 35.0}})));
+}
+
 // Zeros of the torque that scatter 2.6 times as much as replicates do, in eleven experiments, are
 // worth 43; that of the friction twice as much is where the function acts.
 TEST(LesserScatter, ElsewhereDoesNotSpeakAgainstAGreaterFunction) {

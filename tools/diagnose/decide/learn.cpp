@@ -223,6 +223,12 @@ double excess_left(const Criticism& before, const Criticism& after,
   return most;
 }
 
+bool passes_any(const Criticism& before, const Criticism& after) {
+  return std::any_of(before.tests.begin(), before.tests.end(), [&](const JudgedTest& each) {
+    return !each.passed() && after.test(each.name).passed();
+  });
+}
+
 Learning learn(Engine& engine, const Criticism& failed, const std::function<bool()>& stop,
                const std::function<bool(const Engine&, const LearnedFit&)>& holds) {
   Learning out;

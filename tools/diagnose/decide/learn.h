@@ -47,6 +47,9 @@ const LawEvidence* named_law(const LearnedFit& fit, const std::vector<LawEvidenc
 bool is_shadowed(const Campaign& campaign, const std::vector<int>& accepted,
                  const Criticism& without, const Criticism& with);
 
+// Whether any of the tests that failed passes.
+bool passes_any(const Criticism& before, const Criticism& after);
+
 // Share of the failed tests' excess over their limits that is left, of the one that keeps most;
 // those named in `apart` do not count.
 double excess_left(const Criticism& before, const Criticism& after,
