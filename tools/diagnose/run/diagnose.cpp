@@ -313,11 +313,11 @@ class Run {
     }
   }
 
-  // One name with which all tests pass, and that does what the torque ratio that stays cannot: that
+  // One name with which all tests pass, and that does what the other torque ratio cannot: that
   // explains less in its place.
-  static bool is_settled(const Engine& engine, const Learning& learning, const Engine& stays) {
+  static bool is_settled(const Engine& engine, const Learning& learning, const Engine& other) {
     return engine.accepted().size() == 1 && things_in(engine, learning) == 1 &&
-           explain_more_than(stays, engine);
+           explain_more_than(other, engine);
   }
 
   static bool loses_unusually(const Campaign& campaign, const Naming& naming) {
