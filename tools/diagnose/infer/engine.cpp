@@ -47,8 +47,8 @@ constexpr double kBeyondPromise = 10.0;
 // last step, 8 with 5.
 constexpr double kBeyondLast = 4.0, kBeyondPromiseThen = 2.0;
 // Derived, scaled: beyond what data say of any constant (1e8), so that none moves what has it. A
-// fifth less or more, two campaigns of other make (117, 27): the same names, constants moved by 1e-8
-// of their half interval at most.
+// fifth less or more, two campaigns of other make (117, 27): the same names, constants moved by
+// 1e-8 of their half interval at most.
 constexpr double kHeldPrecision = 1e14;
 constexpr double kSameStep = 1e-3;  // apart by less of their length: both fail; +-20 %: same bytes
 // One sigma of curve_faults(), chosen. A fifth more: the same answers in all 24. A fifth less: in
