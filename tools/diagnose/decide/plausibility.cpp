@@ -7,6 +7,7 @@
 
 #include "estimator/physics/clamp_force.h"
 #include "estimator/statistics/order.h"
+#include "tools/diagnose/data/text_of.h"
 
 namespace beltgrip::diagnose {
 namespace {
@@ -23,12 +24,6 @@ constexpr double kPressureMost_Pa = 200e5;   // three times what variators have
 constexpr double kTorqueTold_Nm = 10.0;
 constexpr double kPowerLeast = 0.3;  // out over in: no variator loses or gains as much
 constexpr double kCopyNoise = 0.3;   // rms of the difference over that of the noise
-
-std::string text_of(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.3g", value);
-  return buffer;
-}
 
 // One sample after the other, also where a copy was written with fewer digits or another time of
 // its first sample: two experiments never share their noise.
