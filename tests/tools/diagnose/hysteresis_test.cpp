@@ -1,5 +1,5 @@
 // Play between the measured pressure and the clamp force: found in its true size, whatever went
-// before the recording, and none of the size that any cylinder has.
+// before the recording; of the size that any cylinder has it is the machine's.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -40,13 +40,24 @@ TEST_P(Hysteresis, IsFoundInItsSize) {
 
 INSTANTIATE_TEST_SUITE_P(WhateverWentBefore, Hysteresis, testing::Range<std::uint64_t>(0, 3));
 
-TEST(Play, OfAnyCylinderIsNoFinding) {
-  for (const double force_N : {24.0, 60.0}) {
+TEST(Play, OfAnyCylinderIsAConstantOfTheMachineAndNoFinding) {
+  for (const double force_N : {0.0, 30.0, 60.0}) {
     SCOPED_TRACE(force_N);
     Engine engine(campaign_of(trial_of(1, 1, force_N)));
     const Naming naming = name_effects(engine, [] { return false; });
-    EXPECT_EQ(naming.accepted.size(), force_N > 30.0 ? 1U : 0U);
+    EXPECT_TRUE(naming.accepted.empty());
+    EXPECT_NEAR(naming.hypothesis.state.nuisance[kPlay_N], force_N, 3.0);
   }
+}
+
+// What the machine's own may be is part of what is told.
+TEST(Play, BeyondAnyCylindersIsToldAsAWhole) {
+  constexpr double kBeyond_N = 160.0;
+  Engine engine(campaign_of(trial_of(1, 1, kBeyond_N)));
+  const Naming naming = name_effects(engine, [] { return false; });
+  ASSERT_EQ(naming.accepted.size(), 1U);
+  EXPECT_NEAR(naming.hypothesis.state.effects[naming.accepted.front().slot], kBeyond_N, 5.0);
+  EXPECT_NEAR(naming.hypothesis.state.nuisance[kPlay_N], 0.0, 1e-9);
 }
 
 }  // namespace

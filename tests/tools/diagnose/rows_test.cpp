@@ -54,6 +54,7 @@ ModelState somewhere(const Campaign& campaign) {
     const double tolerance = i >= kShapeOverdrive && i <= kEndOfShapes ? 0.05 : row.tolerance;
     out.nuisance[i] = row.nominal + off(random) * tolerance;
   }
+  out.nuisance[kPlay_N] = 0.0;  // no equation of single samples
   out.effects.setZero(static_cast<Index>(campaign.slots.size()));
   return out;
 }

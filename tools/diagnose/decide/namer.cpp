@@ -59,13 +59,6 @@ constexpr double kHeld = 0.5;
 // sensors' own (kReach of the engine). A fifth less or more: the same in two healthy campaigns of
 // other make that it is for (25, 174); more also in one whose spring is there (115).
 constexpr double kStatedSigmas = 3.0;
-// Derived: the least that the literature gives of the friction of a cylinder in the clamp force's
-// way (30 to 300 N), which any machine may have. Measured in campaigns of other make: with none 13
-// of 116 healthy ones are named, by plays of 11 to 26 N (of 7 to 15 N there), with it none of them.
-// A fifth less or more (24, 36 N): the same answers of 13 healthy ones and of four with a play that
-// is planted, of 45 to 422 N. Not run: at 10 N it would name those of 11 N and more again; from 45
-// N on it would lose what is planted.
-constexpr double kUsualPlay_N = 30.0;
 constexpr double kOfConsequence = 0.1, kBelievable = 8.0;  // in usual sizes
 // Log odds that what is of no consequence is there. How small it is says what it matters, not
 // whether it is there; but what the form of the friction leaves in healthy machines is small as
@@ -266,9 +259,8 @@ double stated_sigma(const Campaign& campaign, const Slot& slot) {
 // What a sensor may be off by, as stated, or any machine has, is no finding.
 bool is_beyond_usual(const Engine& engine, int slot, double size) {
   const Slot& which = engine.campaign().slots[static_cast<std::size_t>(slot)];
-  const double usual = which.row->id == "clamp_hysteresis"
-                           ? kUsualPlay_N
-                           : kStatedSigmas * stated_sigma(engine.campaign(), which);
+  const double usual =
+      which.is_play() ? kUsualPlay_N : kStatedSigmas * stated_sigma(engine.campaign(), which);
   return std::abs(size) >= usual;
 }
 
@@ -290,7 +282,7 @@ bool credible(const Engine& engine, int slot, double size) {
   if (!is_beyond_holding(engine, slot, size) || !is_beyond_usual(engine, slot, size)) return false;
   if (row.id == "radius_tilt" && !engine.campaign().torque_varies) return false;
   if (row.id == "torque_delay" && !engine.campaign().torque_moves) return false;
-  const bool follows_pressure = row.id == "clamp_hysteresis" || shifts_pressure(which);
+  const bool follows_pressure = which.is_play() || shifts_pressure(which);
   if (follows_pressure && !engine.campaign().pressure_moves) return false;
   const bool shifts_speed = row.id == "channel_skew" && !shifts_pressure(which);
   if (shifts_speed && !engine.campaign().speeds_move) return false;

@@ -394,6 +394,39 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model,
   return out;
 }
 
+namespace {
+
+bool has_play(const Campaign& campaign, const std::vector<int>& slots) {
+  return std::any_of(slots.begin(), slots.end(), [&](int slot) {
+    return campaign.slots[static_cast<std::size_t>(slot)].is_play();
+  });
+}
+
+double play_of(const Campaign& campaign, const VectorXd& effects) {
+  double out = 0.0;
+  for (std::size_t i = 0; i < campaign.slots.size(); ++i) {
+    if (campaign.slots[i].is_play()) out += effects[static_cast<Index>(i)];
+  }
+  return out;
+}
+
+// A play has one bearer: the name where it is among those asked, else the machine.
+void give_play(const Campaign& campaign, const std::vector<int>& slots, const Range& own,
+               const ModelState& from, ModelState& to) {
+  const auto named = std::find_if(slots.begin(), slots.end(), [&](int slot) {
+    return campaign.slots[static_cast<std::size_t>(slot)].is_play();
+  });
+  if (named != slots.end()) {
+    to.effects[*named] += to.nuisance[kPlay_N];
+    to.nuisance[kPlay_N] = 0.0;
+  } else if (campaign.pressure_moves) {
+    const double all = from.nuisance[kPlay_N] + play_of(campaign, from.effects);
+    to.nuisance[kPlay_N] = std::clamp(all, own.least, own.most);
+  }
+}
+
+}  // namespace
+
 Engine::Engine(Campaign campaign, int jobs, Losses losses, TorqueRatio torque_ratio)
     : jobs_(jobs), losses_(losses), torque_ratio_(torque_ratio), campaign_(std::move(campaign)) {
   for (std::size_t e = 0; e < campaign_.runs.size(); ++e) {
@@ -421,6 +454,7 @@ Engine::Engine(Campaign campaign, int jobs, Losses losses, TorqueRatio torque_ra
       continue;
     }
     if (campaign_.nuisances[static_cast<std::size_t>(i)].tolerance == 0.0) continue;  // is known
+    if (i == kPlay_N && !campaign_.pressure_moves) continue;
     if ((i == kCommandGain || i == kCommandOffset_Pa) && !campaign_.has_tracking) continue;
     nuisances_.push_back(i);
   }
@@ -438,6 +472,22 @@ double Engine::scale(int parameter) const {
   return parameter < kNuisanceCount
              ? campaign_.nuisances[static_cast<std::size_t>(parameter)].tolerance
              : campaign_.slots[static_cast<std::size_t>(parameter - kNuisanceCount)].row->typical;
+}
+
+void Engine::hold_play(const std::vector<int>& parameters, Prior& prior) {
+  const auto own = std::find(parameters.begin(), parameters.end(), static_cast<int>(kPlay_N));
+  if (own == parameters.end()) return;
+  const auto j = static_cast<Index>(own - parameters.begin());
+  prior.pull[j] = 0.0;
+  prior.precision[j] = kHeldPrecision;
+}
+
+Prior Engine::prior_here(const std::vector<int>& parameters) const {
+  Prior out = prior(parameters, state_);
+  const double own = state_.nuisance[kPlay_N];
+  const bool stands_for_it = has_play(campaign_, accepted_);
+  if (stands_for_it || (own != 0.0 && own >= range(kPlay_N).most)) hold_play(parameters, out);
+  return out;
 }
 
 Prior Engine::prior(const std::vector<int>& parameters, const ModelState& at) const {
@@ -460,6 +510,9 @@ Prior Engine::prior(const std::vector<int>& parameters, const ModelState& at) co
     } else {
       out.pull[j] = -at.effects[p - kNuisanceCount] / scale(p);
       out.precision[j] = 1.0 / (kSizePrior * kSizePrior);
+      if (campaign_.slots[static_cast<std::size_t>(p - kNuisanceCount)].is_play()) {
+        hold_play(parameters, out);
+      }
     }
   }
   return out;
@@ -515,6 +568,7 @@ void Engine::fit_machine() {
   std::vector<int> constants = nuisances_;
   std::erase(constants, kPressureBias_Pa);
   std::erase(constants, kCentrifugalOff_N_s2);
+  std::erase(constants, kPlay_N);
   const auto information_of = [&](const Optimum& at) {
     const auto n = static_cast<Index>(constants.size());
     MatrixXd out = MatrixXd::Identity(n, n);
@@ -675,7 +729,7 @@ void Engine::update_noise() {
   }
   // A tight prior on sizes: together, all effects could explain the noise itself. Those far from
   // zero stand beside them: what a large lag or play leaves is no noise either.
-  Prior all = prior(summary_parameters_, state_);
+  Prior all = prior_here(summary_parameters_);
   const Index constants = static_cast<Index>(nuisances_.size());
   const Index sizes = all.precision.size() - constants + static_cast<Index>(far_sizes_.size());
   all.precision.conservativeResize(constants + sizes);
@@ -708,7 +762,7 @@ void Engine::update_noise() {
   add_curve_bounds(state_, summary_parameters_, summaries_);
   const std::vector<int> parameters = with_nuisances(accepted_);
   base_ =
-      fit_linear(summaries_, columns_of(parameters), prior(parameters, state_), first_scatter_, 25);
+      fit_linear(summaries_, columns_of(parameters), prior_here(parameters), first_scatter_, 25);
 }
 
 void Engine::bound_scatter(const RandomVector& most) {
@@ -744,7 +798,7 @@ bool Engine::scatters_unusually() const { return is_unusual(base_.scatter).any()
 
 std::vector<Score> Engine::screen_with_usual_scatter() const {
   const std::vector<int> base = with_nuisances(accepted_);
-  return screen(fit_linear(summaries_, columns_of(base), prior(base, state_), default_scatter(), 0,
+  return screen(fit_linear(summaries_, columns_of(base), prior_here(base), default_scatter(), 0,
                            Wanted::kStep),
                 0);
 }
@@ -752,7 +806,7 @@ std::vector<Score> Engine::screen_with_usual_scatter() const {
 std::vector<Score> Engine::screen(const Fit& from, int scatter_steps) const {
   const std::vector<int> base = with_nuisances(accepted_);
   const std::vector<int> base_columns = columns_of(base);
-  const Prior base_prior = prior(base, state_);
+  const Prior base_prior = prior_here(base);
   std::vector<int> curve;
   for (const int i : nuisances_) {
     if (i <= kEndOfShapes) curve.push_back(i);
@@ -777,9 +831,10 @@ std::vector<Score> Engine::screen(const Fit& from, int scatter_steps) const {
     std::vector<int> columns = base_columns;
     columns.push_back(column);
     const Fit fit =
-        fit_linear(summaries_, columns, prior(parameters, state_), from.scatter, scatter_steps);
-    const Information info =
-        information_on(summaries_, base_columns, base_prior, column, fit.scatter);
+        fit_linear(summaries_, columns, prior_here(parameters), from.scatter, scatter_steps);
+    Prior beside = base_prior;
+    if (campaign_.slots[static_cast<std::size_t>(slot)].is_play()) hold_play(base, beside);
+    const Information info = information_on(summaries_, base_columns, beside, column, fit.scatter);
     Score score;
     score.slot = slot;
     double energy = 0.0;
@@ -819,7 +874,9 @@ std::vector<Score> Engine::screen(const Fit& from, int scatter_steps) const {
 bool Engine::is_constant(int slot) const {
   constexpr double kSame = 1.0 - 1e-3;  // of the column's energy
   const int column = columns_of({kNuisanceCount + slot}).front();
-  const std::vector<int> constants = columns_of(nuisances_);
+  std::vector<int> others = nuisances_;
+  std::erase(others, kPlay_N);  // of a play that is named it has nothing
+  const std::vector<int> constants = columns_of(others);
   const auto n = static_cast<Eigen::Index>(constants.size());
   MatrixXd gram = MatrixXd::Zero(n, n);
   VectorXd along = VectorXd::Zero(n);
@@ -841,7 +898,7 @@ bool Engine::is_constant(int slot) const {
 
 Engine::Replacement Engine::add(const std::vector<int>& slots) const {
   const std::vector<int> parameters = with_nuisances(slots);
-  const Fit fit = fit_linear(summaries_, columns_of(parameters), prior(parameters, state_),
+  const Fit fit = fit_linear(summaries_, columns_of(parameters), prior_here(parameters),
                              base_.scatter, 3, Wanted::kStep);
   Replacement out{2.0 * (fit.log_likelihood - base_.log_likelihood), state_, state_};
   move(parameters, fit.step, 1.0, out.state);
@@ -852,7 +909,12 @@ std::vector<Summary> Engine::summaries_without(const std::vector<int>& slots) co
   std::vector<Summary> moved = summaries_;
   for (const int slot : slots) {
     const int column = columns_of({kNuisanceCount + slot}).front();
-    const double back = -state_.effects[slot] / scale(kNuisanceCount + slot);
+    // Without the name the machine has as much of a play as any.
+    const double size = state_.effects[slot];
+    const double own = campaign_.slots[static_cast<std::size_t>(slot)].is_play()
+                           ? std::clamp(size, range(kPlay_N).least, range(kPlay_N).most)
+                           : 0.0;
+    const double back = (own - size) / scale(kNuisanceCount + slot);
     for (Summary& each : moved) {  // the residual's column after the step back
       const auto last = each.aa.rows() - 1;
       const double power = each.aa(last, last) + 2.0 * back * each.aa(column, last) +
@@ -870,8 +932,8 @@ std::vector<Summary> Engine::summaries_without(const std::vector<int>& slots) co
 Engine::Replacement Engine::replace(const std::vector<int>& slots, int instead_of) const {
   const std::vector<int> parameters = with_nuisances(slots);
   const std::vector<Summary> without = summaries_without({instead_of});
-  const Fit fit = fit_linear(without, columns_of(parameters), prior(parameters, state_),
-                             base_.scatter, 3, Wanted::kStep);
+  const Fit fit = fit_linear(without, columns_of(parameters), prior_here(parameters), base_.scatter,
+                             3, Wanted::kStep);
   Replacement out{2.0 * (fit.log_likelihood - base_.log_likelihood), state_, state_};
   out.state.effects[instead_of] = 0.0;
   out.beside = out.state;
@@ -880,7 +942,7 @@ Engine::Replacement Engine::replace(const std::vector<int>& slots, int instead_o
   const std::vector<int> alone(parameters.end() - static_cast<std::ptrdiff_t>(slots.size()),
                                parameters.end());
   move(alone,
-       fit_linear(without, columns_of(alone), prior(alone, state_), base_.scatter, 0, Wanted::kStep)
+       fit_linear(without, columns_of(alone), prior_here(alone), base_.scatter, 0, Wanted::kStep)
            .step,
        1.0, out.beside);
   return out;
@@ -920,6 +982,10 @@ Range Engine::range(int parameter) const {
   }
   if (parameter == kSecondaryInertia_kgm2) return {0.0, kAny};
   if (parameter == kDeformationLost) return {0.0, 1.0};
+  if (parameter == kPlay_N) {  // beside what the model has of it
+    const double on = play_of(campaign_, campaign_.switched_on);
+    return {std::min(0.0, -on), std::max(0.0, kUsualPlay_N - on)};
+  }
   // The data hold it far better than the usual values do: without a bound any drag would be the
   // machine's own, and what it explains would be no gain.
   constexpr std::array kBounded{kLossPerkN_Nm, kSecondaryLossPerkN_Nm, kSecondaryTorqueGain,
@@ -1006,6 +1072,7 @@ Hypothesis Engine::fit_from(const ModelState& from, const std::vector<int>& slot
       start.effects[i] = 0.0;
     }
   }
+  give_play(campaign_, slots, range(kPlay_N), from, start);
   const std::vector<int> parameters = with_nuisances(slots);
   VectorXd scales(static_cast<Index>(parameters.size()));
   for (Index j = 0; j < scales.size(); ++j) {
@@ -1075,7 +1142,7 @@ void Engine::accept(const Hypothesis& hypothesis) {
 double Engine::left_out_gain(int without) const {
   const auto density = [&](const std::vector<Summary>& summaries, const std::vector<int>& set) {
     const std::vector<int> parameters = with_nuisances(set);
-    return left_out_density(summaries, columns_of(parameters), prior(parameters, state_),
+    return left_out_density(summaries, columns_of(parameters), prior_here(parameters),
                             first_scatter_);
   };
   std::vector<int> fewer = accepted_;
@@ -1086,7 +1153,7 @@ double Engine::left_out_gain(int without) const {
 std::vector<double> Engine::left_out_gains() const {
   const auto densities = [&](const std::vector<Summary>& summaries, const std::vector<int>& set) {
     const std::vector<int> parameters = with_nuisances(set);
-    return left_out_densities(summaries, columns_of(parameters), prior(parameters, state_),
+    return left_out_densities(summaries, columns_of(parameters), prior_here(parameters),
                               first_scatter_);
   };
   std::vector<double> out = densities(summaries_, accepted_);

@@ -153,6 +153,9 @@ class Engine {
 
   double scale(int parameter) const;
   Prior prior(const std::vector<int>& parameters, const ModelState& at) const;
+  // At the state reached. A play that a name stands for, or that is at its most, is held.
+  Prior prior_here(const std::vector<int>& parameters) const;
+  static void hold_play(const std::vector<int>& parameters, Prior& prior);
   std::vector<int> with_nuisances(const std::vector<int>& slots) const;  // parameter numbers
   double degrees(double with_scatter, double without_scatter) const;
 

@@ -69,6 +69,8 @@ NuisanceTable default_nuisances() {
       {"secondary_torque_gain", 0.0, 0.0, 1e-4},
       {"secondary_pressure_bias_Pa", 0.0, 0.0, 10.0},
       {"secondary_centrifugal_off_N_s2", 0.0, 0.0, 1e-6},
+      // Chosen: what is usual is two of these.
+      {"clamp_play_N", 0.0, 0.5 * kUsualPlay_N, 5.0},
       {"command_offset_Pa", 0.0, 1e5, 10.0},
       {"command_gain", 0.0, 0.1, 1e-4},
   }};
@@ -213,6 +215,23 @@ void multiply_by_exp(const ArrayXd& ln, ArrayXd& values) {
     values.head(ln.size() - odd) *= factor[0];
     values.tail(odd) *= factor[factor.size() - 1];
   }
+}
+
+// play(x) - x: follows only after the input has moved by the width on either side. Odd in the
+// width. first: where it rests before the input has moved, in widths above it; what went before a
+// recording is not in it.
+ArrayXd play_change(const ArrayXd& in, double half_width, double first) {
+  const double w = std::abs(half_width);
+  ArrayXd out = ArrayXd::Zero(in.size());
+  double y = std::nan("");
+  for (Eigen::Index k = 0; k < in.size(); ++k) {
+    const double x = in[k];
+    if (!std::isfinite(x)) continue;
+    if (!std::isfinite(y)) y = x + first * w;
+    y = std::clamp(y, x - w, x + w);
+    out[k] = std::copysign(1.0, half_width) * (y - x);
+  }
+  return out;
 }
 
 constexpr double kLeastForce_N = 50.0;  // chosen, of what a force is divided by
@@ -420,7 +439,12 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
   if (const double off_N_s2 = nuisance[kCentrifugalOff_N_s2]; off_N_s2 != 0.0) {
     c.force_N += off_N_s2 * c.omega_s.square();
   }
+  c.play_N = nuisance[kPlay_N];
   apply(Stage::kForce);
+  if (c.play_N != 0.0) {
+    c.force_N +=
+        play_change(variator.secondary_piston_area_m2 * run.pressure.sharp, c.play_N, c.play_from);
+  }
   pass.loss(c);
   apply(Stage::kDriveline);
   pass.belt(c);

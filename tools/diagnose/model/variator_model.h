@@ -54,10 +54,15 @@ enum Nuisance : int {
   kSecondaryTorqueGain,  // T_measured = (1 + gain) T_true, as far as the sensors' accuracies go
   kPressureBias_Pa,      // p_measured = p_true + bias, the same
   kCentrifugalOff_N_s2,  // F_true = F_model + off omega_s^2, as far as a maker's value goes
+  kPlay_N,               // friction in the clamp force's way, with play at reversal
   kCommandOffset_Pa,     // tracking residual only
   kCommandGain,
   kNuisanceCount
 };
+
+// Of any machine: the literature's usual friction of cylinder and splines in the clamp force's way
+// (100 N; 30 to 300 N).
+inline constexpr double kUsualPlay_N = 100.0;
 
 struct NuisanceRow {
   std::string_view name;
@@ -101,6 +106,8 @@ struct Context {
   Eigen::ArrayXd secondary_loss_Nm;  // between belt and secondary torque, drag positive
   Eigen::ArrayXd ln_friction;
   std::array<double, kStops> ln_peak_slip{}, fall{};
+  double play_N = 0.0;     // on either side
+  double play_from = 0.0;  // where the force rests before it has moved, in plays above it
 };
 
 // The torque less a share of what its slow copy reads.

@@ -273,6 +273,10 @@ class Run {
     }
     store_effects(campaign.slots, campaign.switched_on + stored.effects, stored.nuisance,
                   answer_.extended);
+    if (machine_.has_play()) {
+      answer_.extended.effects["clamp_hysteresis"].parameters["force_N"] +=
+          stored.nuisance[kPlay_N];
+    }
   }
 
   // Where none is told the file has none either but what it was given.

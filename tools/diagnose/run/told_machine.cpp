@@ -18,6 +18,12 @@ const EffectRow* row_of(const std::string& id) {
                         [&](const EffectRow& row) { return row.id == id; });
 }
 
+bool is_play_named(const Engine& engine) {
+  const auto& slots = engine.campaign().slots;
+  return std::any_of(engine.accepted().begin(), engine.accepted().end(),
+                     [&](int slot) { return slots[static_cast<std::size_t>(slot)].is_play(); });
+}
+
 // Mean magnitude of a channel over the samples that count.
 double typical(const Engine& engine, GridSignal ExperimentData::*channel) {
   double sum = 0.0, count = 1e-9;
@@ -105,6 +111,7 @@ void ToldMachine::fill(const Engine& engine, const Naming& naming) {
     const double value = naming.hypothesis.state.nuisance[p];
     // The curve's own peak and slip are the fit's; what they come to is told below.
     if (p == kLnMuMax || p == kLnPeakSlipOverdrive || p == kLnPeakSlipLow) continue;
+    if (p == kPlay_N && is_play_named(engine)) continue;
     const std::string name(engine.campaign().nuisances[static_cast<std::size_t>(p)].name);
     const Interval fitted{value, value - estimator::kNormal95 * sigma,
                           value + estimator::kNormal95 * sigma};
@@ -139,6 +146,7 @@ void ToldMachine::fill(const Engine& engine, const Naming& naming) {
     }
   }
   note_torque_ratio();
+  note_play();
   note_torque_from_nothing(engine.campaign());
   tell_turning_oil(engine);
 }
@@ -198,6 +206,21 @@ void ToldMachine::note_torque_ratio() {
 
 // A zero of the torque sensor looks like a constant loss, of either sign; beyond what was stated
 // of it a loss below nothing is something else's.
+bool ToldMachine::has_play() const {
+  const auto play = out_.machine.find("clamp_play_N");
+  return play != out_.machine.end() && play->second.low > 0.0;
+}
+
+void ToldMachine::note_play() {
+  if (!has_play()) return;
+  const Interval& play = out_.machine.at("clamp_play_N");
+  out_.notes.push_back(
+      "clamp_play_N: " + text_of(play.value) + " (" + text_of(play.low) + " to " +
+      text_of(play.high) +
+      "): friction in the clamp force's way, of which any machine may have up to " +
+      text_of(kUsualPlay_N) + " N; no finding");
+}
+
 void ToldMachine::note_torque_from_nothing(const Campaign& campaign) {
   const auto loss = out_.machine.find("loss_constant_Nm");
   if (loss == out_.machine.end()) return;
@@ -241,6 +264,7 @@ std::vector<Score> ToldMachine::unseen_in(const Campaign& campaign, const Naming
   is_plain["torque_gain"] |= torque.gain > 0.0;
   is_plain["pressure_offset"] |= pressure.bias > 0.0;
   is_plain["pressure_gain"] |= pressure.gain > 0.0;
+  is_plain["clamp_hysteresis"] |= campaign.pressure_moves;  // a constant of the machine
   std::vector<Score> out;
   for (const Score& score : naming.last_screen) {
     const Slot& slot = campaign.slots[static_cast<std::size_t>(score.slot)];

@@ -25,12 +25,14 @@ class ToldMachine {
   void count_learned(const Engine& engine, const Learning& learning);
   void count_unexplained(const Engine& engine, const Naming& naming, const Criticism& left);
   void no_mu_max(const std::string& why);
+  bool has_play() const;  // of its own, that no name stands for
   // Of mu_max; empty where other errors are larger.
   const LeftOpen& open() const { return open_; }
 
  private:
   void widen_mu_max(double variance);
   void note_torque_ratio();
+  void note_play();
   void note_torque_from_nothing(const Campaign& campaign);
   void tell_turning_oil(const Engine& engine);
   std::vector<Score> unseen_in(const Campaign& campaign, const Naming& naming) const;

@@ -34,23 +34,6 @@ ArrayXd lag_change(const ArrayXd& in, double dt_s, double time_constant_s) {
   return out;
 }
 
-// play(x) - x: follows only after the input has moved by the width on either side. Odd in the
-// width. first: where it rests before the input has moved, in widths above it; what went before a
-// recording is not in it.
-ArrayXd play_change(const ArrayXd& in, double half_width, double first) {
-  const double w = std::abs(half_width);
-  ArrayXd out = ArrayXd::Zero(in.size());
-  double y = std::nan("");
-  for (Eigen::Index k = 0; k < in.size(); ++k) {
-    const double x = in[k];
-    if (!std::isfinite(x)) continue;
-    if (!std::isfinite(y)) y = x + first * w;
-    y = std::clamp(y, x - w, x + w);
-    out[k] = std::copysign(1.0, half_width) * (y - x);
-  }
-  return out;
-}
-
 void apply_hydraulic_lag(Context& c, const Slot& slot, double time_constant_s) {
   if (slot.role == "command") {
     c.track += lag_change(c.run.command.sharp, c.run.dt_s, time_constant_s);
@@ -72,9 +55,8 @@ void apply_centrifugal_force(Context& c, const Slot&, double coefficient_N_s2) {
 void apply_spring_force(Context& c, const Slot&, double force_N) { c.force_N += force_N; }
 
 void apply_clamp_hysteresis(Context& c, const Slot& slot, double force_N) {
-  const ArrayXd model_N = c.variator.secondary_piston_area_m2 * c.run.pressure.sharp;
-  const double first = slot.role == "raised" ? -1.0 : slot.role == "lowered" ? 1.0 : 0.0;
-  c.force_N += play_change(model_N, force_N, first);
+  c.play_N += force_N;
+  c.play_from = slot.role == "raised" ? -1.0 : slot.role == "lowered" ? 1.0 : 0.0;
 }
 
 void of_each_input(const Carried& data, const AddSlot& add) {

@@ -65,6 +65,8 @@ struct Slot {
   // friction_shape's parameters are absolute in the contract, relative to the nominal curve here.
   double to_contract(double value, const Eigen::VectorXd& nuisance) const;
   double from_contract(double value, const std::map<std::string, double>& friction) const;
+  // It does what the machine's own play does (kPlay_N), and has all of it where it is there.
+  bool is_play() const { return row->id == "clamp_hysteresis"; }
 };
 
 // The library, in the order of the table. What is no size is left out: wear.at.
