@@ -41,10 +41,10 @@ Cell cell(Injection injection, std::string_view follows, double gain, double mea
 Criticism failing(const std::vector<std::string>& names, std::vector<Cell> cells = {}) {
   Criticism out;
   out.cells = std::move(cells);
-  for (const char* name :
-       {"law_cell", "smooth_cell", "own_shape", "line", "slow_line", "channel_line", "torque_swing",
-        "slip_swing", "belt_passage", "whiteness", "scatter_friction", "scatter_ratio",
-        "scatter_torque", "unusual_scatter", "unusual_ratio", "unusual_friction"}) {
+  for (const char* name : {"law_cell", "smooth_cell", "held_cell", "own_shape", "line", "slow_line",
+                           "channel_line", "torque_swing", "slip_swing", "belt_passage",
+                           "whiteness", "scatter_friction", "scatter_ratio", "scatter_torque",
+                           "unusual_scatter", "unusual_ratio", "unusual_friction"}) {
     const bool fails = std::find(names.begin(), names.end(), name) != names.end();
     out.tests.push_back({name, fails ? 10.0 : 0.0, 1.0});
   }
@@ -143,11 +143,32 @@ TEST(ScatterBetween, FollowsWhatNeighboursAlongItAreAlikeBy) {
   EXPECT_EQ(told.kind, MisfitKind::kBetweenRuns);
 }
 
+// What moves within an experiment, and the balance of the torques, shows what no model has of the
+// machine's dynamics.
+TEST(HeldGain, IsOfWhatExperimentsHold) {
+  Cell one = cell(Injection::kFriction, "primary_speed", 30.0, 0.1, 0.9);
+  one.smooth_gain = 12.0;
+  EXPECT_EQ(held_gain(one), 30.0);
+  one.smooth_gain = 9.0;  // a step that no smooth function sees
+  EXPECT_EQ(held_gain(one), 9.0);
+  for (const auto& [point, follows] :
+       {std::pair{Injection::kFriction, "time"}, std::pair{Injection::kRatio, "acceleration"},
+        std::pair{Injection::kTorque, "primary_speed"},
+        std::pair{Injection::kTorqueGain, "oil_temperature"}}) {
+    Cell other = cell(point, follows, 30.0, 0.1, 0.9);
+    other.smooth_gain = 12.0;
+    EXPECT_EQ(held_gain(other), 0.0) << follows;
+  }
+  one.is_told_by_form = true;
+  EXPECT_EQ(held_gain(one), 0.0);
+}
+
 TEST(RepeatsWithin, WhatFollowsAVariableThatChangesInEachExperiment) {
   const Cell within = cell(Injection::kRatio, "time", 900.0, 0.5, 0.5);
   const Cell between = cell(Injection::kFriction, "oil_temperature", 900.0, 0.1, 0.9);
   EXPECT_TRUE(repeats_within(failing({"law_cell"}, {within, between})));
   EXPECT_TRUE(repeats_within(failing({"smooth_cell"}, {within})));
+  EXPECT_TRUE(repeats_within(failing({"held_cell"}, {within})));
   EXPECT_FALSE(repeats_within(failing({"law_cell"}, {between, within})));
   EXPECT_FALSE(repeats_within(failing({"scatter_friction"}, {within})));  // it does not stand out
   EXPECT_FALSE(repeats_within(failing({"law_cell"})));

@@ -140,9 +140,24 @@ const Cell* own_shape(const Campaign& campaign, const std::vector<int>& accepted
   return out;
 }
 
+double held_gain(const Cell& cell) {
+  const std::string_view follows = cell.abscissa.variable->name;
+  const Injection point = cell.injection->injection;
+  const bool moves = follows == "time" || follows == "acceleration";
+  const bool is_of_balance = point == Injection::kTorque || point == Injection::kTorqueGain;
+  if (cell.is_told_by_form || moves || is_of_balance) return 0.0;
+  return cell.smooth_gain > thresholds::kSmoothBeside ? cell.gain() : cell.smooth_gain;
+}
+
 bool Criticism::passed() const {
   return std::all_of(tests.begin(), tests.end(),
                      [](const JudgedTest& each) { return each.passed(); });
+}
+
+bool Criticism::function_fails() const {
+  return std::any_of(tests.begin(), tests.end(), [](const JudgedTest& each) {
+    return each.name.ends_with("_cell") && !each.passed();
+  });
 }
 
 const JudgedTest& Criticism::test(const std::string& name) const {
@@ -162,6 +177,9 @@ Criticism criticise(const Engine& engine) {
   out.base = scatter_base(engine);
   out.offsets = engine.offsets();
   double law = 0.0, smooth = 0.0;
+  const auto first = std::find_if(out.cells.begin(), out.cells.end(),
+                                  [](const Cell& cell) { return !cell.is_told_by_form; });
+  const double held = first == out.cells.end() ? 0.0 : held_gain(*first);
   for (const Cell& cell : out.cells) {
     if (cell.is_told_by_form) continue;
     // A step that a smooth function sees nothing of rests on a moment of one experiment.
@@ -183,6 +201,7 @@ Criticism criticise(const Engine& engine) {
   out.tests = {
       {"law_cell", law, kLawCell},
       {"smooth_cell", smooth, kSmoothCell},
+      {"held_cell", held, kHeldCell},
       {"own_shape", out.own ? out.own->gain() : 0.0, kOwnShape},
       {"line", out.line.excess, kLine},
       {"slow_line", out.slow_line.excess, kSlowLine},
@@ -228,8 +247,7 @@ bool changes_within(const Abscissa& abscissa) {
 }  // namespace
 
 bool repeats_within(const Criticism& criticism) {
-  return !criticism.cells.empty() &&
-         (!criticism.test("law_cell").passed() || !criticism.test("smooth_cell").passed()) &&
+  return !criticism.cells.empty() && criticism.function_fails() &&
          (!differs_between(criticism.cells.front().abscissa) ||
           changes_within(criticism.cells.front().abscissa));
 }
@@ -312,7 +330,7 @@ Unexplained what_is_left(const Criticism& criticism, bool has_balance) {
   }
   const Cell* best = criticism.cells.empty() ? nullptr : &criticism.cells.front();
   // A function of something that sweeps leaves a weak line as well, and a slow one.
-  const bool is_function = best != nullptr && (fails("law_cell") || fails("smooth_cell"));
+  const bool is_function = best != nullptr && criticism.function_fails();
   const bool is_line =
       fails("line") && (!is_function || criticism.line.share > thresholds::kLineShare);
   if (is_line || (fails("slow_line") && !is_function)) {
@@ -329,7 +347,7 @@ Unexplained what_is_left(const Criticism& criticism, bool has_balance) {
   const bool scatters = fails("scatter_friction") || fails("scatter_ratio") ||
                         fails("scatter_torque") || fails("unusual_scatter") ||
                         fails("unusual_ratio") || fails("unusual_friction");
-  const bool stands_out = fails("law_cell") || fails("smooth_cell");
+  const bool stands_out = criticism.function_fails();
   if (!stands_out) {
     const auto found =
         std::find_if(criticism.cells.begin(), criticism.cells.end(), [&](const Cell& cell) {

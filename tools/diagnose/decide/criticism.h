@@ -31,6 +31,7 @@ struct Criticism {
   std::vector<RandomVector> offsets;
   std::vector<JudgedTest> tests;
   bool passed() const;
+  bool function_fails() const;  // one of the tests of the cells
   const JudgedTest& test(const std::string& name) const;
 };
 
@@ -39,6 +40,10 @@ struct Criticism {
 double scatter_limit(double usual_most, std::size_t experiments);
 // What they may scatter by over a base that so many degrees of freedom tell: both are estimates.
 double replicate_limit(std::size_t experiments, double degrees);
+
+// What a cell of friction, ratio or clamp force explains, over what experiments hold or set: twice
+// the log odds. 0: it is over time or acceleration, of a torque, or the curve's own form.
+double held_gain(const Cell& cell);
 
 // At the engine's state.
 Criticism criticise(const Engine& engine);

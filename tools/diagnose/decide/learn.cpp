@@ -19,6 +19,9 @@ bool stands_out(const Cell& cell, const Criticism& failed, bool has_balance) {
   if (cell.law_gain > failed.test("law_cell").limit && cell.smooth_gain > kSmoothBeside) {
     return true;
   }
+  if (&cell == &failed.cells.front() && held_gain(cell) > failed.test("held_cell").limit) {
+    return true;
+  }
   return may_be_scatter(cell, failed, has_balance);
 }
 

@@ -161,6 +161,8 @@ std::string_view words_of_test(std::string_view test) {
   static constexpr std::array kAll{
       TestWords{"law_cell", "a step, kink or bump over a recorded variable, twice the log odds"},
       TestWords{"smooth_cell", "a smooth function of a recorded variable, twice the log odds"},
+      TestWords{"held_cell",
+                "friction, ratio or force that follows what experiments hold, twice the log odds"},
       TestWords{"own_shape", "another course over what a finding follows, twice the log odds"},
       TestWords{"group", "functions of a recorded variable beside the findings, chi-square"},
       TestWords{"line", "a line in what each sample says of friction, ratio or torque, sigmas"},

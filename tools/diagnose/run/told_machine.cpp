@@ -172,9 +172,7 @@ void ToldMachine::count_unexplained(const Engine& engine, const Naming& naming,
   double variance = 0.0;
   const auto fails = [&](const char* name) { return !left.test(name).passed(); };
   if (fails("scatter_friction") || fails("unusual_friction")) variance += scatter.variance[0];
-  if (fails("law_cell") || fails("smooth_cell")) {
-    variance += friction_variance(engine, left.cells.front());
-  }
+  if (left.function_fails()) variance += friction_variance(engine, left.cells.front());
   widen_mu_max(variance + variance_of_halves(engine, naming.last_screen, mu_height_) +
                variance_of_bending(engine, naming.hypothesis, mu_height_));
 }
