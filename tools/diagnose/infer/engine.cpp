@@ -394,9 +394,7 @@ Campaign make_campaign(std::vector<ExperimentData> runs, const ModelFile& model,
   return out;
 }
 
-namespace {
-
-bool has_play(const Campaign& campaign, const std::vector<int>& slots) {
+bool any_play(const Campaign& campaign, const std::vector<int>& slots) {
   return std::any_of(slots.begin(), slots.end(), [&](int slot) {
     return campaign.slots[static_cast<std::size_t>(slot)].is_play();
   });
@@ -409,6 +407,8 @@ double play_of(const Campaign& campaign, const VectorXd& effects) {
   }
   return out;
 }
+
+namespace {
 
 // A play has one bearer: the name where it is among those asked, else the machine.
 void give_play(const Campaign& campaign, const std::vector<int>& slots, const Range& own,
@@ -485,7 +485,7 @@ void Engine::hold_play(const std::vector<int>& parameters, Prior& prior) {
 Prior Engine::prior_here(const std::vector<int>& parameters) const {
   Prior out = prior(parameters, state_);
   const double own = state_.nuisance[kPlay_N];
-  const bool stands_for_it = has_play(campaign_, accepted_);
+  const bool stands_for_it = any_play(campaign_, accepted_);
   if (stands_for_it || (own != 0.0 && own >= range(kPlay_N).most)) hold_play(parameters, out);
   return out;
 }

@@ -70,6 +70,11 @@ enum class Losses { kAsFitted, kUsual };
 // by slip.
 enum class TorqueRatio { kFollows, kMayStay };
 
+// Whether one of these slots is a play.
+bool any_play(const Campaign& campaign, const std::vector<int>& slots);
+// The play that effects have, whatever the side it begins from, N.
+double play_of(const Campaign& campaign, const Eigen::VectorXd& effects);
+
 struct Range {
   double least = 0.0, most = 0.0;
 };

@@ -18,12 +18,6 @@ const EffectRow* row_of(const std::string& id) {
                         [&](const EffectRow& row) { return row.id == id; });
 }
 
-bool is_play_named(const Engine& engine) {
-  const auto& slots = engine.campaign().slots;
-  return std::any_of(engine.accepted().begin(), engine.accepted().end(),
-                     [&](int slot) { return slots[static_cast<std::size_t>(slot)].is_play(); });
-}
-
 // Mean magnitude of a channel over the samples that count.
 double typical(const Engine& engine, GridSignal ExperimentData::*channel) {
   double sum = 0.0, count = 1e-9;
@@ -108,10 +102,12 @@ void ToldMachine::fill(const Engine& engine, const Naming& naming) {
       variance = lever.dot(fit.covariance * lever);
     }
     const double sigma = std::sqrt(std::max(variance, 0.0));
-    const double value = naming.hypothesis.state.nuisance[p];
+    const Campaign& campaign = engine.campaign();
+    const double of_model = p == kPlay_N ? play_of(campaign, campaign.switched_on) : 0.0;
+    const double value = of_model + naming.hypothesis.state.nuisance[p];
     // The curve's own peak and slip are the fit's; what they come to is told below.
     if (p == kLnMuMax || p == kLnPeakSlipOverdrive || p == kLnPeakSlipLow) continue;
-    if (p == kPlay_N && is_play_named(engine)) continue;
+    if (p == kPlay_N && any_play(engine.campaign(), engine.accepted())) continue;
     const std::string name(engine.campaign().nuisances[static_cast<std::size_t>(p)].name);
     const Interval fitted{value, value - estimator::kNormal95 * sigma,
                           value + estimator::kNormal95 * sigma};
@@ -202,15 +198,13 @@ void ToldMachine::note_torque_ratio() {
       text_of(share->second.value) + " of it takes speed alone, as slip does");
 }
 
-// A zero of the torque sensor looks like a constant loss, of either sign; beyond what was stated
-// of it a loss below nothing is something else's.
 bool ToldMachine::has_play() const {
   const auto play = out_.machine.find("clamp_play_N");
   return play != out_.machine.end() && play->second.low > 0.0;
 }
 
 void ToldMachine::note_play() {
-  if (!has_play()) return;
+  if (!has_play() || out_.machine.at("clamp_play_N").value > kUsualPlay_N) return;
   const Interval& play = out_.machine.at("clamp_play_N");
   out_.notes.push_back(
       "clamp_play_N: " + text_of(play.value) + " (" + text_of(play.low) + " to " +
@@ -219,6 +213,8 @@ void ToldMachine::note_play() {
       text_of(kUsualPlay_N) + " N; no finding");
 }
 
+// A zero of the torque sensor looks like a constant loss, of either sign; beyond what was stated
+// of it a loss below nothing is something else's.
 void ToldMachine::note_torque_from_nothing(const Campaign& campaign) {
   const auto loss = out_.machine.find("loss_constant_Nm");
   if (loss == out_.machine.end()) return;
