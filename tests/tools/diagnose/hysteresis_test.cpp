@@ -40,13 +40,17 @@ TEST_P(Hysteresis, IsFoundInItsSize) {
 
 INSTANTIATE_TEST_SUITE_P(WhateverWentBefore, Hysteresis, testing::Range<std::uint64_t>(0, 3));
 
+// Whatever went before the recording.
 TEST(Play, OfAnyCylinderIsAConstantOfTheMachineAndNoFinding) {
-  for (const double force_N : {0.0, 30.0, 60.0}) {
+  for (const auto& [force_N, before] : {std::pair{0.0, 1U}, {30.0, 1U}, {60.0, 0U}, {60.0, 2U}}) {
     SCOPED_TRACE(force_N);
-    Engine engine(campaign_of(trial_of(1, 1, force_N)));
+    Engine engine(campaign_of(trial_of(1, before, force_N)));
     const Naming naming = name_effects(engine, [] { return false; });
     EXPECT_TRUE(naming.accepted.empty());
-    EXPECT_NEAR(naming.hypothesis.state.nuisance[kPlay_N], force_N, 3.0);
+    const Eigen::VectorXd& machine = naming.hypothesis.state.nuisance;
+    EXPECT_NEAR(machine[kPlay_N], force_N, 3.0);
+    const double from = force_N > 0.0 ? static_cast<double>(before) - 1.0 : 0.0;
+    EXPECT_NEAR(machine[kPlayFrom], from, 0.5);  // nearer than to any other
   }
 }
 

@@ -454,7 +454,7 @@ Engine::Engine(Campaign campaign, int jobs, Losses losses, TorqueRatio torque_ra
       continue;
     }
     if (campaign_.nuisances[static_cast<std::size_t>(i)].tolerance == 0.0) continue;  // is known
-    if (i == kPlay_N && !campaign_.pressure_moves) continue;
+    if ((i == kPlay_N || i == kPlayFrom) && !campaign_.pressure_moves) continue;
     if ((i == kCommandGain || i == kCommandOffset_Pa) && !campaign_.has_tracking) continue;
     nuisances_.push_back(i);
   }
@@ -475,11 +475,11 @@ double Engine::scale(int parameter) const {
 }
 
 void Engine::hold_play(const std::vector<int>& parameters, Prior& prior) {
-  const auto own = std::find(parameters.begin(), parameters.end(), static_cast<int>(kPlay_N));
-  if (own == parameters.end()) return;
-  const auto j = static_cast<Index>(own - parameters.begin());
-  prior.pull[j] = 0.0;
-  prior.precision[j] = kHeldPrecision;
+  for (std::size_t j = 0; j < parameters.size(); ++j) {
+    if (parameters[j] != kPlay_N && parameters[j] != kPlayFrom) continue;
+    prior.pull[static_cast<Index>(j)] = 0.0;
+    prior.precision[static_cast<Index>(j)] = kHeldPrecision;
+  }
 }
 
 Prior Engine::prior_here(const std::vector<int>& parameters) const {
@@ -569,6 +569,7 @@ void Engine::fit_machine() {
   std::erase(constants, kPressureBias_Pa);
   std::erase(constants, kCentrifugalOff_N_s2);
   std::erase(constants, kPlay_N);
+  std::erase(constants, kPlayFrom);
   const auto information_of = [&](const Optimum& at) {
     const auto n = static_cast<Index>(constants.size());
     MatrixXd out = MatrixXd::Identity(n, n);
@@ -876,6 +877,7 @@ bool Engine::is_constant(int slot) const {
   const int column = columns_of({kNuisanceCount + slot}).front();
   std::vector<int> others = nuisances_;
   std::erase(others, kPlay_N);  // of a play that is named it has nothing
+  std::erase(others, kPlayFrom);
   const std::vector<int> constants = columns_of(others);
   const auto n = static_cast<Eigen::Index>(constants.size());
   MatrixXd gram = MatrixXd::Zero(n, n);
@@ -982,6 +984,7 @@ Range Engine::range(int parameter) const {
   }
   if (parameter == kSecondaryInertia_kgm2) return {0.0, kAny};
   if (parameter == kDeformationLost) return {0.0, 1.0};
+  if (parameter == kPlayFrom) return {-1.0, 1.0};
   if (parameter == kPlay_N) {  // beside what the model has of it
     const double on = play_of(campaign_, campaign_.switched_on);
     return {std::min(0.0, -on), std::max(0.0, kUsualPlay_N - on)};

@@ -35,7 +35,8 @@ Named to_file(int index, double value) {
 // No part of the machine that a model file describes.
 bool is_beside_file(int index) {
   return index == kSecondaryTorqueGain || index == kPressureBias_Pa ||
-         index == kCentrifugalOff_N_s2 || index == kDeformationLost || index == kPlay_N;
+         index == kCentrifugalOff_N_s2 || index == kDeformationLost || index == kPlay_N ||
+         index == kPlayFrom;
 }
 
 }  // namespace

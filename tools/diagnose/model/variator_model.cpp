@@ -71,6 +71,8 @@ NuisanceTable default_nuisances() {
       {"secondary_centrifugal_off_N_s2", 0.0, 0.0, 1e-6},
       // Chosen: what is usual is two of these.
       {"clamp_play_N", 0.0, 0.5 * kUsualPlay_N, 5.0},
+      // Chosen: as likely in between as at either end.
+      {"clamp_play_from", 0.0, 1.0, 0.1},
       {"command_offset_Pa", 0.0, 1e5, 10.0},
       {"command_gain", 0.0, 0.1, 1e-4},
   }};
@@ -440,6 +442,7 @@ Quantities evaluate(const ExperimentData& run, const Readings& read, int experim
     c.force_N += off_N_s2 * c.omega_s.square();
   }
   c.play_N = nuisance[kPlay_N];
+  c.play_from = nuisance[kPlayFrom];
   apply(Stage::kForce);
   if (c.play_N != 0.0) {
     c.force_N +=

@@ -55,7 +55,8 @@ enum Nuisance : int {
   kPressureBias_Pa,      // p_measured = p_true + bias, the same
   kCentrifugalOff_N_s2,  // F_true = F_model + off omega_s^2, as far as a maker's value goes
   kPlay_N,               // friction in the clamp force's way, with play at reversal
-  kCommandOffset_Pa,     // tracking residual only
+  kPlayFrom,          // where the force rests before it has moved: -1 raised to it, 1 lowered to it
+  kCommandOffset_Pa,  // tracking residual only
   kCommandGain,
   kNuisanceCount
 };

@@ -273,10 +273,18 @@ class Run {
     }
     store_effects(campaign.slots, campaign.switched_on + stored.effects, stored.nuisance,
                   answer_.extended);
-    if (machine_.has_play()) {
-      answer_.extended.effects["clamp_hysteresis"].parameters["force_N"] +=
-          stored.nuisance[kPlay_N];
+    if (machine_.has_play()) store_play(stored.nuisance);
+  }
+
+  // The machine's own, beside what the model has of it.
+  void store_play(const Eigen::VectorXd& nuisance) {
+    constexpr double kFromAnEnd = 0.5;  // derived: nearer to it than to in between
+    daemon::ModelEffect& play = answer_.extended.effects["clamp_hysteresis"];
+    const double from = nuisance[kPlayFrom];
+    if (play.parameters.empty() && std::abs(from) > kFromAnEnd) {
+      play.role = from < 0.0 ? "raised" : "lowered";
     }
+    play.parameters["force_N"] += nuisance[kPlay_N];
   }
 
   // Where none is told the file has none either but what it was given.
