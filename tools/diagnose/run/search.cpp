@@ -183,14 +183,16 @@ class Search {
   }
 
   // Where names leave something, the machine is wrong still, and by its misfit a further name may
-  // gain much and stand for nothing: it is there if a test that fails without it passes with it.
+  // gain much and stand for nothing: it is there if a test that fails without it passes with it,
+  // and none fails that had passed. Else the misfit has only moved.
   void drop_what_heals_nothing(Engine& engine, Naming& naming, Criticism& left) const {
     while (!left.passed() && engine.accepted().size() > 1 && !options_.stop()) {
       Engine with_fewer = engine;
       Naming fewer = naming;
       forget_last(with_fewer, fewer, options_.stop);
       Criticism without = criticise(with_fewer);
-      if (with_fewer.accepted().empty() || passes_any(without, left)) return;
+      const bool heals = passes_any(without, left) && !passes_any(left, without);
+      if (with_fewer.accepted().empty() || heals) return;
       engine = std::move(with_fewer);
       naming = std::move(fewer);
       left = std::move(without);
