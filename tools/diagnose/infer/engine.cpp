@@ -564,11 +564,15 @@ void Engine::fit_machine() {
   // The same measure for every start: no weights, scatter between experiments counted.
   const Whitening plain = identity_whitening(campaign_);
   // What the pressure is off by is asked once the machine is near: from afar it takes up what the
-  // constants have not found yet, and does not give it back. The play is asked for from the first:
-  // without it a fit goes to where the friction curve makes up for it.
+  // constants have not found yet, and does not give it back. The play as well; but where no torque
+  // is read behind the belt, the friction curve makes up for it, and does not give it back either.
   std::vector<int> constants = nuisances_;
   std::erase(constants, kPressureBias_Pa);
   std::erase(constants, kCentrifugalOff_N_s2);
+  if (campaign_.has_balance) {
+    std::erase(constants, kPlay_N);
+    std::erase(constants, kPlayFrom);
+  }
   const auto information_of = [&](const Optimum& at) {
     const auto n = static_cast<Index>(constants.size());
     MatrixXd out = MatrixXd::Identity(n, n);

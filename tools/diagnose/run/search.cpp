@@ -70,6 +70,11 @@ class Search {
     return engine.accepted().size() + learning.terms.size() + (learning.left.passed() ? 0 : 1);
   }
 
+  // Pulleys that close as the force grows do not give way: there is nothing that stays.
+  static bool ratio_stays(const ModelState& state) {
+    return state.nuisance[kDeformationLost] > kStays && state.nuisance[kDeformationPerkN] > 0.0;
+  }
+
   // The torque ratio is that which the data are more probable with, whatever may be wrong beside
   // it: on the wrong machine names take up what its ratio lacks, and do not give it back. The other
   // one is asked where something is left or named.
@@ -82,8 +87,7 @@ class Search {
     Engine by_follows = follows, by_stays = stays;
     by_follows.update_noise();
     by_stays.update_noise();
-    const bool is_there = stays.state().nuisance[kDeformationLost] > kStays &&
-                          explain_more_than(by_follows, by_stays);
+    const bool is_there = ratio_stays(stays.state()) && explain_more_than(by_follows, by_stays);
     other_ratio_ = is_there ? follows : stays;
     return is_there ? stays : follows;
   }
@@ -106,14 +110,13 @@ class Search {
     if (!other_ratio_ || options_.stop()) return out;
     Engine noisy = *other_ratio_;
     noisy.update_noise();
-    const auto share = [](const ModelState& state) { return state.nuisance[kDeformationLost]; };
     const bool has_it = engine.torque_ratio() == TorqueRatio::kMayStay;
     // Where the names leave little that stays, or where they leave much, the other machine is
     // there.
     const bool is_there =
-        has_it ? share(engine.state()) <= kStays
-               : share(noisy.refine_from(engine.state(), engine.accepted()).state) > kStays;
-    const bool may_be_there = has_it || share(other_ratio_->state()) > kStays;
+        has_it ? !ratio_stays(engine.state())
+               : ratio_stays(noisy.refine_from(engine.state(), engine.accepted()).state);
+    const bool may_be_there = has_it || ratio_stays(other_ratio_->state());
     if (is_there || (may_be_there && !is_settled(engine, learning, noisy))) add(*other_ratio_);
     return out;
   }
