@@ -25,8 +25,8 @@ blind::Trial planted(const std::string& cause, double size) {
   return trial;
 }
 
-Criticism criticised(Campaign campaign, Losses losses = Losses::kAsFitted) {
-  Engine engine(std::move(campaign), 1, losses);
+Criticism criticised(Campaign campaign) {
+  Engine engine(std::move(campaign));
   name_effects(engine, [] { return false; });
   return criticise(engine);
 }
@@ -81,8 +81,7 @@ TEST(OverThePressure, ARatioAtOneTorqueFailsNoTest) {
   EXPECT_FALSE(criticism.function_fails());
 }
 
-// A torque that is read in steps of 1 Nm without noise to carry it over them, on equal ramps. They
-// tell no losses: it is asked with those that variators have, as the program asks.
+// A torque that is read in steps of 1 Nm without noise to carry it over them, on equal ramps.
 TEST(OverThePressure, WhatRoundingLeavesIsNoTorque) {
   blind::Trial trial = planted("", 0.0);
   trial.plan = blind::paper_plan(8);
@@ -96,8 +95,8 @@ TEST(OverThePressure, WhatRoundingLeavesIsNoTorque) {
     runs.push_back(prepare(table, variator));
   }
   ASSERT_FALSE(runs.front().rests_torque.empty());
-  const Criticism criticism = criticised(
-      make_campaign(std::move(runs), nominal_model(variator), Accuracies{}), Losses::kUsual);
+  const Criticism criticism =
+      criticised(make_campaign(std::move(runs), nominal_model(variator), Accuracies{}));
   for (const Cell& cell : criticism.cells) {
     const Injection point = cell.injection->injection;
     EXPECT_FALSE(follows_pressure(cell) &&

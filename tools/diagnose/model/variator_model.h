@@ -62,8 +62,9 @@ enum Nuisance : int {
 };
 
 // Of any machine: the literature's usual friction of cylinder and splines in the clamp force's way
-// (100 N; 30 to 300 N). Healthy machines of two generators of other make have 25 to 80 N. A fifth
-// less or more: not run.
+// (100 N; 30 to 300 N). Chosen: the usual one. Healthy machines of two generators of other make
+// have 25 to 80 N. Not run: a fifth less would have those of 78 to 80 N (two of 84) at the bound, a
+// fifth more would take the name from plays of 100 to 120 N.
 inline constexpr double kUsualPlay_N = 100.0;
 
 struct NuisanceRow {
