@@ -31,13 +31,13 @@ class Draw {
   FootBatch batch(const CurveShape& curve, double slip_most) {
     const double peak = std::exp(uniform(-5.0, -3.0));
     const double sigma = std::exp(uniform(-12.0, -4.0));
-    FootBatch out(curve, peak);
+    FootBatch out(curve, peak, uniform(0.0, 1.0));
     const double spread = std::exp(uniform(-28.0, -8.0));
     const double off = std::exp(uniform(-6.0, 0.5));  // from the curve, in capacities
     const double force_share = std::exp(uniform(-9.0, -2.0));
     const double slip_of_force = uniform(0.0, 2.0) * sigma;
     for (std::size_t i = count(); i-- > 0;) {
-      const double x = uniform(-0.2, slip_most), capacity_Nm = uniform(20.0, 150.0);
+      const double x = uniform(-slip_most, slip_most), capacity_Nm = uniform(20.0, 150.0);
       const double torque_Nm = capacity_Nm * (curve.evaluate(x).value + off * normal());
       out.add(x * peak, torque_Nm, capacity_Nm, uniform(0.0, 1.0) < 0.3 ? 0.0 : spread,
               {sigma * sigma, std::exp(uniform(-6.0, 4.0)), force_share, slip_of_force});
@@ -55,6 +55,7 @@ void expect_same(const FootBatch& a, const FootBatch& b, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
     ASSERT_EQ(bits(a.x(i)), bits(b.x(i))) << a.x(i) << " " << b.x(i);
     ASSERT_EQ(bits(a.model_Nm(i)), bits(b.model_Nm(i)));
+    ASSERT_EQ(bits(a.calm(i)), bits(b.calm(i)));
     ASSERT_EQ(bits(a.slope(i)), bits(b.slope(i)));
     ASSERT_EQ(bits(a.weight(i)), bits(b.weight(i)));
     ASSERT_EQ(bits(a.value(i)), bits(b.value(i)));
@@ -83,25 +84,47 @@ TEST(FootPoints, BeyondTheTableToo) { compare(8.0, 0.0); }
 
 TEST(FootPoints, OfACurveThatFalls) { compare(3.0, 0.1); }
 
-// A clamp force that is read too high: the capacity is more, and pulleys that give way to it would
-// have taken more of the slip. Where the curve rises the one makes up for the other; counted each
-// for itself, the distance there is less than its noise.
-TEST(FootPoints, CountTheClampForceOnce) {
-  constexpr double kPeak = 0.02, kCapacity_Nm = 80.0, kForceShare = 1e-3, kSlipOfForce = 6e-6;
-  constexpr FootNoise kNoise{1e-16, 1e-10, kForceShare, kSlipOfForce};
-  const CurveShape curve(std::array<double, kShapeKnots>{}, 0.0);
-  for (const double x : {0.1, 0.3, 0.6, 0.95}) {
-    SCOPED_TRACE(x);
-    FootBatch batch(curve, kPeak);
+// Two samples of a belt at x, in drive and overrun, whose clamp force is read too high and too low
+// by one sigma of its noise: its pulleys seem to give way by more and by less.
+class ForceReadWrong : public testing::TestWithParam<double> {
+ protected:
+  static constexpr double kPeak = 0.02, kCapacity_Nm = 80.0, kForceShare = 1e-3;
+  static constexpr double kSlipOfForce = 6e-6;
+  FootBatch found(double reading_share) const {
+    constexpr FootNoise kNoise{1e-16, 1e-10, kForceShare, kSlipOfForce};
+    FootBatch out(curve_, kPeak, reading_share);
     for (const double sigmas : {1.0, -1.0}) {
-      batch.add(x * kPeak - sigmas * kSlipOfForce, kCapacity_Nm * curve.evaluate(x).value,
-                kCapacity_Nm * (1.0 + sigmas * kForceShare), 0.0, kNoise);
+      out.add(GetParam() * kPeak - sigmas * kSlipOfForce,
+              kCapacity_Nm * curve_.evaluate(GetParam()).value,
+              kCapacity_Nm * (1.0 + sigmas * kForceShare), 0.0, kNoise);
     }
-    batch.find();
-    EXPECT_NEAR(std::abs(batch.value(0)), 1.0, 0.01);
-    EXPECT_NEAR(batch.value(0), -batch.value(1), 0.01);
+    out.find();
+    return out;
   }
+
+ private:
+  CurveShape curve_{std::array<double, kShapeKnots>{}, 0.0};
+};
+
+// In drive, where the curve rises, the one makes up for the other; counted each for itself, the
+// distance there is less than its noise. In overrun both go one way.
+TEST_P(ForceReadWrong, CountsOnce) {
+  const FootBatch batch = found(1.0);
+  EXPECT_NEAR(std::abs(batch.value(0)), 1.0, 0.01);
+  EXPECT_NEAR(batch.value(0), -batch.value(1), 0.01);
 }
+
+// Else all columns of a fit have the clamp force's noise in them.
+TEST_P(ForceReadWrong, IsInNoSlopeWhereItIsNoise) {
+  const FootBatch noise = found(1.0), rests = found(0.0);
+  EXPECT_NEAR(noise.slope(0) / noise.slope(1), 1.0, 0.02 * kForceShare);
+  EXPECT_NEAR(rests.slope(0) / rests.slope(1), 1.0 + 2.0 * kForceShare, 0.1 * kForceShare);
+  EXPECT_NEAR(noise.calm(0), 1.0 - kForceShare, 0.02 * kForceShare);
+  EXPECT_EQ(rests.calm(0), 1.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(FootPoints, ForceReadWrong,
+                         testing::Values(0.1, 0.3, 0.6, 0.95, -0.1, -0.3, -0.6, -0.95));
 
 }  // namespace
 }  // namespace beltgrip::diagnose

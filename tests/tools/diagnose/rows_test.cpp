@@ -197,7 +197,7 @@ TEST(Rows, DerivativesAreThoseOfEachSample) {
     for (int mode = 0; mode < kShapeKnots; ++mode) {
       const auto of_mode = [&](int k) {
         const double departure = mode_shape(mode).departure(spline_position(std::abs(at.foot[k])));
-        return at.measured.capacity[k] * departure * -std::copysign(at.weight[k], at.foot[k]);
+        return at.calm_capacity_Nm[k] * departure * -std::copysign(at.weight[k], at.foot[k]);
       };
       expect_same(rows(kShapeOverdrive + mode, kFrictionResidual), expected(of_mode));
       if (low) {

@@ -69,10 +69,17 @@ void FootBatch::find_one(std::size_t i) {
   x_[i] = foot.x;
   model_Nm_[i] = foot.model_Nm;
   slope_[i] = foot.slope;
+  const auto variance_Nm2 = [&](double slope, double force_Nm) {
+    return torque_variance_[i] + slope * slope * slip_variance_[i] + force_Nm * force_Nm;
+  };
   const double force_Nm = of_force_Nm(i);
-  weight_[i] = 1.0 / std::sqrt(torque_variance_[i] + foot.slope * foot.slope * slip_variance_[i] +
-                               force_Nm * force_Nm);
-  value_[i] = (torque_Nm - foot.model_Nm - foot.slope * (slip - foot.x * peak_)) * weight_[i];
+  const double gap_Nm = torque_Nm - foot.model_Nm - foot.slope * (slip - foot.x * peak_);
+  const double off =
+      reading_share_ * force_share_[i] * force_Nm * gap_Nm / variance_Nm2(foot.slope, force_Nm);
+  calm_[i] = 1.0 + std::clamp(off, -kMoveMost, kMoveMost);
+  slope_[i] = foot.slope * calm_[i];
+  weight_[i] = 1.0 / std::sqrt(variance_Nm2(slope_[i], of_force_Nm(i)));
+  value_[i] = gap_Nm * weight_[i];
 }
 
 void FootBatch::find_simply() {
@@ -251,18 +258,28 @@ class FootSearch {
   }
 
   BELTGRIP_LANES void weigh(std::size_t i) {
-    const Value slope = load(batch_.slope_, i);
-    const Value force_Nm = load(batch_.model_Nm_, i) * load(batch_.force_share_, i) -
-                           slope * load(batch_.slip_of_force_, i);
-    const Value noise =
-        Curve::root(load(batch_.torque_variance_, i) +
-                    slope * slope * load(batch_.slip_variance_, i) + force_Nm * force_Nm);
-    const Value weight = 1.0 / noise;
-    const Value value = (load(level_Nm_, i) - load(batch_.model_Nm_, i) -
-                         slope * (load(batch_.slip_, i) - load(batch_.x_, i) * batch_.peak_)) *
-                        weight;
+    const Value share = load(batch_.force_share_, i), model_Nm = load(batch_.model_Nm_, i);
+    const Value slip_of_force = load(batch_.slip_of_force_, i);
+    const Value torque_Nm2 = load(batch_.torque_variance_, i);
+    const Value slip_share2 = load(batch_.slip_variance_, i);
+    const auto force_Nm = [&](Value slope)
+                              BELTGRIP_INLINE { return model_Nm * share - slope * slip_of_force; };
+    const auto variance_Nm2 = [&](Value slope, Value by_force_Nm) BELTGRIP_INLINE {
+      return torque_Nm2 + slope * slope * slip_share2 + by_force_Nm * by_force_Nm;
+    };
+    const Value slope = load(batch_.slope_, i), by_force_Nm = force_Nm(slope);
+    const Value gap_Nm = load(level_Nm_, i) - model_Nm -
+                         slope * (load(batch_.slip_, i) - load(batch_.x_, i) * batch_.peak_);
+    const Value off =
+        batch_.reading_share_ * share * by_force_Nm * gap_Nm / variance_Nm2(slope, by_force_Nm);
+    const Value least = Value{} - FootBatch::kMoveMost, most = Value{} + FootBatch::kMoveMost;
+    const Value calm = 1.0 + (off < least ? least : off > most ? most : off);
+    const Value calm_slope = slope * calm;
+    const Value weight = 1.0 / Curve::root(variance_Nm2(calm_slope, force_Nm(calm_slope)));
+    store(calm, batch_.calm_, i);
+    store(calm_slope, batch_.slope_, i);
     store(weight, batch_.weight_, i);
-    store(value, batch_.value_, i);
+    store(gap_Nm * weight, batch_.value_, i);
   }
 
   FootBatch& batch_;

@@ -21,10 +21,15 @@ struct FootNoise {
 class FootBatch {
  public:
   static constexpr std::size_t kMost = 128;
+  static constexpr double kMoveMost = 0.2;  // chosen, of the clamp force: none is off by more
   using Column = std::array<double, kMost>;
 
-  FootBatch(const CurveShape& curve, double peak_slip_share)
-      : curve_(curve), peak_(peak_slip_share), per_peak_(1.0 / peak_slip_share) {}
+  // reading_share: of the clamp force's variance, what is noise of the samples.
+  FootBatch(const CurveShape& curve, double peak_slip_share, double reading_share)
+      : curve_(curve),
+        peak_(peak_slip_share),
+        per_peak_(1.0 / peak_slip_share),
+        reading_share_(reading_share) {}
 
   // slip_spread_share2: by how much the slip varies within the sample.
   void add(double slip_share, double torque_Nm, double capacity_Nm, double slip_spread_share2,
@@ -48,7 +53,11 @@ class FootBatch {
   std::size_t count() const { return count_; }
   double x(std::size_t i) const { return x_[i]; }
   double model_Nm(std::size_t i) const { return model_Nm_[i]; }
-  double slope(std::size_t i) const { return slope_[i]; }    // dT/d(slip)
+  // The clamp force less what of the distance is its samples' noise, over that which is measured.
+  // That noise in slopes, and so in weights, would stand in all columns of a fit, and where most of
+  // the distance is such noise they would together explain it.
+  double calm(std::size_t i) const { return calm_[i]; }
+  double slope(std::size_t i) const { return slope_[i]; }    // dT/d(slip), by the calm force
   double weight(std::size_t i) const { return weight_[i]; }  // 1 / (noise of the distance)
   // What of that noise one sigma of the clamp force is, Nm.
   double of_force_Nm(std::size_t i) const {
@@ -75,11 +84,11 @@ class FootBatch {
   }
 
   const CurveShape& curve_;
-  double peak_, per_peak_;
+  double peak_, per_peak_, reading_share_;
   std::size_t count_ = 0;
   alignas(64) Column slip_, torque_Nm_, capacity_Nm_, slip_spread_;
   alignas(64) Column slip_variance_, torque_variance_, force_share_, slip_of_force_;
-  alignas(64) Column x_, model_Nm_, slope_, weight_, value_;
+  alignas(64) Column x_, model_Nm_, slope_, calm_, weight_, value_;
 };
 
 }  // namespace beltgrip::diagnose

@@ -99,6 +99,7 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
       campaign.slip_noise_share_of(run) * campaign.slip_noise_share_of(run);
   const double sensor_variance = campaign.noise.torque_Nm * campaign.noise.torque_Nm;
   out.of_force_Nm = ArrayXd::Zero(n);
+  out.calm_capacity_Nm = q.capacity;
   const ArrayXd force_share = force_noise_share(campaign, data);
   const ArrayXd slip_of_force = slip_noise_of_force(campaign, q);
   std::array<std::vector<int>, kStops> at_stop;  // samples
@@ -113,7 +114,8 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
     for (std::size_t first = 0; first < all.size(); first += FootBatch::kMost) {
       const auto samples =
           std::span(all).subspan(first, std::min(FootBatch::kMost, all.size() - first));
-      FootBatch batch(curve[stop], std::exp(q.ln_peak_slip[stop]));
+      FootBatch batch(curve[stop], std::exp(q.ln_peak_slip[stop]),
+                      campaign.noise.force_reading_share);
       for (const int k : samples) {
         batch.add(q.slip_share[k], q.belt_torque[k], q.capacity[k], data.slip_spread_share2[k],
                   {slip_variance, sensor_variance, force_share[k], slip_of_force[k]});
@@ -126,6 +128,7 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
         out.model_Nm[k] = batch.model_Nm(i);
         out.weight[k] = batch.weight(i);
         out.of_force_Nm[k] = batch.of_force_Nm(i);
+        out.calm_capacity_Nm[k] = q.capacity[k] * batch.calm(i);
         out.value[kFrictionResidual][k] = batch.value(i);
       }
     }
@@ -143,10 +146,6 @@ Residuals residuals_of(const Campaign& campaign, int run, const ModelState& stat
   }
   return out;
 }
-
-namespace {
-constexpr double kMoveMost = 0.2;  // chosen, of the clamp force: no foot point is farther
-}  // namespace
 
 // What stands in the regressors, without what of the misfit is the noise of the torque and of the
 // clamp force: of each what is most probable by the noises of all three.
@@ -169,7 +168,7 @@ void move_to_foot(const Campaign& campaign, int run, Residuals& at) {
           const double misfit_per_Nm = value[k] * weight[k];
           const double off_Nm = sensor_Nm2 * misfit_per_Nm;
           const double off_N = noise_N * of_force_Nm[k] * misfit_per_Nm;
-          const double most_N = kMoveMost * force_N[k];
+          const double most_N = FootBatch::kMoveMost * force_N[k];
           clean_Pa[k] += (off_N < -most_N ? -most_N : off_N > most_N ? most_N : off_N) / area_m2;
           clean_Nm[k] -= off_Nm;
           reading_Nm[k] -= off_Nm;
@@ -211,7 +210,7 @@ void fill_modes(const ExperimentData& data, Residuals& at) {
       const bool counts = at.weight[k] > 0.0;
       at.is_low[static_cast<Row>(samples.size())] = stop == kLowStop ? 1.0 : 0.0;
       if (counts) at.has_stop[static_cast<std::size_t>(stop)] = true;
-      samples.push_back({spline_position(std::abs(at.foot[k])), at.measured.capacity[k],
+      samples.push_back({spline_position(std::abs(at.foot[k])), at.calm_capacity_Nm[k],
                          counts ? -std::copysign(at.weight[k], at.foot[k]) : 0.0});
     }
   }
@@ -599,9 +598,10 @@ NoiseLevels estimate_noise_levels(const Campaign& campaign, const ModelState& st
         {robust_sigma(balance[stop]), 2e-3, std::hypot(torque_Nm, ratio[stop] * torque_s_Nm)});
   }
   out.balance = parts_of_balance_noise(campaign, state, balance_Nm);
-  out.force_N = std::max({robust_sigma(force), 0.2,
-                          campaign.variator.secondary_piston_area_m2 *
-                              rounding(&ExperimentData::left_of_rounding_Pa)});
+  const double reading_N = std::max(robust_sigma(force), 0.2);
+  out.force_N = std::max(reading_N, campaign.variator.secondary_piston_area_m2 *
+                                        rounding(&ExperimentData::left_of_rounding_Pa));
+  out.force_reading_share = reading_N * reading_N / (out.force_N * out.force_N);
   out.tracking_Pa = std::max(robust_sigma(tracking), 20.0);
   return out;
 }

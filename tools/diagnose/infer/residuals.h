@@ -29,12 +29,17 @@ struct NoiseLevels {
   std::array<BalanceNoise, kStops> balance;
   double tracking_Pa = 1e3;
   double force_N = 1.0;
+  // Of its variance: what is noise of the samples. The rest, as long as a reading rests on its
+  // step, does not change from one to the next.
+  double force_reading_share = 1.0;
+  // More is no noise of the samples either.
   NoiseLevels times(double factor) const {
     return {slip_share * factor,
             torque_Nm * factor,
             {balance[0].times(factor), balance[1].times(factor)},
             tracking_Pa * factor,
-            force_N * factor};
+            force_N * factor,
+            force_reading_share / (factor * factor)};
   }
 };
 
@@ -109,6 +114,9 @@ struct Residuals {
   // One sigma of the clamp force, in Nm of the distance: what it carries less what it takes of the
   // slip by the pulleys that give way.
   Eigen::ArrayXd of_force_Nm;
+  // Of the belt by the clamp force that the samples' noise is taken off as far as the distance
+  // tells it, Nm.
+  Eigen::ArrayXd calm_capacity_Nm;
   // By move_to_foot only: of the belt at the foot point, and what the sensors would read there. No
   // noise in a regressor.
   Eigen::ArrayXd clean_Nm, output_torque;
