@@ -59,6 +59,32 @@ TEST(SensorAccuracy, ExcusesNoGainFarBeyondIt) {
   EXPECT_NEAR(d.gain, 0.08, 0.005);
 }
 
+// A car, whose only torque reads too much: the acceleration takes less of it than it should.
+std::vector<std::string> names_of_a_car(double torque_gain, double stated) {
+  blind::Trial trial;
+  trial.seed = 7;
+  blind::Random random(trial.seed);
+  trial.machine.setting = blind::Setting::kCar;
+  trial.plan = blind::draw_plan(random, trial.machine.setting, 10);
+  for (blind::PlannedRun& run : trial.plan) run.profile = blind::Profile::kSpeedSweep;
+  trial.planted.push_back({"torque_gain", {{"gain", torque_gain}}, {}});
+  Accuracies accuracies{};
+  accuracies[static_cast<std::size_t>(Role::kEngineTorque)].gain = stated;
+  Engine engine(campaign_of(trial, accuracies));
+  std::vector<std::string> out;
+  for (const Accepted& each : name_effects(engine, [] { return false; }).accepted) {
+    out.emplace_back(engine.campaign().slots[static_cast<std::size_t>(each.slot)].row->id);
+  }
+  return out;
+}
+
+TEST(SensorAccuracy, OfTheOnlyTorqueIsNoGain) {
+  constexpr double kGain = 0.15;
+  EXPECT_EQ(names_of_a_car(kGain, 0.0), std::vector<std::string>{"inertia_torque"});
+  EXPECT_EQ(names_of_a_car(kGain, 0.2 * kGain), std::vector<std::string>{"inertia_torque"});
+  EXPECT_TRUE(names_of_a_car(kGain, 0.5 * kGain).empty());
+}
+
 struct Offset {
   std::vector<std::string> names;
   double as_machine_Pa = 0.0;

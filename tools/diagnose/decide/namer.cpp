@@ -246,10 +246,11 @@ double stated_sigma(const Campaign& campaign, const Slot& slot) {
     return campaign.variator.secondary_piston_area_m2 * of(Role::kSecondaryPressure).bias;
   }
   if (id == "pressure_gain") return of(Role::kSecondaryPressure).gain;
-  if (id == "torque_bias") {
-    const bool is_engine = campaign.runs.size() > 0 && campaign.runs[0].torque_is_engine;
-    return of(is_engine ? Role::kEngineTorque : Role::kPrimaryTorque).bias;
-  }
+  const bool is_engine = campaign.runs.size() > 0 && campaign.runs[0].torque_is_engine;
+  const auto torque = of(is_engine ? Role::kEngineTorque : Role::kPrimaryTorque);
+  if (id == "torque_bias") return torque.bias;
+  // Against another torque the machine has a constant for it (kSecondaryTorqueGain).
+  if (id == "torque_gain") return campaign.has_balance ? 0.0 : torque.gain;
   if (id == "speed_scale") {
     return of(slot.row->parameter == "primary" ? Role::kPrimarySpeed : Role::kSecondarySpeed).gain;
   }
