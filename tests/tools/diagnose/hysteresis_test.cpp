@@ -56,7 +56,7 @@ TEST(Play, OfAnyCylinderIsAConstantOfTheMachineAndNoFinding) {
 
 // What the machine's own may be is part of what is told.
 TEST(Play, BeyondAnyCylindersIsToldAsAWhole) {
-  constexpr double kBeyond_N = 160.0;
+  constexpr double kBeyond_N = 100.0;
   Engine engine(campaign_of(trial_of(1, 1, kBeyond_N)));
   const Naming naming = name_effects(engine, [] { return false; });
   ASSERT_EQ(naming.accepted.size(), 1U);
