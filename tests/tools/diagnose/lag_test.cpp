@@ -62,11 +62,12 @@ struct Named {
   Engine engine;
   Naming naming;
 };
+// Twelve runs: a little of the lag may be the machine's own play as well, less with more of them.
 Named named(double lag_s) {
   Rig rig;
   rig.lag_s = lag_s;
   std::vector<ExperimentData> runs;
-  for (unsigned seed = 0; seed < 6; ++seed) {
+  for (unsigned seed = 0; seed < 12; ++seed) {
     rig.torque_Nm = seed % 2 == 0 ? 50.0 : 44.0;
     runs.push_back(prepare(rig.record(seed), rig.variator));
   }
@@ -81,8 +82,7 @@ TEST(HydraulicLag, IsFoundInItsSizeBehindAStepThatDoesNotCount) {
   const int found = naming.accepted.front().slot;
   const Slot& slot = engine.campaign().slots[static_cast<std::size_t>(found)];
   EXPECT_EQ(slot.label(), "hydraulic_lag.time_constant_s");
-  // In ramps of one rate a little of it is the machine's own play as well.
-  EXPECT_NEAR(naming.hypothesis.state.effects[found], kLag_s, 0.05 * kLag_s);
+  EXPECT_NEAR(naming.hypothesis.state.effects[found], kLag_s, 0.03 * kLag_s);
 }
 
 TEST(HydraulicLag, IsNotFoundWhereThereIsNone) { EXPECT_TRUE(named(0.0).naming.accepted.empty()); }
