@@ -103,6 +103,28 @@ TEST(ForceNoise, IsNoneOfTheSlip) {
   expect_that(stiff);
 }
 
+// In overrun it moves capacity and slip in one direction. As nothing explains it, a fit of all that
+// there is leaves it as it was.
+TEST(ForceNoise, IsExplainedByNoFit) {
+  for (const double torque_Nm : {-45.0, 45.0}) {
+    SCOPED_TRACE(torque_Nm);
+    blind::Trial trial;
+    trial.seed = 5;
+    trial.machine.setting = blind::Setting::kCar;
+    trial.machine.noise_pressure_Pa = 15e3;
+    trial.machine.deformation_per_kN = 2e-3;
+    trial.plan = blind::paper_plan(10);
+    for (std::size_t i = 0; i < trial.plan.size(); ++i) {
+      trial.plan[i].torque_Nm = torque_Nm;
+      trial.plan[i].speed_rad_s = 100.0 + 8.0 * static_cast<double>(i % 5);
+    }
+    Engine engine(campaign_of(trial));
+    engine.fit_machine();
+    engine.update_noise();
+    EXPECT_GT(engine.whitening().filter[kFrictionResidual].sigma.front(), 0.85);
+  }
+}
+
 // Two experiments in the middle with less friction than those before and behind them: that is no
 // wear, which does not come back.
 TEST(Wear, DoesNotComeBack) {
