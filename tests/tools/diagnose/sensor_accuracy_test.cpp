@@ -85,6 +85,31 @@ TEST(SensorAccuracy, OfTheOnlyTorqueIsNoGain) {
   EXPECT_TRUE(names_of_a_car(kGain, 0.5 * kGain).empty());
 }
 
+// Far beyond what sensors are off by it is no force of the turning oil, with another friction.
+TEST(SensorAccuracy, OfThePressureMayBeFarBeyondWhatWasStated) {
+  constexpr double kGain = -0.18;
+  for (const std::uint64_t seed : {7U, 8U, 10U}) {
+    SCOPED_TRACE(seed);
+    blind::Trial trial;
+    trial.seed = seed;
+    blind::Random random(trial.seed);
+    trial.machine = blind::draw_machine(random);
+    trial.machine.setting = blind::Setting::kRig;
+    trial.plan = blind::draw_plan(random, trial.machine.setting, 12);
+    trial.planted.push_back({"pressure_gain", {{"gain", kGain}}, {}});
+    Accuracies accuracies{};
+    accuracies[static_cast<std::size_t>(Role::kSecondaryPressure)].gain = 0.005;
+    Engine engine(campaign_of(trial, accuracies));
+    const Naming naming = name_effects(engine, [] { return false; });
+    ASSERT_EQ(naming.accepted.size(), 1U);
+    const int slot = naming.accepted.front().slot;
+    EXPECT_EQ(engine.campaign().slots[static_cast<std::size_t>(slot)].row->id, "pressure_gain");
+    EXPECT_NEAR(naming.hypothesis.state.effects[slot], kGain, 0.2 * std::abs(kGain));
+    EXPECT_NEAR(std::exp(naming.hypothesis.state.nuisance[kLnMuMax]), trial.machine.mu_max,
+                0.03 * trial.machine.mu_max);
+  }
+}
+
 struct Offset {
   std::vector<std::string> names;
   double as_machine_Pa = 0.0;
