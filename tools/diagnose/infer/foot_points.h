@@ -21,7 +21,9 @@ struct FootNoise {
 class FootBatch {
  public:
   static constexpr std::size_t kMost = 128;
-  static constexpr double kMoveMost = 0.2;  // chosen, of the clamp force: none is off by more
+  // Chosen, of the clamp force: none is off by more. A fifth less or more: the same verdicts and
+  // names in 70 campaigns of other make, other last digits in half of them.
+  static constexpr double kMoveMost = 0.2;
   using Column = std::array<double, kMost>;
 
   // reading_share: of the clamp force's variance, what is noise of the samples.
