@@ -66,7 +66,7 @@ enum Nuisance : int {
 // machines of two generators of other make have 25 to 80 N. With a quarter more, in 200 of their
 // campaigns, opened: 13 of 84 healthy ones alarm instead of 14, 25 of 32 names are in the class
 // instead of 26; plays of 80 to 100 N have no name. A fifth more: the same in 60 of them; a fifth
-// less: two healthy machines of 63 and 71 N alarm, and three others of 72 to 77 N have it beside.
+// less, of 58: two healthy machines of 63 and 71 N alarm, three others of 72 to 77 N get the name.
 inline constexpr double kUsualPlay_N = 80.0;
 
 struct NuisanceRow {
